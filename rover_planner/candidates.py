@@ -1,0 +1,201 @@
+"""Candidate paths in the plane between two poses: a direct connection and a fan of curves beside it.
+
+Every candidate is driven forward, leaves the start along its heading and arrives along the goal's heading.
+The direct connection is a cubic Hermite curve, a straight line where both headings point along it. The
+fan adds a cosine bump across the chord to it, whose slope is zero at both ends, so both headings stay
+exact. Curves tighter than the smallest radius are dropped. Where even the direct connection is too
+tight (headings that oppose each other, a goal behind the rover) the arcs and lines of Dubins (1957) take
+over; they connect any two poses with the smallest radius, so there is always a candidate.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from rover_planner.dubins import dubins_paths
+from rover_planner.errors import PlanningError
+
+MIN_RADIUS = 0.8
+"""Smallest radius of a candidate [m], unless told: the wheelbase of the LSR-1 preset.
+
+With the radius equal to the wheelbase and steered end wheels, those on the inside turn by about 40 degrees.
+"""
+
+MAX_WAYPOINTS = 100_000
+"""Longest path worth sweeping [waypoints]; a longer one is a slip in the units of the request."""
+
+_SAME_PLACE = 1e-9
+_FINE_SAMPLES = 2001
+_TANGENT_SCALES = (1.0, 1.6, 2.4)
+
+Curve = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def generate_candidates(
+    start,
+    goal,
+    *,
+    count: int = 9,
+    spacing: float = 0.3,
+    waypoint_spacing: float = 0.02,
+    min_radius: float = MIN_RADIUS,
+) -> list[np.ndarray]:
+    """Make candidate paths from start to goal, the direct connection first, then outwards to both sides.
+
+    Args:
+        start: x, y [m] and yaw [rad] of the body origin in the map frame.
+        goal: x, y [m] and yaw [rad] of the body origin in the map frame.
+        count: Largest number of candidates.
+        spacing: Lateral distance between neighbouring candidates half-way [m].
+        waypoint_spacing: Largest distance between waypoints along the path [m].
+        min_radius: Radius of the tightest curve the rover may drive [m].
+
+    Returns:
+        One to `count` arrays (n, 3) of x, y [m] and yaw [rad, in -pi to pi], yaw along the tangent. The
+        waypoints of a path are equally far apart along it, at most `waypoint_spacing`; the first is the
+        start and the last the goal. One single pose where start and goal are the same.
+
+    Raises:
+        PlanningError: An argument is NaN or out of range, or the path has more than MAX_WAYPOINTS.
+    """
+    start = _check_pose("start", start)
+    goal = _check_pose("goal", goal)
+    _check_count(count)
+    _check_positive("spacing", spacing)
+    _check_positive("waypoint_spacing", waypoint_spacing)
+    _check_positive("min_radius", min_radius)
+    _check_length(start, goal, waypoint_spacing)
+
+    chord = float(np.hypot(*(goal[:2] - start[:2])))
+    turn = abs(_wrap(goal[2] - start[2]))
+    if chord <= _SAME_PLACE and turn <= _SAME_PLACE:
+        return [goal[None, :].copy()]
+
+    paths = []
+    if chord > _SAME_PLACE:
+        paths = _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius)
+    if not paths:
+        for x, y, yaw in dubins_paths(start, goal, min_radius, waypoint_spacing)[:count]:
+            paths.append(np.column_stack([x, y, yaw]))
+    return [_pin_ends(path, start, goal) for path in paths]
+
+
+def lateral_offsets(count: int, spacing: float) -> list[float]:
+    """List the lateral offsets of a fan [m]: 0, then to the left and right in turn, further each time."""
+    return [spacing * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(count)]
+
+
+def path_length(poses: np.ndarray) -> float:
+    """Return the length [m] of a path of poses (n, 3), measured along its chords."""
+    return float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
+
+
+def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:
+    """Sample the direct curve and its neighbours; nothing where the direct one is too tight."""
+    scale = next(
+        (s for s in _TANGENT_SCALES if _drivable(_connect(start, goal, s), min_radius)), None
+    )
+    if scale is None:
+        return []
+    curves = [_connect(start, goal, scale, offset) for offset in lateral_offsets(count, spacing)]
+    return [_sample(curve, waypoint_spacing) for curve in curves if _drivable(curve, min_radius)]
+
+
+def _connect(start, goal, scale: float, offset: float = 0.0) -> Curve:
+    """Return a curve of its parameter in 0 to 1: the Hermite cubic plus a bump of `offset` metres.
+
+    `scale` times the chord is the length of the end tangents. The curve returns positions and first
+    derivatives, each (n, 2).
+    """
+    chord = goal[:2] - start[:2]
+    length = np.hypot(*chord)
+    left = np.array([-chord[1], chord[0]]) / length
+    m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
+    m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
+
+    def curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        t = t[:, None]
+        h = t * t * (3 - 2 * t)
+        dh = 6 * t * (1 - t)
+        place = start[:2] + h * chord + t * (1 - t) ** 2 * m0 - t * t * (1 - t) * m1
+        slope = dh * chord + (1 - t) * (1 - 3 * t) * m0 + t * (3 * t - 2) * m1
+        bump = 0.5 * offset * (1 - np.cos(2 * np.pi * t))
+        dbump = np.pi * offset * np.sin(2 * np.pi * t)
+        return place + bump * left, slope + dbump * left
+
+    return curve
+
+
+def _drivable(curve: Curve, min_radius: float) -> bool:
+    """Tell whether the tightest place of a curve is no tighter than `min_radius` [m]."""
+    _, slope = curve(np.linspace(0.0, 1.0, _FINE_SAMPLES))
+    speed = np.hypot(slope[:, 0], slope[:, 1])
+    if speed.min() <= 1e-6 * speed.max():
+        return False
+    yaw = np.unwrap(np.arctan2(slope[:, 1], slope[:, 0]))
+    turned = np.abs(np.diff(yaw))
+    driven = 0.5 * (speed[1:] + speed[:-1]) / (_FINE_SAMPLES - 1)
+    return bool(np.all(turned * min_radius <= driven * (1 + 1e-9)))
+
+
+def _sample(curve: Curve, waypoint_spacing: float) -> np.ndarray:
+    """Sample poses (n, 3) equally far apart along a curve."""
+    t = np.linspace(0.0, 1.0, _FINE_SAMPLES)
+    _, slope = curve(t)
+    speed = np.hypot(slope[:, 0], slope[:, 1])
+    middle = np.hypot(*curve(0.5 * (t[1:] + t[:-1]))[1].T)
+    driven = np.concatenate(
+        [[0.0], np.cumsum((speed[1:] + 4 * middle + speed[:-1]) / 6 / (_FINE_SAMPLES - 1))]
+    )
+    steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
+    parameter = CubicHermiteSpline(driven, t, 1 / speed)(np.linspace(0.0, driven[-1], steps + 1))
+    place, slope = curve(parameter)
+    return np.column_stack([place, np.arctan2(slope[:, 1], slope[:, 0])])
+
+
+def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """Put the exact start and goal at the ends of a path; their yaw is already right but for rounding."""
+    path[0], path[-1] = start, goal
+    path[:, 2] = _wrap(path[:, 2])
+    return path
+
+
+def _wrap(angle):
+    """Bring an angle [rad] into -pi to pi, leaving those inside as they are."""
+    inside = np.abs(angle) <= np.pi
+    return np.where(inside, angle, np.arctan2(np.sin(angle), np.cos(angle)))
+
+
+def _check_pose(name: str, pose) -> np.ndarray:
+    try:
+        values = np.array(pose, dtype=float)
+    except (TypeError, ValueError):
+        raise PlanningError(f"{name} is {pose!r}; it is three numbers x, y, yaw") from None
+    if values.shape != (3,):
+        raise PlanningError(f"{name} has shape {values.shape}; it is three numbers x, y, yaw")
+    if not np.isfinite(values).all():
+        raise PlanningError(f"{name} is {values.tolist()}; x, y and yaw must be finite")
+    values[2] = _wrap(values[2])
+    return values
+
+
+def _check_count(count) -> None:
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise PlanningError(f"count is {count!r}; it must be a whole number of at least 1")
+
+
+def _check_positive(name: str, value) -> None:
+    number = isinstance(value, int | float | np.integer | np.floating)
+    if not number or not np.isfinite(value) or value <= 0:
+        raise PlanningError(f"{name} is {value!r}; it must be a finite number above 0")
+
+
+def _check_length(start: np.ndarray, goal: np.ndarray, waypoint_spacing: float) -> None:
+    with np.errstate(over="ignore"):
+        chord = float(np.hypot(*(goal[:2] - start[:2])))
+    if not chord / waypoint_spacing < MAX_WAYPOINTS:
+        raise PlanningError(
+            f"the goal is {chord:.4g} m from the start: in steps of {waypoint_spacing} m that is "
+            f"more than {MAX_WAYPOINTS} waypoints"
+        )

@@ -1,0 +1,102 @@
+"""Dubins paths: the shortest forward connections of two poses by arcs of one radius and straight lines.
+
+Dubins, L. E. (1957), On curves of minimal length with a constraint on average curvature, American Journal
+of Mathematics 79(3). The six words are solved in the normalised form of Shkel and Lumelsky (2001),
+Classification of the Dubins set, Robotics and Autonomous Systems 34.
+"""
+
+import numpy as np
+
+_TURN = {"L": 1.0, "S": 0.0, "R": -1.0}
+
+
+def dubins_paths(
+    start: np.ndarray, goal: np.ndarray, radius: float, waypoint_spacing: float
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Connect two poses by every Dubins word that exists, the shortest first.
+
+    Args:
+        start, goal: x, y [m] and yaw [rad], (3,) each.
+        radius: Radius of the arcs [m].
+        waypoint_spacing: Largest distance between waypoints along the path [m].
+
+    Returns:
+        One to six paths, each x (n,), y (n,) [m] and yaw (n,) [rad], with waypoints equally far apart.
+    """
+    dx, dy = (goal[:2] - start[:2]) / radius
+    bearing = np.arctan2(dy, dx)
+    distance = float(np.hypot(dx, dy))
+    words = _solve_words(_turn(start[2] - bearing), _turn(goal[2] - bearing), distance)
+    words.sort(key=lambda word: sum(word[1]))
+    return [_drive(start, word, pieces, radius, waypoint_spacing) for word, pieces in words]
+
+
+def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, float, float]]]:
+    """Solve the six words for headings a, b to the chord [rad] and its length d [radii].
+
+    Returns each word that exists with the lengths of its three pieces [radii, which is rad on arcs].
+    """
+    sa, ca, sb, cb, cab = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.cos(a - b)
+    words = []
+
+    square = 2 + d * d - 2 * cab + 2 * d * (sa - sb)
+    if square >= 0:
+        line = np.arctan2(cb - ca, d + sa - sb)
+        words.append(("LSL", (_turn(line - a), np.sqrt(square), _turn(b - line))))
+    square = 2 + d * d - 2 * cab + 2 * d * (sb - sa)
+    if square >= 0:
+        line = np.arctan2(ca - cb, d - sa + sb)
+        words.append(("RSR", (_turn(a - line), np.sqrt(square), _turn(line - b))))
+    square = -2 + d * d + 2 * cab + 2 * d * (sa + sb)
+    if square >= 0:
+        p = np.sqrt(square)
+        line = np.arctan2(-ca - cb, d + sa + sb) - np.arctan2(-2.0, p)
+        words.append(("LSR", (_turn(line - a), p, _turn(line - b))))
+    square = -2 + d * d + 2 * cab - 2 * d * (sa + sb)
+    if square >= 0:
+        p = np.sqrt(square)
+        line = np.arctan2(ca + cb, d - sa - sb) - np.arctan2(2.0, p)
+        words.append(("RSL", (_turn(a - line), p, _turn(b - line))))
+    cosine = (6 - d * d + 2 * cab + 2 * d * (sa - sb)) / 8
+    if abs(cosine) <= 1:
+        p = 2 * np.pi - np.arccos(cosine)
+        t = _turn(a - np.arctan2(ca - cb, d - sa + sb) + p / 2)
+        words.append(("RLR", (t, p, _turn(a - b - t + p))))
+    cosine = (6 - d * d + 2 * cab + 2 * d * (sb - sa)) / 8
+    if abs(cosine) <= 1:
+        p = 2 * np.pi - np.arccos(cosine)
+        t = _turn(-a - np.arctan2(ca - cb, d + sa - sb) + p / 2)
+        words.append(("LRL", (t, p, _turn(b - a - t + p))))
+    return words
+
+
+def _drive(start, word, pieces, radius, waypoint_spacing):
+    """Sample a word from the start: x, y, yaw, equally far apart along it."""
+    ends = np.concatenate([[0.0], np.cumsum(pieces)])
+    steps = max(1, int(np.ceil(ends[-1] * radius / waypoint_spacing - 1e-9)))
+    driven = np.linspace(0.0, ends[-1], steps + 1)
+    x, y, yaw = np.zeros(steps + 1), np.zeros(steps + 1), np.zeros(steps + 1)
+    x0, y0, yaw0 = 0.0, 0.0, start[2]
+    for k, letter in enumerate(word):
+        here = (driven >= ends[k]) if k == 2 else (driven >= ends[k]) & (driven < ends[k + 1])
+        x[here], y[here], yaw[here] = _advance(x0, y0, yaw0, _TURN[letter], driven[here] - ends[k])
+        x0, y0, yaw0 = _advance(x0, y0, yaw0, _TURN[letter], pieces[k])
+    return start[0] + radius * x, start[1] + radius * y, yaw
+
+
+def _advance(x, y, yaw, turn, s):
+    """Move by s [radii] along a unit arc to the left (turn 1), to the right (-1) or straight on (0)."""
+    if turn == 0.0:
+        return x + s * np.cos(yaw), y + s * np.sin(yaw), yaw + 0.0 * s
+    after = yaw + turn * s
+    return (
+        x + turn * (np.sin(after) - np.sin(yaw)),
+        y - turn * (np.cos(after) - np.cos(yaw)),
+        after,
+    )
+
+
+def _turn(angle: float) -> float:
+    """Bring an angle [rad] into 0 to 2 pi, with one that is a full turn but for rounding at 0."""
+    turned = float(np.mod(angle, 2 * np.pi))
+    return 0.0 if 2 * np.pi - turned < 1e-9 else turned
