@@ -1,0 +1,1 @@
+"""ROS messages to numpy and back: pure functions, one file per kind of message."""

@@ -1,0 +1,21 @@
+"""The exceptions of the package, all of them below RoverError."""
+
+
+class RoverError(Exception):
+    """Root of every error that this package raises on purpose."""
+
+
+class RoverFileError(RoverError):
+    """A rover file with a missing, unknown or impossible key; the text names the dotted key."""
+
+
+class TerrainError(RoverError):
+    """A terrain of wrong shape or resolution, without any known cell, or in an unreadable file."""
+
+
+class PoseError(RoverError):
+    """Poses of the wrong shape, or with values that are not finite numbers."""
+
+
+class ModelError(RoverError):
+    """A model argument outside its range, such as an unknown policy or a friction of zero."""

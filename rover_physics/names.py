@@ -1,0 +1,23 @@
+"""Names and order of wheels, sides and joints in every per-wheel and per-side array."""
+
+WHEELS = (
+    "rear_right",
+    "middle_right",
+    "front_right",
+    "rear_left",
+    "middle_left",
+    "front_left",
+)
+"""Wheel order of every per-wheel array, as in the paper: the right side first, rear to front."""
+
+SIDES = ("right", "left")
+"""Side order of every per-side array."""
+
+WHEEL_POSITIONS = ("rear", "middle", "front")
+"""Names of the wheels of one side, rear to front; the keys of ``suspension.wheels``."""
+
+SUSPENSION_JOINTS = ("rocker_right", "rocker_left", "bogie_right", "bogie_left")
+"""Suspension joints as they are called in joint messages."""
+
+WHEEL_JOINTS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
+"""Wheel drive joints as they are called in joint messages, in wheel order."""

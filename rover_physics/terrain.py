@@ -1,0 +1,292 @@
+"""The terrain: an elevation grid with unknown cells and an optional friction layer."""
+
+import zipfile
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage, sparse
+from scipy.sparse import linalg
+
+from rover_physics.errors import TerrainError
+
+_EDGE_TOLERANCE = 1e-9  # cells; rounding of (x - origin) / resolution at the map's edge
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Ground heights on a regular grid in the map frame.
+
+    Cell [j, i] is centred at x = origin[0] + i * resolution, y = origin[1] + j * resolution.
+    Arrays are taken as they are where type and layout fit, not copied: do not write into them.
+
+    Raises:
+        TerrainError: Wrong shape or type, resolution not above 0, infinite heights, no known cell.
+    """
+
+    elevation: NDArray[np.float64]
+    """Heights (ny, nx) in [m], row 0 at smallest y, column 0 at smallest x, NaN where unknown."""
+    resolution: float
+    """Cell size in [m]."""
+    origin: tuple[float, float] = (0.0, 0.0)
+    """Centre (x, y) of cell [0, 0] in [m], map frame."""
+    friction: NDArray[np.float64] | None = None
+    """Coulomb coefficients (ny, nx), NaN where the rover's default holds; None: everywhere."""
+
+    def __post_init__(self) -> None:
+        elevation = _as_grid("elevation", self.elevation)
+        if not np.isfinite(elevation).any():
+            ny, nx = elevation.shape
+            raise TerrainError(
+                f"elevation has no known cell: all {ny} x {nx} are NaN; at least one must be known"
+            )
+        friction = self.friction
+        if friction is not None:
+            friction = _as_grid("friction", friction)
+            if friction.shape != elevation.shape:
+                raise TerrainError(
+                    f"friction has shape {friction.shape}; it must be that of elevation, "
+                    f"{elevation.shape}"
+                )
+            _refuse_first(friction, friction <= 0.0, "friction", "above 0, or NaN for the default")
+        object.__setattr__(self, "elevation", elevation)
+        object.__setattr__(self, "resolution", _as_resolution(self.resolution))
+        object.__setattr__(self, "origin", _as_origin(self.origin))
+        object.__setattr__(self, "friction", friction)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Extent (xmin, xmax, ymin, ymax) in [m] between the centres of the outermost cells."""
+        ny, nx = self.elevation.shape
+        x, y = self.origin
+        return (x, x + (nx - 1) * self.resolution, y, y + (ny - 1) * self.resolution)
+
+    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which points are on the map, within `bounds`; known or not.
+
+        Args:
+            x: Positions in [m], map frame, any shape.
+            y: The same, of a shape that broadcasts with x.
+        """
+        ny, nx = self.elevation.shape
+        column, row = self._grid_coordinates(x, y)
+        inside = (column >= -_EDGE_TOLERANCE) & (column <= nx - 1 + _EDGE_TOLERANCE)
+        return inside & (row >= -_EDGE_TOLERANCE) & (row <= ny - 1 + _EDGE_TOLERANCE)
+
+    def elevation_at(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """Interpolate the height bilinearly between the four cell centres around each point.
+
+        Args:
+            x: Positions in [m], map frame, any shape.
+            y: The same, of a shape that broadcasts with x.
+
+        Returns:
+            Heights in [m] of the broadcast shape, NaN where one of the four cells is unknown, and
+            off the map.
+        """
+        ny, nx = self.elevation.shape
+        column, row = self._grid_coordinates(x, y)
+        inside = self.contains(x, y)
+        column = np.where(inside, column, 0.0)
+        row = np.where(inside, row, 0.0)
+        i = np.clip(np.floor(column).astype(np.intp), 0, nx - 2)
+        j = np.clip(np.floor(row).astype(np.intp), 0, ny - 2)
+        u, v = column - i, row - j
+        z = self.elevation
+        lower = (1.0 - u) * z[j, i] + u * z[j, i + 1]
+        upper = (1.0 - u) * z[j + 1, i] + u * z[j + 1, i + 1]
+        return np.where(inside, (1.0 - v) * lower + v * upper, np.nan)
+
+    def fill_gaps(self, max_gap: float) -> "Terrain":
+        """Close small unknown regions by a smooth surface through their rims.
+
+        A region of unknown cells, joined by their sides, is filled when no square wider than
+        ``max_gap`` fits into it and it does not touch the map's edge, so that known ground
+        is all around it. The surface is harmonic (each filled height is the mean of its four
+        neighbours): it continues planes exactly and makes no new peaks or pits.
+
+        Args:
+            max_gap: Largest width of a region in [m].
+
+        Returns:
+            A terrain with the gaps filled; larger regions stay NaN. Friction is as it was.
+
+        Raises:
+            TerrainError: max_gap is negative or not a number.
+        """
+        if not (np.isfinite(max_gap) and max_gap >= 0.0):
+            raise TerrainError(f"max_gap is {max_gap}; it must be a width of at least 0 in m")
+        gaps = _small_gaps(np.isnan(self.elevation), int(max_gap / self.resolution + 1e-9))
+        if not gaps.any():
+            return self
+        return replace(self, elevation=_fill_harmonic(self.elevation, gaps))
+
+    def _grid_coordinates(
+        self, x: ArrayLike, y: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return fractional column and row of points, broadcast to one shape."""
+        xs, ys = np.broadcast_arrays(
+            np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        )
+        column = (xs - self.origin[0]) / self.resolution
+        row = (ys - self.origin[1]) / self.resolution
+        return column, row
+
+
+def load_terrain(path: str | Path) -> Terrain:
+    """Load a terrain from an ``.npz`` file.
+
+    Args:
+        path: File with ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
+            optionally ``friction`` (ny, nx). Other entries, such as ``source``, are left alone.
+
+    Raises:
+        TerrainError: Unreadable file, a missing entry, or one that cannot be; names file and entry.
+    """
+    entries = _read_npz(Path(path))
+    for key in ("elevation", "resolution", "origin"):
+        if key not in entries:
+            raise TerrainError(
+                f"{path}: no entry {key}; a terrain file has elevation, resolution and origin"
+            )
+    try:
+        return Terrain(
+            elevation=entries["elevation"],
+            resolution=entries["resolution"],
+            origin=entries["origin"],
+            friction=entries.get("friction"),
+        )
+    except TerrainError as error:
+        raise TerrainError(f"{path}: {error}") from None
+
+
+def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
+    """Save a terrain as an ``.npz`` file that `load_terrain` reads.
+
+    Args:
+        path: File to write, taken as it is; a file of that name is replaced.
+        terrain: The terrain.
+        notes: Further texts to keep in the file, e.g. ``source``.
+
+    Raises:
+        TerrainError: The file cannot be written.
+    """
+    entries: dict[str, Any] = dict(notes)
+    entries["elevation"] = terrain.elevation
+    entries["resolution"] = np.float64(terrain.resolution)
+    entries["origin"] = np.asarray(terrain.origin)
+    if terrain.friction is not None:
+        entries["friction"] = terrain.friction
+    try:
+        with open(path, "wb") as file:
+            np.savez_compressed(file, **entries)
+    except OSError as error:
+        raise TerrainError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _read_npz(path: Path) -> dict[str, NDArray[Any]]:
+    """Read the entries that a terrain needs, without unpickling anything."""
+    wanted = ("elevation", "resolution", "origin", "friction")
+    name = ""
+    try:
+        archive = np.load(path, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise TerrainError(f"{path}: a single array; it must be an .npz file with elevation")
+        with archive:
+            entries = {}
+            for name in (key for key in wanted if key in archive.files):
+                entries[name] = archive[name]
+            return entries
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise TerrainError(f"{path}: cannot be read: {error.strerror}") from error
+        what = f"entry {name} is damaged or not numeric" if name else "not an .npz file"
+        reason = " ".join(str(error).split())
+        raise TerrainError(f"{path}: {what} ({reason})") from error
+
+
+def _as_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return a grid as C-contiguous float64 after checking type, shape and infinities."""
+    grid = np.asarray(values)
+    if grid.dtype.kind not in "fiu":
+        raise TerrainError(f"{name} has type {grid.dtype}; it must be an array of numbers")
+    if grid.ndim != 2 or min(grid.shape) < 2:
+        raise TerrainError(
+            f"{name} has shape {grid.shape}; it must be (ny, nx) with at least 2 rows and 2 columns"
+        )
+    grid = np.ascontiguousarray(grid, dtype=np.float64)
+    _refuse_first(grid, np.isinf(grid), name, "finite, or NaN where unknown")
+    return grid
+
+
+def _refuse_first(grid: NDArray[np.float64], bad: NDArray[np.bool_], name: str, must: str) -> None:
+    """Raise an error that names the first bad cell, if there is one."""
+    if bad.any():
+        row, column = (int(k) for k in np.argwhere(bad)[0])
+        value = grid[row, column]
+        raise TerrainError(f"{name}[{row}, {column}] is {value}; it must be {must}")
+
+
+def _as_resolution(value: Any) -> float:
+    """Return the cell size as a float after checking it."""
+    number = np.asarray(value)
+    if number.dtype.kind in "fiu" and number.size == 1:
+        resolution = float(number.reshape(()))
+        if np.isfinite(resolution) and resolution > 0.0:
+            return resolution
+    raise TerrainError(f"resolution is {value}; it must be one number above 0 in m")
+
+
+def _as_origin(value: Any) -> tuple[float, float]:
+    """Return the origin as two floats after checking it."""
+    try:
+        point = np.asarray(value)
+    except ValueError:
+        point = np.empty(0)
+    if point.dtype.kind in "fiu" and point.shape == (2,) and np.isfinite(point).all():
+        return (float(point[0]), float(point[1]))
+    raise TerrainError(
+        f"origin is {value}; it must be two numbers in m, x and y of the centre of cell [0, 0]"
+    )
+
+
+def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:
+    """Select the unknown regions in the map's inside that are at most max_cells wide."""
+    labels, count = ndimage.label(unknown)
+    small = np.ones(count + 1, dtype=bool)
+    small[0] = False
+    side = max_cells + 1
+    if side <= min(unknown.shape):
+        # A square that is too wide fits where the erosion by it leaves a cell.
+        wide = ndimage.minimum_filter(
+            unknown.astype(np.uint8), size=side, mode="constant", cval=0
+        ).astype(bool)
+        small[labels[wide]] = False
+    for edge in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        small[edge] = False
+    chosen: NDArray[np.bool_] = small[labels]
+    return chosen
+
+
+def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Solve for heights in the gaps that are the mean of their four neighbours each."""
+    count = int(gaps.sum())
+    index = np.full(gaps.shape, -1)
+    index[gaps] = np.arange(count)
+    rows, columns = np.nonzero(gaps)
+    matrix = sparse.eye(count, format="csr") * 4.0
+    right_side = np.zeros(count)
+    for down, along in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        neighbour = index[rows + down, columns + along]
+        inner = neighbour >= 0
+        coupling = sparse.csr_matrix(
+            (np.ones(inner.sum()), (np.nonzero(inner)[0], neighbour[inner])), shape=(count, count)
+        )
+        matrix = matrix - coupling
+        right_side[~inner] += elevation[rows + down, columns + along][~inner]
+    filled = elevation.copy()
+    filled[gaps] = linalg.spsolve(matrix.tocsc(), right_side)
+    return filled

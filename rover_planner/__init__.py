@@ -1,0 +1,1 @@
+"""Path planning for rocker-bogie rovers: candidate paths, the command line and the ROS 2 nodes."""
