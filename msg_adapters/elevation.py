@@ -1,0 +1,323 @@
+"""Elevation map messages: PointCloud2 and OccupancyGrid against Terrain.
+
+A cloud becomes a grid in two steps: the points are read where they stand in the message (no copy
+but the conversion to float64), then each falls into the cell whose centre is nearest. A cloud
+that is itself a regular grid keeps its own cells, so that a terrain published as a cloud comes
+back as it was.
+"""
+
+import array
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from nav_msgs.msg import OccupancyGrid
+from numpy.typing import NDArray
+from sensor_msgs.msg import PointCloud2, PointField
+
+from msg_adapters.errors import MessageError
+from rover_physics.terrain import Terrain
+
+CELL_HEIGHTS = ("max", "mean")
+MAX_CELLS = 25_000_000
+"""Largest map built from a cloud; one stray point far away must not take the memory."""
+
+_MIN_FILL = 0.05
+"""Least share of a detected grid's cells that have a point; below it the spacing is a chance."""
+
+_MAX_OFF_CENTRE = 0.02
+"""Largest distance of a regular grid's points from their cell centres, in cells."""
+
+_FLOATS = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
+_DATATYPE_NAMES = {
+    getattr(PointField, name): name
+    for name in ("INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32", "FLOAT32", "FLOAT64")
+}
+
+
+@dataclass(frozen=True)
+class CloudPoints:
+    """The points of a cloud in the order of the message, invalid ones included."""
+
+    xyz: NDArray[np.float64]
+    """(n, 3) coordinates [m]; NaN where the message has NaN."""
+    friction: NDArray[np.float64] | None
+    """(n,) friction coefficient, where the cloud has such a field."""
+    precision: float
+    """Rounding error of the x and y coordinates [m]."""
+
+
+def read_points(cloud: PointCloud2) -> CloudPoints:
+    """Read the points of a cloud, whatever its layout.
+
+    Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
+    and the optional `friction` may be FLOAT32 or FLOAT64.
+
+    Raises:
+        MessageError: no points, a field missing or of another datatype, or lengths that disagree.
+    """
+    row_step = _check_layout(cloud)
+    names = ["x", "y", "z"]
+    fields = {field.name: field for field in cloud.fields}
+    missing = [name for name in names if name not in fields]
+    if missing:
+        has = ", ".join(fields) or "none"
+        raise MessageError(
+            f"cloud has no field {', '.join(missing)}; it needs x, y and z, and has {has}")
+    if "friction" in fields:
+        names.append("friction")
+    formats = [_field_format(fields[name], cloud) for name in names]
+    point = np.dtype({
+        "names": names, "formats": formats, "offsets": [fields[name].offset for name in names],
+        "itemsize": cloud.point_step})
+    points = np.ndarray(
+        (cloud.height, cloud.width), point, buffer=np.frombuffer(cloud.data, np.uint8),
+        strides=(row_step, cloud.point_step))
+    columns = {name: points[name].astype(np.float64).ravel() for name in names}
+    single = any(point[name].itemsize == 4 for name in ("x", "y"))
+    xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
+    extent = np.abs(xyz[np.isfinite(xyz[:, :2]).all(axis=1), :2]).max(initial=1.0)
+    precision = float(np.finfo(np.float32 if single else np.float64).eps * extent)
+    return CloudPoints(xyz, columns.get("friction"), precision)
+
+
+def terrain_from_point_cloud(
+    cloud: PointCloud2, resolution: float = 0.0, cell_height: str = "max",
+) -> Terrain:
+    """Grid a cloud onto square cells; a cell without a point is unknown (NaN).
+
+    Args:
+        cloud: Points in the map frame, z up [m]. Points with NaN or infinite height are unknown
+            ground; with NaN or infinite x or y they are left out.
+        resolution: Cell size [m]. 0 takes the spacing of the points, which must then form a
+            regular grid along x and y. Irregular points fall on cells centred on multiples of
+            the resolution.
+        cell_height: What becomes of several points in one cell. "max" keeps the top of every
+            obstacle, as a verdict about safety should; it lifts noisy ground by about the noise
+            and narrows a ditch by up to a cell. "mean" is unbiased on plain ground and lowers
+            the edges of obstacles.
+
+    Raises:
+        MessageError: the cloud cannot be read, has no valid point, is no regular grid although
+            the resolution is to be detected, or would make a map of more than MAX_CELLS.
+        TerrainError: the cells make no terrain.
+    """
+    if cell_height not in CELL_HEIGHTS:
+        raise MessageError(f"cell_height is {cell_height!r}; it must be one of {CELL_HEIGHTS}")
+    if not (math.isfinite(resolution) and resolution >= 0.0):
+        raise MessageError(f"resolution is {resolution} m; it must be positive, or 0 to detect it")
+    points = read_points(cloud)
+    placed = np.isfinite(points.xyz[:, :2]).all(axis=1)
+    known = placed & np.isfinite(points.xyz[:, 2])
+    if not known.any():
+        raise MessageError(f"none of the cloud's {len(known)} points has finite x, y and z")
+    xy = points.xyz[placed, :2]
+    grid = _detect_grid(xy, points.precision)
+    if resolution > 0.0 and (grid is None or abs(grid.resolution - resolution) > 1e-3 * resolution):
+        grid = _regular_cells(xy, resolution)
+    if grid is None:
+        raise MessageError(
+            "the cloud's points form no regular grid along x and y, so the cell size must be "
+            f"given: set map_resolution, for these points about {_typical_spacing(xy):.2g} m")
+    columns, rows = grid.cells(points.xyz[known, :2])
+    cells = rows * grid.columns + columns
+    elevation = _combine(cells, points.xyz[known, 2], grid, cell_height)
+    friction = None
+    if points.friction is not None:
+        # The lowest coefficient of a cell counts; not finite ones say nothing.
+        values = np.where(np.isfinite(points.friction), points.friction, np.nan)[known]
+        friction = -_combine(cells, -values, grid, "max")
+    return Terrain(elevation, grid.resolution, grid.origin, friction)
+
+
+def terrain_to_point_cloud(
+    terrain: Terrain, frame_id: str, stamp=None, datatype: int = PointField.FLOAT32,
+) -> PointCloud2:
+    """Write a terrain as an organised cloud, one point per cell, row 0 first.
+
+    Args:
+        terrain: Unknown cells become points with NaN height, so that the shape is kept.
+        frame_id: Frame of the map.
+        stamp: builtin_interfaces/Time, zero if None.
+        datatype: PointField.FLOAT32 (what viewers show; heights are rounded to it) or FLOAT64.
+    """
+    rows, columns = terrain.elevation.shape
+    names = ["x", "y", "z"] + (["friction"] if terrain.friction is not None else [])
+    kind = np.dtype("<" + _FLOATS[datatype])
+    values = np.empty((rows, columns, len(names)), kind)
+    values[:, :, 0] = terrain.origin[0] + terrain.resolution * np.arange(columns)
+    values[:, :, 1] = (terrain.origin[1] + terrain.resolution * np.arange(rows))[:, None]
+    values[:, :, 2] = terrain.elevation
+    if terrain.friction is not None:
+        values[:, :, 3] = terrain.friction
+    cloud = PointCloud2(height=rows, width=columns, is_bigendian=False, is_dense=False)
+    cloud.header.frame_id = frame_id
+    if stamp is not None:
+        cloud.header.stamp = stamp
+    cloud.fields = [
+        PointField(name=name, offset=i * kind.itemsize, datatype=datatype, count=1)
+        for i, name in enumerate(names)]
+    cloud.point_step = len(names) * kind.itemsize
+    cloud.row_step = columns * cloud.point_step
+    cloud.data = array.array("B")
+    cloud.data.frombytes(values.tobytes())
+    return cloud
+
+
+def terrain_to_occupancy_grid(terrain: Terrain, frame_id: str, stamp) -> OccupancyGrid:
+    """Say which cells of a terrain are known (0) and which are not (-1).
+
+    The origin is the corner of cell [0, 0], as nav_msgs/MapMetaData asks, half a cell from the
+    terrain's own origin, which is that cell's centre.
+    """
+    grid = OccupancyGrid()
+    grid.header.frame_id = frame_id
+    grid.header.stamp = stamp
+    grid.info.map_load_time = stamp
+    grid.info.resolution = float(terrain.resolution)
+    grid.info.height, grid.info.width = terrain.elevation.shape
+    grid.info.origin.position.x = terrain.origin[0] - terrain.resolution / 2.0
+    grid.info.origin.position.y = terrain.origin[1] - terrain.resolution / 2.0
+    grid.data = array.array("b")
+    grid.data.frombytes(np.where(np.isnan(terrain.elevation), -1, 0).astype(np.int8).tobytes())
+    return grid
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Square cells that hold all points of a cloud."""
+
+    resolution: float
+    origin: tuple[float, float]
+    columns: int
+    rows: int
+
+    def cells(self, xy):
+        """Return the column and row of points (n, 2)."""
+        index = np.rint((xy - self.origin) / self.resolution).astype(np.int64)
+        return index[:, 0], index[:, 1]
+
+
+def _check_layout(cloud: PointCloud2) -> int:
+    """Check that sizes and steps agree with the data; return the row step in bytes."""
+    if cloud.height * cloud.width == 0:
+        raise MessageError(
+            f"cloud has no points: height {cloud.height}, width {cloud.width}")
+    if cloud.point_step == 0:
+        raise MessageError("cloud has point_step 0; it must be the size of a point in bytes")
+    row_bytes = cloud.width * cloud.point_step
+    row_step = cloud.row_step
+    if row_step == 0 and cloud.height == 1:
+        row_step = row_bytes
+    if row_step < row_bytes:
+        raise MessageError(
+            f"cloud has row_step {row_step}; {cloud.width} points of {cloud.point_step} bytes "
+            f"need at least {row_bytes}")
+    if len(cloud.data) != cloud.height * row_step:
+        raise MessageError(
+            f"cloud has {len(cloud.data)} bytes of data; height {cloud.height} x row_step "
+            f"{row_step} needs {cloud.height * row_step}")
+    return row_step
+
+
+def _field_format(field: PointField, cloud: PointCloud2) -> str:
+    """Return the numpy format of a field in its byte order."""
+    if field.datatype not in _FLOATS:
+        datatype = _DATATYPE_NAMES.get(field.datatype, str(field.datatype))
+        raise MessageError(
+            f"cloud field {field.name} has datatype {datatype}; "
+            "it must be FLOAT32 or FLOAT64, in metres")
+    if field.count > 1:
+        raise MessageError(f"cloud field {field.name} has count {field.count}; it must be 1")
+    kind = _FLOATS[field.datatype]
+    if field.offset + int(kind[1]) > cloud.point_step:
+        raise MessageError(
+            f"cloud field {field.name} at offset {field.offset} does not fit into "
+            f"point_step {cloud.point_step}")
+    return (">" if cloud.is_bigendian else "<") + kind
+
+
+def _detect_grid(xy: NDArray[np.float64], precision: float) -> _Grid | None:
+    """Find the regular grid along x and y that the points (n, 2) lie on, or None."""
+    noise = 4.0 * precision
+    axes = [_detect_axis(xy[:, i], noise) for i in (0, 1)]
+    steps = [axis[1] for axis in axes if axis is not None and axis[1] > 0.0]
+    if any(axis is None for axis in axes) or not steps:
+        return None
+    spans = np.ptp(xy, axis=0)
+    widest = 0 if spans[0] >= spans[1] else 1
+    fitted = axes[widest][1] or max(steps)
+    if any(abs(step - fitted) > _MAX_OFF_CENTRE * fitted for step in steps):
+        return None
+    counts = [round(span / fitted) + 1 for span in spans]
+    if len(xy) < _MIN_FILL * counts[0] * counts[1]:
+        return None
+    resolution = _round_within(fitted, noise / max(counts))
+    origin = tuple(_round_within(axis[0], noise) for axis in axes)
+    grid = _Grid(resolution, origin, counts[0], counts[1])
+    index = np.rint((xy - origin) / resolution)
+    off_centre = np.abs(xy - (origin + index * resolution)).max()
+    columns, rows = grid.cells(xy)
+    single = len(np.unique(rows * grid.columns + columns)) == len(xy)
+    on_centre = off_centre <= max(_MAX_OFF_CENTRE * resolution, noise)
+    return grid if single and on_centre else None
+
+
+def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, float] | None:
+    """Return the first value and the spacing of equidistant values (0 for one value), or None."""
+    ordered = np.unique(values)
+    starts = np.concatenate([[True], np.diff(ordered) > noise])
+    distinct = ordered[starts]
+    if len(distinct) == 1:
+        return float(distinct[0]), 0.0
+    gaps = np.diff(distinct)
+    smallest = gaps.min()
+    index = np.concatenate([[0.0], np.cumsum(np.rint(gaps / smallest))])
+    step, first = np.polyfit(index, distinct, 1)
+    residual = np.abs(distinct - (first + step * index)).max()
+    if residual > max(_MAX_OFF_CENTRE * step, noise):
+        return None
+    return float(first), float(step)
+
+
+def _regular_cells(xy: NDArray[np.float64], resolution: float) -> _Grid:
+    """Return cells centred on multiples of the resolution that hold the points (n, 2)."""
+    first = np.rint(xy.min(axis=0) / resolution)
+    last = np.rint(xy.max(axis=0) / resolution)
+    counts = last - first + 1.0
+    if counts.prod() > MAX_CELLS:
+        span = np.ptp(xy, axis=0)
+        raise MessageError(
+            f"cloud spans {span[0]:.4g} m x {span[1]:.4g} m, which at {resolution:g} m are "
+            f"{counts.prod():.3g} cells; a map may have {MAX_CELLS}: remove stray points or set "
+            "a coarser map_resolution")
+    origin = first * resolution
+    return _Grid(resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1]))
+
+
+def _combine(cells, values, grid: _Grid, how: str) -> NDArray[np.float64]:
+    """Combine the values of each cell; NaN where there is none."""
+    size = grid.rows * grid.columns
+    if how == "max":
+        combined = np.full(size, np.nan)
+        np.fmax.at(combined, cells, values)
+    else:
+        counts = np.bincount(cells, minlength=size)
+        sums = np.bincount(cells, weights=values, minlength=size)
+        combined = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+    return combined.reshape(grid.rows, grid.columns)
+
+
+def _typical_spacing(xy: NDArray[np.float64]) -> float:
+    """Return a cell size [m] at which most cells within the points (n, 2) would have one."""
+    area = float(np.prod(np.ptp(xy, axis=0)))
+    return 2.0 * math.sqrt(area / len(xy))
+
+
+def _round_within(value: float, tolerance: float) -> float:
+    """Return the shortest decimal within a tolerance of a value: 0.0500000003 is 0.05."""
+    for digits in range(13):
+        rounded = round(value, digits)
+        if abs(rounded - value) <= tolerance:
+            return rounded
+    return value

@@ -1,0 +1,179 @@
+"""Path and pose messages: PoseStamped and Path against arrays of x, y, yaw."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from geometry_msgs.msg import Pose, PoseStamped, Quaternion
+from nav_msgs.msg import Path
+from numpy.typing import ArrayLike, NDArray
+
+from msg_adapters.errors import MessageError
+
+_NORM_TOLERANCE = 0.01
+"""How far the squared length of a quaternion may be from 1, as in tf2."""
+
+_LEAST_LEVEL = 1e-3
+"""Least horizontal share of the forward axis for which a heading is defined."""
+
+
+def check_frame(frame_id: str, map_frame: str, what: str) -> None:
+    """Refuse a message in any other frame than the map's; nothing is transformed.
+
+    Raises:
+        MessageError: the frame is empty or another one; the text says which is right.
+    """
+    if frame_id != map_frame:
+        given = f"in frame {frame_id!r}" if frame_id else "without a frame_id"
+        raise MessageError(f"{what} is {given}; it must be in {map_frame!r}")
+
+
+def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> float:
+    """Return the heading [rad] of the body's forward axis.
+
+    Raises:
+        MessageError: NaN, not of unit length, or the forward axis is vertical.
+    """
+    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    norm = x * x + y * y + z * z + w * w
+    text = f"{what} (x {x:g}, y {y:g}, z {z:g}, w {w:g})"
+    if not math.isfinite(norm):
+        raise MessageError(f"{text} is not finite; it must be a quaternion of length 1")
+    if abs(norm - 1.0) > _NORM_TOLERANCE:
+        raise MessageError(
+            f"{text} has length {math.sqrt(norm):.3g}; it must be a quaternion of length 1, "
+            "for no rotation w = 1")
+    forward_x = w * w + x * x - y * y - z * z
+    forward_y = 2.0 * (x * y + w * z)
+    if math.hypot(forward_x, forward_y) < _LEAST_LEVEL:
+        raise MessageError(f"{text} points forward straight up or down; it has no heading")
+    return math.atan2(forward_y, forward_x)
+
+
+def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:
+    """Return (3,) x, y [m] and yaw [rad] of a pose; its z, roll and pitch are not used.
+
+    Raises:
+        MessageError: a position or orientation that is not finite, or no unit quaternion.
+    """
+    x, y = pose.position.x, pose.position.y
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise MessageError(f"{what} has position x {x}, y {y}; both must be finite, in metres")
+    return np.array([x, y, yaw_from_quaternion(pose.orientation, f"{what} orientation")])
+
+
+def stamped_pose_to_array(
+    stamped: PoseStamped, map_frame: str, what: str = "pose",
+) -> NDArray[np.float64]:
+    """Return (3,) x, y [m] and yaw [rad] of a pose in the map frame.
+
+    Raises:
+        MessageError: another frame, or a pose that `pose_to_array` refuses.
+    """
+    check_frame(stamped.header.frame_id, map_frame, what)
+    return pose_to_array(stamped.pose, what)
+
+
+def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
+    """Return (n, 3) x, y [m] and yaw [rad] of a path's poses.
+
+    The path's own header counts; poses may leave their frame empty. The orientation of each pose
+    is the heading of the body there, whichever way the path runs.
+
+    Raises:
+        MessageError: no poses, another frame, or a pose that `pose_to_array` refuses.
+    """
+    check_frame(path.header.frame_id, map_frame, "path")
+    if not path.poses:
+        raise MessageError("path has no poses; it must have at least one")
+    for i, stamped in enumerate(path.poses):
+        if stamped.header.frame_id:
+            check_frame(stamped.header.frame_id, map_frame, f"path pose {i}")
+    return np.array([
+        pose_to_array(stamped.pose, f"path pose {i}") for i, stamped in enumerate(path.poses)])
+
+
+def quaternions(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> NDArray[np.float64]:
+    """Return (n, 4) x, y, z, w of the rotations Rz(yaw) Ry(pitch) Rx(roll), angles (n,) [rad]."""
+    halves = [np.asarray(angle, dtype=np.float64) / 2.0 for angle in (roll, pitch, yaw)]
+    (cr, cp, cy), (sr, sp, sy) = np.cos(halves), np.sin(halves)
+    return np.stack([
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy], axis=-1)
+
+
+def decimate(poses: ArrayLike, spacing: float) -> NDArray[np.intp]:
+    """Choose poses about `spacing` [m] apart along a path, always the first and the last.
+
+    Args:
+        poses: (n, 2) or wider; columns 0 and 1 are x and y [m].
+        spacing: Distance to keep between chosen poses [m]; 0 keeps all.
+
+    Returns:
+        (m,) ascending indices of the chosen poses.
+    """
+    xy = np.asarray(poses, dtype=np.float64)[:, :2]
+    if len(xy) <= 2 or spacing <= 0.0:
+        return np.arange(len(xy))
+    steps = np.hypot(*np.diff(xy, axis=0).T)
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    marks = np.arange(0.0, travelled[-1], spacing)
+    chosen = np.searchsorted(travelled, marks - 1e-9 * spacing)
+    return np.unique(np.concatenate([[0], chosen, [len(xy) - 1]])).astype(np.intp)
+
+
+def settled_path(
+    prediction, rows: Sequence[int] | NDArray[np.intp], frame_id: str, stamp,
+) -> Path:
+    """Write settled waypoints of a prediction as a path with the body's full orientation.
+
+    Args:
+        prediction: PathPrediction of n waypoints.
+        rows: Waypoints to write, in order; all must have settled.
+        frame_id: Map frame.
+        stamp: builtin_interfaces/Time of the path and of every pose.
+    """
+    path = empty_path(frame_id, stamp)
+    rows = np.asarray(rows, dtype=np.intp)
+    position = prediction.position[rows].tolist()
+    rotation = quaternions(
+        prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]).tolist()
+    for (x, y, z), (qx, qy, qz, qw) in zip(position, rotation, strict=True):
+        stamped = PoseStamped()
+        stamped.header = path.header
+        stamped.pose.position.x, stamped.pose.position.y, stamped.pose.position.z = x, y, z
+        orientation = stamped.pose.orientation
+        orientation.x, orientation.y, orientation.z, orientation.w = qx, qy, qz, qw
+        path.poses.append(stamped)
+    return path
+
+
+def empty_path(frame_id: str, stamp=None) -> Path:
+    """Write a path without poses, the answer where there is no way."""
+    path = Path()
+    path.header.frame_id = frame_id
+    if stamp is not None:
+        path.header.stamp = stamp
+    return path
+
+
+def stamped_pose(pose: ArrayLike, frame_id: str, stamp=None) -> PoseStamped:
+    """Write a level pose (3,) x, y [m], yaw [rad], such as the goal of a request."""
+    x, y, yaw = (float(value) for value in np.asarray(pose, dtype=np.float64))
+    stamped = PoseStamped()
+    stamped.header.frame_id = frame_id
+    if stamp is not None:
+        stamped.header.stamp = stamp
+    stamped.pose.position.x, stamped.pose.position.y = x, y
+    stamped.pose.orientation.z = math.sin(yaw / 2.0)
+    stamped.pose.orientation.w = math.cos(yaw / 2.0)
+    return stamped
+
+
+def poses_path(poses: ArrayLike, frame_id: str, stamp=None) -> Path:
+    """Write level poses (n, 3) x, y [m], yaw [rad] as a path to be checked."""
+    path = empty_path(frame_id, stamp)
+    path.poses = [stamped_pose(pose, frame_id, stamp) for pose in np.asarray(poses)]
+    return path
