@@ -71,7 +71,7 @@ class ConfigSection:
         least: float | None = None,
         most: float | None = None,
     ) -> float:
-        """Return a finite number, checked against an open or closed lower and a closed upper bound."""
+        """Return a finite number within the bounds; ``above`` itself is outside."""
         must = _number_phrase(unit, above, least, most)
         value = self._finite(name, self._data[name], must)
         too_low = (above is not None and value <= above) or (least is not None and value < least)

@@ -35,7 +35,7 @@ class Suspension:
     """Pivots and wheel centres of the left side on flat ground, body frame, [m]."""
 
     rocker_pivot: Point
-    """Where the rocker is hinged to the body; the body frame's origin is midway between the two."""
+    """Where the rocker is hinged to the body; the origin is midway between the two pivots."""
     bogie_pivot: Point
     """Where the bogie is hinged to the rocker."""
     rocker_wheel: str
@@ -154,7 +154,7 @@ class Rover:
 
     @property
     def total_mass(self) -> float:
-        """Mass of the whole rover in [kg]: body, two rockers, two bogies, six wheels, no payload."""
+        """Mass in [kg] of body, two rockers, two bogies and six wheels, without payload."""
         masses = self.masses
         sides = 2.0 * (masses.rocker.mass + masses.bogie.mass)
         return masses.body.mass + sides + 6.0 * self.wheel.mass

@@ -25,8 +25,8 @@ def check_rover(rover: Rover, source: str) -> None:
         RoverFileError: Two or more keys contradict each other; names the one to mend.
     """
     try:
-        _check_pivots(rover.suspension)
         _check_wheels(rover)
+        _check_pivots(rover.suspension)
         _check_joint_limits(rover.suspension)
         _check_belly(rover)
         _check_speed(rover)
@@ -85,7 +85,7 @@ def _check_pivots(suspension: Suspension) -> None:
         raise _refuse("suspension.bogie_pivot", bogie, "on the left side, y above 0")
     behind, ahead = suspension.bogie_wheels
     low, high = wheels[behind][0], wheels[ahead][0]
-    if low < high and not low < bogie[0] < high:
+    if not low < bogie[0] < high:
         raise _refuse(
             "suspension.bogie_pivot",
             bogie,

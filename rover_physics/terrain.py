@@ -16,7 +16,7 @@ from rover_physics.errors import TerrainError
 _EDGE_TOLERANCE = 1e-9  # cells; rounding of (x - origin) / resolution at the map's edge
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Terrain:
     """Ground heights on a regular grid in the map frame.
 
@@ -144,7 +144,7 @@ def load_terrain(path: str | Path) -> Terrain:
             optionally ``friction`` (ny, nx). Other entries, such as ``source``, are left alone.
 
     Raises:
-        TerrainError: Unreadable file, a missing entry, or one that cannot be; names file and entry.
+        TerrainError: Unreadable file, or a missing or impossible entry; names file and entry.
     """
     entries = _read_npz(Path(path))
     for key in ("elevation", "resolution", "origin"):
@@ -187,7 +187,7 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
         raise TerrainError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def _read_npz(path: Path) -> dict[str, NDArray[Any]]:
+def _read_npz(path: Path) -> dict[str, Any]:
     """Read the entries that a terrain needs, without unpickling anything."""
     wanted = ("elevation", "resolution", "origin", "friction")
     name = ""
@@ -215,7 +215,7 @@ def _as_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise TerrainError(f"{name} has type {grid.dtype}; it must be an array of numbers")
     if grid.ndim != 2 or min(grid.shape) < 2:
         raise TerrainError(
-            f"{name} has shape {grid.shape}; it must be (ny, nx) with at least 2 rows and 2 columns"
+            f"{name} has shape {grid.shape}; it must be (ny, nx), at least 2 rows and 2 columns"
         )
     grid = np.ascontiguousarray(grid, dtype=np.float64)
     _refuse_first(grid, np.isinf(grid), name, "finite, or NaN where unknown")

@@ -1,0 +1,54 @@
+# Everything a developer or a newcomer runs; `make help` lists it. Needs Python 3.11 or newer.
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.ONESHELL:
+
+VENV ?= .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+PACKAGES := rover_physics msg_adapters rover_planner
+MAP ?=
+# Tests, demo and nodes talk to this machine only.
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help
+help: ## list what there is
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/make \1\t\2/' | expand -t 14
+
+.PHONY: demo
+demo: $(READY) ## plan over DDS on a made Mars terrain; MAP=terrain.npz for another
+	@$(BIN)/python -m rover_planner demo $(if $(MAP),"$(MAP)")
+
+.PHONY: test
+test: lint kernels ## lint, type check and all tests
+	@echo "== tests"
+	$(BIN)/python -m pytest -n auto --dist loadfile test
+
+.PHONY: lint
+lint: $(READY) ## ruff and mypy
+	@echo "== ruff"
+	$(BIN)/python -m ruff check .
+	echo "== mypy"
+	$(BIN)/python -m mypy
+
+.PHONY: kernels
+kernels: $(READY) ## compile the numba kernels into their cache
+	@echo "== compiling kernels"
+	$(BIN)/python -m rover_physics.sweep
+
+.PHONY: bench
+bench: kernels ## measure the time of a full evaluation
+	@for file in benchmarks/bench_*.py; do $(BIN)/python "$$file"; done
+
+.PHONY: clean
+clean: ## remove the environment and everything that was made
+	rm -rf "$(VENV)" build dist install log out *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find $(PACKAGES) test -name __pycache__ -prune -exec rm -rf {} +
+
+$(READY): setup.py pyproject.toml constraints.txt .ci/make_venv
+	@.ci/make_venv "$(VENV)"
+	touch $@

@@ -1,0 +1,87 @@
+"""Installs rover_planner, by pip or as an ament_python package by colcon."""
+
+import re
+from pathlib import Path
+
+from setuptools import setup
+
+NAME = "rover_planner"
+PACKAGES = ["rover_physics", "msg_adapters", "rover_planner"]
+HERE = Path(__file__).parent
+
+# Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba and osqp are not in it.
+# Upper bounds: the next version that may break. constraints.txt holds the versions tested.
+REQUIRES = [
+    "numpy>=1.26,<3",
+    "scipy>=1.11,<2",
+    "numba>=0.60,<1",
+    "osqp>=1.0,<2",
+    "PyYAML>=6.0,<7",
+    "typer>=0.9,<1",
+    "rich>=13.7,<16",
+]
+EXTRAS = {
+    "ros": [
+        "ros-jazzy-rclpy>=7.1,<8",
+        "ros-jazzy-common-interfaces>=5.3,<6",
+        "ros-jazzy-rmw-fastrtps-cpp>=8.4,<9",
+    ],
+    "plots": ["matplotlib>=3.6,<4"],
+    "test": [
+        "pytest>=7.4,<10",
+        "pytest-xdist>=3.4,<4",
+        "hypothesis>=6.98,<7",
+    ],
+    "dev": [
+        "ruff>=0.9,<1",
+        "mypy>=1.14,<3",
+    ],
+}
+EXTRAS["all"] = EXTRAS["ros"] + EXTRAS["plots"] + EXTRAS["test"]
+
+
+def read_version() -> str:
+    """Return __version__ of rover_physics, the one place where the version is kept."""
+    text = (HERE / "rover_physics" / "__init__.py").read_text(encoding="utf-8")
+    match = re.search(r'^__version__ = "([^"]+)"$', text, re.MULTILINE)
+    if match is None:
+        raise RuntimeError("rover_physics/__init__.py has no __version__")
+    return match.group(1)
+
+
+def list_data_files() -> list[tuple[str, list[str]]]:
+    """List what goes to share/: package manifest, ament marker, configuration, launch files."""
+    share = f"share/{NAME}"
+    folders = {share: ["package.xml"]}
+    for top in ("config", "launch"):
+        for path in sorted((HERE / top).rglob("*")):
+            if path.is_file():
+                relative = path.relative_to(HERE)
+                folder = f"{share}/{relative.parent.as_posix()}"
+                folders.setdefault(folder, []).append(relative.as_posix())
+    folders["share/ament_index/resource_index/packages"] = [f"resource/{NAME}"]
+    return list(folders.items())
+
+
+setup(
+    name=NAME,
+    version=read_version(),
+    packages=PACKAGES,
+    data_files=list_data_files(),
+    python_requires=">=3.11",
+    install_requires=REQUIRES,
+    extras_require=EXTRAS,
+    zip_safe=False,
+    author="rover_planner maintainers",
+    description="Onboard action planning for rocker-bogie rovers on ROS 2",
+    long_description=(HERE / "README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "rover_planner = rover_planner.cli:main",
+            "traverse_server = rover_planner.traverse_server:main",
+            "mission_planner = rover_planner.mission_planner:main",
+        ],
+    },
+)
