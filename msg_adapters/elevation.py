@@ -113,7 +113,8 @@ def terrain_from_point_cloud(
         raise MessageError(f"none of the cloud's {len(known)} points has finite x, y and z")
     xy = points.xyz[placed, :2]
     grid = _detect_grid(xy, points.precision)
-    if resolution > 0.0 and (grid is None or abs(grid.resolution - resolution) > 1e-3 * resolution):
+    detected = grid is not None and abs(grid.resolution - resolution) <= 1e-3 * resolution
+    if resolution > 0.0 and not detected:
         grid = _regular_cells(xy, resolution)
     if grid is None:
         raise MessageError(
@@ -240,20 +241,21 @@ def _field_format(field: PointField, cloud: PointCloud2) -> str:
 def _detect_grid(xy: NDArray[np.float64], precision: float) -> _Grid | None:
     """Find the regular grid along x and y that the points (n, 2) lie on, or None."""
     noise = 4.0 * precision
-    axes = [_detect_axis(xy[:, i], noise) for i in (0, 1)]
-    steps = [axis[1] for axis in axes if axis is not None and axis[1] > 0.0]
-    if any(axis is None for axis in axes) or not steps:
+    along_x, along_y = _detect_axis(xy[:, 0], noise), _detect_axis(xy[:, 1], noise)
+    if along_x is None or along_y is None:
+        return None
+    steps = [step for _, step in (along_x, along_y) if step > 0.0]
+    if not steps:
         return None
     spans = np.ptp(xy, axis=0)
-    widest = 0 if spans[0] >= spans[1] else 1
-    fitted = axes[widest][1] or max(steps)
+    fitted = steps[0] if spans[0] >= spans[1] else steps[-1]
     if any(abs(step - fitted) > _MAX_OFF_CENTRE * fitted for step in steps):
         return None
     counts = [round(span / fitted) + 1 for span in spans]
     if len(xy) < _MIN_FILL * counts[0] * counts[1]:
         return None
     resolution = _round_within(fitted, noise / max(counts))
-    origin = tuple(_round_within(axis[0], noise) for axis in axes)
+    origin = (_round_within(along_x[0], noise), _round_within(along_y[0], noise))
     grid = _Grid(resolution, origin, counts[0], counts[1])
     index = np.rint((xy - origin) / resolution)
     off_centre = np.abs(xy - (origin + index * resolution)).max()

@@ -9,23 +9,13 @@ from nav_msgs.msg import Path
 from numpy.typing import ArrayLike, NDArray
 
 from msg_adapters.errors import MessageError
+from msg_adapters.frames import check_frame
 
 _NORM_TOLERANCE = 0.01
 """How far the squared length of a quaternion may be from 1, as in tf2."""
 
 _LEAST_LEVEL = 1e-3
 """Least horizontal share of the forward axis for which a heading is defined."""
-
-
-def check_frame(frame_id: str, map_frame: str, what: str) -> None:
-    """Refuse a message in any other frame than the map's; nothing is transformed.
-
-    Raises:
-        MessageError: the frame is empty or another one; the text says which is right.
-    """
-    if frame_id != map_frame:
-        given = f"in frame {frame_id!r}" if frame_id else "without a frame_id"
-        raise MessageError(f"{what} is {given}; it must be in {map_frame!r}")
 
 
 def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> float:

@@ -82,7 +82,7 @@ def test_a_quaternion_rounded_to_three_digits_is_accepted():
 def test_a_position_that_is_not_finite_is_refused(x, y):
     pose = stamped_pose((0.0, 0.0, 0.0), "map")
     pose.pose.position.x, pose.pose.position.y = x, y
-    with pytest.raises(MessageError, match="goal has position x .* both must be finite"):
+    with pytest.raises(MessageError, match=r"goal has position x .* both must be finite"):
         stamped_pose_to_array(pose, "map", "goal")
 
 
@@ -105,7 +105,7 @@ def test_a_path_is_refused_by_its_bad_part():
         path_to_poses(path, "map")
     path = poses_path(np.zeros((4, 3)), "map")
     path.poses[3].pose.orientation.w = 0.0
-    with pytest.raises(MessageError, match="path pose 3 orientation .* has length 0"):
+    with pytest.raises(MessageError, match=r"path pose 3 orientation .* has length 0"):
         path_to_poses(path, "map")
 
 

@@ -1,0 +1,120 @@
+"""Markers for a viewer: the path coloured by verdict, where it fails, the wheels' contacts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from geometry_msgs.msg import Point
+from numpy.typing import NDArray
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from msg_adapters.paths import quaternions
+
+PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
+IMPASSABLE = ColorRGBA(r=0.85, g=0.15, b=0.10, a=1.0)
+CONTACT = ColorRGBA(r=0.15, g=0.35, b=0.85, a=0.8)
+
+_LINE_WIDTH = 0.05
+_CONTACT_SIZE = 0.04
+_TEXT_HEIGHT = 0.2
+_TEXT_ABOVE = 0.6
+
+
+def path_markers(
+    prediction, reasons: Sequence[str], rows: NDArray[np.intp], frame_id: str, stamp,
+) -> MarkerArray:
+    """Draw a judged path; the first marker clears what was drawn before.
+
+    Args:
+        prediction: PathPrediction of n waypoints.
+        reasons: (n,) why each waypoint cannot be passed, empty where it can.
+        rows: Waypoints to draw; the first that fails is always drawn.
+        frame_id: Map frame.
+        stamp: builtin_interfaces/Time.
+    """
+    markers = cleared_markers(frame_id, stamp)
+    positions = _drawable_positions(prediction)
+    failures = [i for i, reason in enumerate(reasons) if reason]
+    rows = np.unique(np.concatenate([rows, failures[:1]]).astype(np.intp))
+    settled = rows[prediction.settled[rows]]
+    colours = [IMPASSABLE if reasons[i] else PASSABLE for i in rows]
+    markers.markers.append(_path_line(positions[rows], colours, frame_id, stamp))
+    markers.markers.append(_contact_points(prediction.contact_points[settled], frame_id, stamp))
+    if failures:
+        first = failures[0]
+        yaw = float(prediction.poses[first, 2])
+        markers.markers.append(_failing_pose(positions[first], yaw, frame_id, stamp))
+        markers.markers.append(_failing_text(positions[first], reasons[first], frame_id, stamp))
+    return markers
+
+
+def cleared_markers(frame_id: str, stamp) -> MarkerArray:
+    """Clear what was drawn before."""
+    marker = _marker("", Marker.CUBE, frame_id, stamp)
+    marker.action = Marker.DELETEALL
+    return MarkerArray(markers=[marker])
+
+
+def _marker(namespace: str, kind: int, frame_id: str, stamp) -> Marker:
+    """Start a marker that stays until the next path is drawn."""
+    marker = Marker(ns=namespace, type=kind, action=Marker.ADD)
+    marker.header.frame_id = frame_id
+    marker.header.stamp = stamp
+    return marker
+
+
+def _path_line(positions, colours, frame_id: str, stamp) -> Marker:
+    """Draw the path as a line with a colour at each waypoint."""
+    line = _marker("path", Marker.LINE_STRIP, frame_id, stamp)
+    line.scale.x = _LINE_WIDTH
+    line.points = _points(positions)
+    line.colors = colours
+    return line
+
+
+def _contact_points(contacts, frame_id: str, stamp) -> Marker:
+    """Draw where the wheels touch the ground, contacts (m, 6, 3)."""
+    spheres = _marker("contact_points", Marker.SPHERE_LIST, frame_id, stamp)
+    spheres.scale.x = spheres.scale.y = spheres.scale.z = _CONTACT_SIZE
+    spheres.color = CONTACT
+    flat = contacts.reshape(-1, 3)
+    spheres.points = _points(flat[np.isfinite(flat).all(axis=1)])
+    return spheres
+
+
+def _failing_pose(position, yaw: float, frame_id: str, stamp) -> Marker:
+    """Draw an arrow along the heading where the rover cannot go on."""
+    arrow = _marker("failing_pose", Marker.ARROW, frame_id, stamp)
+    arrow.pose.position = _points([position])[0]
+    _, _, arrow.pose.orientation.z, arrow.pose.orientation.w = quaternions(0.0, 0.0, yaw).tolist()
+    arrow.scale.x, arrow.scale.y, arrow.scale.z = 0.6, 0.1, 0.1
+    arrow.color = IMPASSABLE
+    return arrow
+
+
+def _failing_text(position, reason: str, frame_id: str, stamp) -> Marker:
+    """Write the reason above the failing pose."""
+    text = _marker("reason", Marker.TEXT_VIEW_FACING, frame_id, stamp)
+    text.pose.position = _points([position])[0]
+    text.pose.position.z += _TEXT_ABOVE
+    text.scale.z = _TEXT_HEIGHT
+    text.color = IMPASSABLE
+    text.text = reason
+    return text
+
+
+def _drawable_positions(prediction) -> NDArray[np.float64]:
+    """Return (n, 3) positions; where a pose did not settle, at the height last known."""
+    positions = np.column_stack([prediction.poses[:, :2], prediction.position[:, 2]])
+    known = np.flatnonzero(np.isfinite(positions[:, 2]))
+    if len(known) == 0:
+        positions[:, 2] = 0.0
+        return positions
+    latest = np.searchsorted(known, np.arange(len(positions)), side="right") - 1
+    positions[:, 2] = positions[known[np.maximum(latest, 0)], 2]
+    return positions
+
+
+def _points(positions) -> list[Point]:
+    """Return (m, 3) positions [m] as messages."""
+    return [Point(x=x, y=y, z=z) for x, y, z in np.asarray(positions).tolist()]

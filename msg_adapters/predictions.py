@@ -1,0 +1,119 @@
+"""Predicted quantities as messages: flat arrays per waypoint, and a joint trajectory."""
+
+import array
+
+import numpy as np
+from builtin_interfaces.msg import Duration
+from numpy.typing import ArrayLike, NDArray
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from msg_adapters.errors import MessageError
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+
+MEASURES = ("tip_over_ratio", "tip_over_force_angle")
+"""Columns of the tip-over margin: the paper's ratio, and the force-angle measure over flat."""
+
+JOINTS = SUSPENSION_JOINTS + WHEEL_JOINTS
+"""Joints of the predicted trajectory, in order."""
+
+
+def waypoint_array(values: ArrayLike, column_label: str = "wheel") -> Float64MultiArray:
+    """Write (n, k) values, one row per waypoint, as an array with labelled dimensions.
+
+    The columns are wheels in wheel order, or the MEASURES. NaN where a pose did not settle.
+    """
+    values = np.ascontiguousarray(values, dtype=np.float64)
+    rows, columns = values.shape
+    message = Float64MultiArray()
+    message.layout.dim = [
+        MultiArrayDimension(label="waypoint", size=rows, stride=rows * columns),
+        MultiArrayDimension(label=column_label, size=columns, stride=columns)]
+    message.data = _doubles(values)
+    return message
+
+
+def array_values(message: Float64MultiArray) -> NDArray[np.float64]:
+    """Read the (n, k) values of a two-dimensional array; a view of the message's data.
+
+    Raises:
+        MessageError: other than two dimensions, padding, or a length that disagrees.
+    """
+    sizes = [dim.size for dim in message.layout.dim]
+    values = np.frombuffer(message.data, np.float64)[message.layout.data_offset:]
+    if len(sizes) != 2 or len(values) != sizes[0] * sizes[1]:
+        raise MessageError(
+            f"array has dimensions {sizes} and {len(values)} values; "
+            "it must have two dimensions and a value for each of their cells")
+    return values.reshape(sizes)
+
+
+def tip_over_array(prediction) -> Float64MultiArray:
+    """Write the tip-over margins of a PathPrediction (n waypoints) as (n, 2), see MEASURES."""
+    margins = [getattr(prediction, measure) for measure in MEASURES]
+    return waypoint_array(np.column_stack(margins), "measure")
+
+
+def joint_trajectory(prediction, wheel_radius: float, frame_id: str, stamp) -> JointTrajectory:
+    """Write the joints along a path, up to the first waypoint that did not settle.
+
+    Positions are the suspension angles and the angles the wheels have rolled without slip [rad];
+    efforts are zero for the passive suspension and the drive torques for the wheels [N m]. The
+    points are the waypoints, in order, at their predicted time from start.
+
+    Args:
+        prediction: PathPrediction of n waypoints.
+        wheel_radius: Of the rover [m].
+        frame_id: Map frame.
+        stamp: builtin_interfaces/Time.
+    """
+    count = len(prediction.settled)
+    if not prediction.settled.all():
+        count = int(np.argmin(prediction.settled))
+    trajectory = empty_trajectory(frame_id, stamp)
+    positions = np.hstack([
+        suspension_angles(prediction)[:count], _rolled_angles(prediction, wheel_radius, count)])
+    efforts = np.hstack([
+        np.zeros((count, len(SUSPENSION_JOINTS))), prediction.torque[:count]])
+    for i in range(count):
+        trajectory.points.append(JointTrajectoryPoint(
+            positions=_doubles(positions[i]), effort=_doubles(efforts[i]),
+            time_from_start=_duration(float(prediction.time[i]))))
+    return trajectory
+
+
+def empty_trajectory(frame_id: str, stamp) -> JointTrajectory:
+    """Write a trajectory that names the JOINTS and has no points."""
+    trajectory = JointTrajectory(joint_names=list(JOINTS))
+    trajectory.header.frame_id = frame_id
+    trajectory.header.stamp = stamp
+    return trajectory
+
+
+def suspension_angles(prediction) -> NDArray[np.float64]:
+    """Return (n, 4) angles [rad] of SUSPENSION_JOINTS at each waypoint of a PathPrediction."""
+    return np.hstack([prediction.rocker_angle, prediction.bogie_angle])
+
+
+def _rolled_angles(prediction, wheel_radius: float, count: int) -> NDArray[np.float64]:
+    """Return (count, 6) angles [rad] that the wheels have rolled, negative backwards."""
+    steps = np.diff(prediction.wheel_centres[:count], axis=0)
+    yaw = prediction.poses[1:count, 2]
+    forward = steps[:, :, 0] * np.cos(yaw)[:, None] + steps[:, :, 1] * np.sin(yaw)[:, None]
+    lengths = np.copysign(np.linalg.norm(steps, axis=2), forward)
+    rolled = np.zeros((count, len(WHEEL_JOINTS)))
+    rolled[1:] = np.cumsum(lengths, axis=0) / wheel_radius
+    return rolled
+
+
+def _doubles(values: NDArray[np.float64]) -> array.array:
+    """Copy values into the array type that message fields take without a check per element."""
+    data = array.array("d")
+    data.frombytes(values.tobytes())
+    return data
+
+
+def _duration(seconds: float) -> Duration:
+    """Return seconds as a message, to the nearest nanosecond."""
+    whole, nanoseconds = divmod(round(seconds * 1e9), 1_000_000_000)
+    return Duration(sec=int(whole), nanosec=int(nanoseconds))

@@ -1,0 +1,58 @@
+"""Verdicts as messages: a diagnostic status for the operator, JSON text for programs."""
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+STATUS_NAME = "traverse_server: can the rover traverse"
+
+
+def verdict_to_json(verdict: Mapping[str, Any]) -> str:
+    """Write a verdict as one line of strict JSON; what is not a finite number becomes null."""
+    return json.dumps(_plain(verdict), allow_nan=False)
+
+
+def verdict_to_diagnostics(
+    verdict: Mapping[str, Any], hardware_id: str, frame_id: str, stamp, warn: bool = False,
+) -> DiagnosticArray:
+    """Write a verdict as one diagnostic status.
+
+    Args:
+        verdict: At least `traversable` and `reason`; every entry becomes a key and a value, a
+            nested one as JSON.
+        hardware_id: Name of the rover.
+        frame_id: Map frame.
+        stamp: builtin_interfaces/Time.
+        warn: A traversable path is reported as WARN, where something needs a look.
+
+    Returns:
+        An array with one status: OK (or WARN) where traversable, else ERROR with the reason.
+    """
+    level = DiagnosticStatus.WARN if warn else DiagnosticStatus.OK
+    status = DiagnosticStatus(
+        level=level if verdict["traversable"] else DiagnosticStatus.ERROR,
+        name=STATUS_NAME, message=verdict["reason"] or "traversable", hardware_id=hardware_id)
+    status.values = [
+        KeyValue(key=key, value=value if isinstance(value, str) else json.dumps(value))
+        for key, value in _plain(verdict).items()]
+    message = DiagnosticArray(status=[status])
+    message.header.frame_id = frame_id
+    message.header.stamp = stamp
+    return message
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of JSON's own types: numpy unwrapped, not finite numbers as None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,301 @@
+"""The node /traverse_server: asks and answers over ROS 2 whether the rover can traverse."""
+
+import sys
+import traceback
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Any
+from urllib.parse import unquote, urlparse
+
+import numpy as np
+import rclpy
+import rclpy.logging
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan, LoadMap
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_occupancy_grid
+from msg_adapters.errors import MessageError
+from msg_adapters.frames import check_frame
+from msg_adapters.joints import joint_positions
+from msg_adapters.markers import cleared_markers, path_markers
+from msg_adapters.paths import (
+    decimate,
+    empty_path,
+    path_to_poses,
+    settled_path,
+    stamped_pose_to_array,
+)
+from msg_adapters.predictions import (
+    MEASURES,
+    empty_trajectory,
+    joint_trajectory,
+    tip_over_array,
+    waypoint_array,
+)
+from msg_adapters.verdicts import verdict_to_diagnostics, verdict_to_json
+from rover_physics.errors import RoverError
+from rover_physics.names import WHEELS
+from rover_physics.sweep import warm_up
+from rover_physics.terrain import Terrain, load_terrain
+from rover_planner.errors import PlanningError
+from rover_planner.parameters import TRAVERSE_SERVER, check_changes, declare_parameters
+from rover_planner.qos import map_subscriptions_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.traverse_service import (
+    Judgement,
+    TraverseService,
+    refusal,
+    settings_from_parameters,
+)
+
+NODE_NAME = "traverse_server"
+WHEEL_TOPICS = {
+    "wheel_loads": "wheel_loads", "slip_ratios": "slip_ratio",
+    "friction_utilisation": "friction_utilisation", "torque_saturation": "torque_saturation"}
+"""Topics of one value per waypoint and wheel, and the field of the prediction each carries."""
+
+_BAD_INPUT = (MessageError, PlanningError, RoverError)
+
+
+class TraverseServer(Node):
+    """Wires a TraverseService to ROS: what arrives is understood or refused, never fatal."""
+
+    def __init__(self, **node_arguments: Any):
+        super().__init__(NODE_NAME, **node_arguments)
+        self._values = declare_parameters(self, TRAVERSE_SERVER)
+        self._service = TraverseService(settings_from_parameters(self._values))
+        self._map_frame: str = self._values["map_frame"]
+        self._seen_maps: deque[int] = deque(maxlen=8)
+        self._create_publishers()
+        self._load_first_map()
+        self._create_subscriptions()
+        self.create_service(GetPlan, "~/can_traverse", self._can_traverse)
+        self.create_service(Trigger, "~/check_path", self._check_path)
+        self.create_service(LoadMap, "~/load_map", self._load_map)
+        self.add_on_set_parameters_callback(
+            check_changes(TRAVERSE_SERVER, self._values, settings_from_parameters))
+        self.add_post_set_parameters_callback(self._apply_parameters)
+        self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
+
+    def _create_publishers(self) -> None:
+        qos = result_qos()
+        self._plan = self.create_publisher(Path, "~/plan", qos)
+        self._joints = self.create_publisher(JointTrajectory, "~/predicted_joints", qos)
+        self._wheels = {
+            topic: self.create_publisher(Float64MultiArray, f"~/{topic}", qos)
+            for topic in WHEEL_TOPICS}
+        self._tip_over = self.create_publisher(Float64MultiArray, "~/tip_over_margin", qos)
+        self._verdict = self.create_publisher(DiagnosticArray, "~/verdict", qos)
+        self._markers = self.create_publisher(MarkerArray, "~/markers", qos)
+
+    def _create_subscriptions(self) -> None:
+        profiles = map_subscriptions_qos(self._values["map_durability"])
+        for qos in profiles:
+            # With several profiles a mismatch of one is no news.
+            events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
+            self.create_subscription(
+                PointCloud2, "elevation_cloud", self._take_cloud, qos, event_callbacks=events)
+        self.create_subscription(JointState, "joint_states", self._take_joints, sensor_qos())
+        self.create_subscription(Path, "~/path", self._take_path, topic_qos())
+
+    def _load_first_map(self) -> None:
+        file = self._values["terrain_file"]
+        if not file:
+            return
+        try:
+            self._take_terrain(load_terrain(file), file)
+        except _BAD_INPUT as error:
+            self.get_logger().error(f"terrain_file not loaded: {error}")
+
+    def _apply_parameters(self, parameters) -> None:
+        self._values.update({
+            parameter.name: parameter.value for parameter in parameters
+            if parameter.name in self._values})
+        self._service.settings = settings_from_parameters(self._values)
+
+    def _take_cloud(self, cloud: PointCloud2, info) -> None:
+        if self._is_second_copy(info):
+            return
+        try:
+            check_frame(cloud.header.frame_id, self._map_frame, "elevation_cloud")
+            terrain = terrain_from_point_cloud(
+                cloud, self._values["map_resolution"], self._values["cell_height"])
+            self._take_terrain(terrain, "elevation_cloud")
+        except _BAD_INPUT as error:
+            there = self._service.terrain is not None
+            kept = "the last good map stays" if there else "there is no map yet"
+            self.get_logger().error(f"elevation_cloud refused, {kept}: {error}")
+
+    def _is_second_copy(self, info) -> bool:
+        """Tell whether the map came through the other subscription already."""
+        stamp = info["source_timestamp"]
+        if not stamp:
+            return False
+        if stamp in self._seen_maps:
+            return True
+        self._seen_maps.append(stamp)
+        return False
+
+    def _take_terrain(self, terrain: Terrain, source: str) -> None:
+        self._service.take_terrain(terrain)
+        taken = self._service.terrain
+        assert taken is not None
+        rows, columns = taken.elevation.shape
+        known = 100.0 * np.isfinite(taken.elevation).mean()
+        self.get_logger().info(
+            f"map from {source}: {columns} x {rows} cells of {taken.resolution:g} m, "
+            f"{known:.0f} % known")
+
+    def _take_joints(self, state: JointState) -> None:
+        try:
+            self._service.take_joints(joint_positions(state, self._service.joint_names))
+        except MessageError as error:
+            self.get_logger().warning(
+                f"{error}; the angles known before stay", throttle_duration_sec=5.0)
+
+    def _take_path(self, path: Path) -> None:
+        try:
+            self._service.take_path(path_to_poses(path, self._map_frame))
+        except MessageError as error:
+            self._service.refuse_path(str(error))
+            self.get_logger().error(f"~/path refused: {error}")
+
+    def _can_traverse(
+        self, request: GetPlan.Request, response: GetPlan.Response,
+    ) -> GetPlan.Response:
+        def answer() -> Judgement:
+            start = stamped_pose_to_array(request.start, self._map_frame, "start")
+            goal = stamped_pose_to_array(request.goal, self._map_frame, "goal")
+            return self._service.answer(start, goal, request.tolerance)
+
+        response.plan = self._publish(self._judge("can_traverse", answer))
+        return response
+
+    def _check_path(
+        self, _request: Trigger.Request, response: Trigger.Response,
+    ) -> Trigger.Response:
+        judgement = self._judge("check_path", self._service.check_last_path)
+        self._publish(judgement)
+        response.success = judgement.traversable
+        response.message = verdict_to_json(judgement.verdict)
+        return response
+
+    def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
+        file = _file_of_url(request.map_url)
+        if file is None or not file.is_file():
+            self.get_logger().error(
+                f"load_map: no file {request.map_url!r}; it must be the path or file:// URL of a "
+                "terrain file on this machine")
+            response.result = LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
+            return response
+        try:
+            terrain = load_terrain(file)
+            self._take_terrain(terrain, str(file))
+        except _BAD_INPUT as error:
+            self.get_logger().error(f"load_map: {error}")
+            response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
+            return response
+        response.map = terrain_to_occupancy_grid(
+            terrain, self._map_frame, self.get_clock().now().to_msg())
+        response.result = LoadMap.Response.RESULT_SUCCESS
+        return response
+
+    def _judge(self, request: str, judge: Callable[[], Judgement]) -> Judgement:
+        """Answer a request and log it; whatever is wrong with it makes a refused verdict."""
+        try:
+            judgement = judge()
+        except _BAD_INPUT as error:
+            judgement = refusal("bad_request", str(error))
+        except Exception as error:
+            # A fault of this program must not leave the rover without a planner.
+            self.get_logger().error(f"{request}: {traceback.format_exc()}")
+            judgement = refusal("internal_error", f"{type(error).__name__}: {error}")
+        verdict = judgement.verdict
+        if judgement.traversable:
+            self.get_logger().info(
+                f"{request}: traversable, {verdict['length']:.2f} m, {verdict['time']:.0f} s, "
+                f"{verdict['energy']:.1f} J")
+        else:
+            self.get_logger().warning(
+                f"{request}: refused ({verdict['code']}): {verdict['reason']}")
+        return judgement
+
+    def _publish(self, judgement: Judgement) -> Path:
+        """Publish a judgement on all topics with one stamp; return the plan."""
+        stamp, frame = self.get_clock().now().to_msg(), self._map_frame
+        plan = self._publish_path(judgement, frame, stamp)
+        for topic, field in WHEEL_TOPICS.items():
+            self._wheels[topic].publish(
+                waypoint_array(np.empty((0, len(WHEELS)))) if judgement.candidate is None
+                else waypoint_array(getattr(judgement.candidate.prediction, field)))
+        self._verdict.publish(verdict_to_diagnostics(
+            judgement.verdict, self._service.settings.rover.name, frame, stamp,
+            warn=not judgement.verdict.get("suspension_agrees", True)))
+        return plan
+
+    def _publish_path(self, judgement: Judgement, frame: str, stamp) -> Path:
+        """Publish what there is of a path, empty messages where none was judged."""
+        plan = empty_path(frame, stamp)
+        if judgement.candidate is None:
+            joints, markers = empty_trajectory(frame, stamp), cleared_markers(frame, stamp)
+            tip_over = waypoint_array(np.empty((0, len(MEASURES))), "measure")
+        else:
+            prediction = judgement.candidate.prediction
+            rows = decimate(prediction.poses, self._values["plan_spacing"])
+            if judgement.traversable:
+                plan = settled_path(prediction, rows, frame, stamp)
+            radius = self._service.settings.rover.wheel.radius
+            joints = joint_trajectory(prediction, radius, frame, stamp)
+            tip_over = tip_over_array(prediction)
+            reasons = judgement.candidate.verdict.reasons
+            markers = path_markers(prediction, reasons, rows, frame, stamp)
+        self._plan.publish(plan)
+        self._joints.publish(joints)
+        self._tip_over.publish(tip_over)
+        self._markers.publish(markers)
+        return plan
+
+
+def _file_of_url(url: str) -> FilePath | None:
+    """Return the file that a path or a file:// URL names, None for a URL of another kind."""
+    parts = urlparse(url)
+    if parts.scheme == "file":
+        return FilePath(unquote(parts.path)) if parts.netloc in ("", "localhost") else None
+    return FilePath(url) if "://" not in url else None
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node until it is told to stop; 2 if a parameter is wrong."""
+    logger = rclpy.logging.get_logger(NODE_NAME)
+    node = None
+    try:
+        logger.info("compiling kernels; the first start takes longest")
+        warm_up()
+        rclpy.init(args=arguments)
+        node = TraverseServer()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except _BAD_INPUT as error:
+        logger.fatal(str(error))
+        return 2
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,308 @@
+"""What a traverse server knows and decides, without ROS: map, path, joints in, judgements out."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.rover import Rover, load_rover
+from rover_physics.terrain import Terrain
+from rover_planner.candidates import MAX_WAYPOINTS
+from rover_planner.errors import PlanningError
+from rover_planner.path_query import (
+    Candidate,
+    PathAnswer,
+    PathQueryOptions,
+    answer_path_query,
+    check_path,
+)
+
+_RING_STEP = 0.1
+_MAX_RINGS = 6
+_RING_GOALS = 8
+
+
+@dataclass(frozen=True)
+class ServiceSettings:
+    """The parameters of a traverse server, loaded and ready to use."""
+
+    rover: Rover
+    """The rover that is asked about."""
+    query: PathQueryOptions
+    """How candidates are made and judged."""
+    interpolate: bool
+    """Whether small unknown regions of a map are interpolated."""
+    max_gap: float
+    """Widest region that is [m]."""
+    suspension_tolerance: float
+    """Difference of measured and predicted suspension angles that is still agreement [rad]."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The answer to one request."""
+
+    verdict: dict[str, Any]
+    """traversable, code, reason and what else there is to say, of JSON's types or numpy's."""
+    candidate: Candidate | None = None
+    """The path that was judged; None where the request was refused before."""
+
+    @property
+    def traversable(self) -> bool:
+        """Whether the rover may drive."""
+        return bool(self.verdict["traversable"])
+
+
+def settings_from_parameters(values: Mapping[str, Any]) -> ServiceSettings:
+    """Load what the parameters of the traverse server name.
+
+    Args:
+        values: All of the table `TRAVERSE_SERVER`, each already checked.
+
+    Raises:
+        RoverError: The rover cannot be loaded.
+    """
+    return ServiceSettings(
+        rover=load_rover(values["rover"]),
+        query=PathQueryOptions(
+            count=values["candidate_count"], spacing=values["candidate_spacing"],
+            waypoint_spacing=values["waypoint_spacing"], policy=values["policy"],
+            friction=values["friction"] or None, max_torque=values["max_torque"] or None),
+        interpolate=values["unknown_cells"] == "interpolate",
+        max_gap=values["max_gap"],
+        suspension_tolerance=values["suspension_tolerance"])
+
+
+class TraverseService:
+    """The last good map, path and joint angles, and the questions about them."""
+
+    def __init__(self, settings: ServiceSettings):
+        self._settings = settings
+        self._received: Terrain | None = None
+        self._terrain: Terrain | None = None
+        self._path: NDArray[np.float64] | None = None
+        self._path_refusal = "no path was received yet; publish one on ~/path"
+        self._joints: dict[str, float] = {}
+
+    @property
+    def settings(self) -> ServiceSettings:
+        """The settings in force."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: ServiceSettings) -> None:
+        self._settings = settings
+        if self._received is not None:
+            self.take_terrain(self._received)
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """The last good map, small gaps filled if the settings say so."""
+        return self._terrain
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints whose angles matter: the suspension's and the manipulator's."""
+        return SUSPENSION_JOINTS + self._manipulator_joints()
+
+    def take_terrain(self, terrain: Terrain) -> None:
+        """Keep a map until the next one."""
+        self._terrain = (
+            terrain.fill_gaps(self._settings.max_gap) if self._settings.interpolate else terrain)
+        self._received = terrain
+
+    def take_path(self, poses: NDArray[np.float64]) -> None:
+        """Keep a path of poses (n, 3), x, y [m], yaw [rad], to be checked."""
+        self._path = poses
+
+    def refuse_path(self, reason: str) -> None:
+        """Forget the path: whoever asks next means the one that could not be understood."""
+        self._path = None
+        self._path_refusal = f"the last path was refused: {reason}"
+
+    def take_joints(self, positions: Mapping[str, float]) -> None:
+        """Keep measured joint angles [rad] by name; others stay as they were."""
+        self._joints.update(positions)
+
+    def answer(self, start, goal, tolerance: float = 0.0) -> Judgement:
+        """Find a way from start to goal, or say why there is none.
+
+        Args:
+            start: (3,) x, y [m], yaw [rad] of the body origin, map frame.
+            goal: The same.
+            tolerance: How far from the goal's position the rover may end [m], where the goal
+                itself cannot be reached; the heading stays. 0 is exact.
+
+        Raises:
+            PlanningError: The request has no meaning.
+            RoverError: The model refuses the request.
+        """
+        if not (math.isfinite(tolerance) and tolerance >= 0.0):
+            raise PlanningError(f"tolerance is {tolerance}; it must be a distance of at least 0 m")
+        if self._terrain is None:
+            return self._refuse_for_want_of_a_map()
+        start, goal = np.asarray(start, np.float64), np.asarray(goal, np.float64)
+        exact = self._query(start, goal)
+        found, reached, tried = exact, goal, 0
+        if not exact.traversable and exact.chosen.verdict.first_failure > 0:
+            for alternative in _goals_within(start, goal, tolerance):
+                tried += 1
+                if not self._can_stand(alternative):
+                    continue
+                answer = self._query(start, alternative)
+                if answer.traversable:
+                    found, reached = answer, alternative
+                    break
+        return self._judge_answer(found, goal, reached, tried)
+
+    def check_last_path(self) -> Judgement:
+        """Judge the last path that was received.
+
+        Raises:
+            PlanningError: The path is too long.
+            RoverError: The model refuses the path.
+        """
+        if self._path is None:
+            return refusal("no_path", self._path_refusal)
+        if self._terrain is None:
+            return self._refuse_for_want_of_a_map()
+        poses = densify(self._path, self._settings.query.waypoint_spacing)
+        candidate = check_path(
+            self._settings.rover, self._terrain, poses, self._settings.query,
+            self._manipulator_angles())
+        return Judgement(self._describe(candidate), candidate)
+
+    def _query(self, start, goal) -> PathAnswer:
+        """Ask for the candidates between two poses on the map."""
+        assert self._terrain is not None
+        return answer_path_query(
+            self._settings.rover, self._terrain, start, goal, self._settings.query,
+            self._manipulator_angles())
+
+    def _can_stand(self, pose: NDArray[np.float64]) -> bool:
+        """Tell whether the rover can stand at a pose (3,), without asking how it gets there."""
+        assert self._terrain is not None
+        return check_path(
+            self._settings.rover, self._terrain, pose[None, :], self._settings.query,
+            self._manipulator_angles()).verdict.traversable
+
+    def _judge_answer(
+        self, answer: PathAnswer, goal: NDArray[np.float64], reached: NDArray[np.float64],
+        tried: int,
+    ) -> Judgement:
+        """Describe the answer to a query, and which goal it is for."""
+        verdict = self._describe(answer.chosen)
+        verdict["candidates"] = len(answer.candidates)
+        verdict["traversable_candidates"] = sum(
+            candidate.verdict.traversable for candidate in answer.candidates)
+        verdict["chosen_candidate"] = answer.nearest
+        verdict["goal"] = reached.tolist()
+        verdict["goal_offset"] = float(np.hypot(*(reached - goal)[:2]))
+        verdict["alternative_goals_tried"] = tried
+        verdict["explanation"] = answer.explain()
+        return Judgement(verdict, answer.chosen)
+
+    def _describe(self, candidate: Candidate) -> dict[str, Any]:
+        """Say about a judged path what a program or an operator wants to know."""
+        prediction, failure = candidate.prediction, candidate.verdict.first_failure
+        verdict = dict(candidate.verdict.to_dict())
+        verdict["waypoints"] = len(prediction.poses)
+        verdict["length"] = candidate.length
+        verdict["time"] = float(prediction.time[-1])
+        verdict["energy"] = float(prediction.energy[-1])
+        if failure >= 0:
+            verdict["failure_pose"] = prediction.poses[failure].tolist()
+            verdict["failure_distance"] = candidate.reach * candidate.length
+        verdict.update(self._compare_suspension(candidate))
+        return verdict
+
+    def _compare_suspension(self, candidate: Candidate) -> dict[str, Any]:
+        """Compare the measured suspension with the predicted one at the path's start."""
+        prediction = candidate.prediction
+        if not prediction.settled[0]:
+            return {}
+        predicted = dict(zip(
+            SUSPENSION_JOINTS, (*prediction.rocker_angle[0], *prediction.bogie_angle[0]),
+            strict=True))
+        mismatch = {
+            name: self._joints[name] - float(angle)
+            for name, angle in predicted.items() if name in self._joints}
+        if not mismatch:
+            return {}
+        largest = max(abs(difference) for difference in mismatch.values())
+        return {
+            "suspension_mismatch": mismatch,
+            "suspension_agrees": largest <= self._settings.suspension_tolerance}
+
+    def _manipulator_joints(self) -> tuple[str, ...]:
+        """Return the names of the manipulator's joints, none where the rover has none."""
+        manipulator = self._settings.rover.manipulator
+        return tuple(manipulator.joints) if manipulator is not None else ()
+
+    def _manipulator_angles(self) -> dict[str, float] | None:
+        """Return the measured manipulator angles, None (stowed) until all are known."""
+        names = self._manipulator_joints()
+        if not names or any(name not in self._joints for name in names):
+            return None
+        return {name: self._joints[name] for name in names}
+
+    @staticmethod
+    def _refuse_for_want_of_a_map() -> Judgement:
+        """Refuse a question that came before any map."""
+        return refusal(
+            "no_map", "no map was received yet; publish one on elevation_cloud or call ~/load_map")
+
+
+def refusal(code: str, reason: str) -> Judgement:
+    """Refuse a request that no path could be judged for."""
+    return Judgement({"traversable": False, "code": code, "reason": reason, "first_failure": -1})
+
+
+def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """Put waypoints between the poses (n, 3) of a path until none are further apart.
+
+    The given poses stay. Between them x and y run along the straight line and the heading turns
+    evenly the shorter way; the turn on the spot of poses at one place stays one step.
+
+    Args:
+        poses: x, y [m], yaw [rad].
+        spacing: Largest distance between waypoints [m].
+
+    Raises:
+        PlanningError: The path would have more than MAX_WAYPOINTS.
+    """
+    steps = np.diff(poses, axis=0)
+    steps[:, 2] = np.arctan2(np.sin(steps[:, 2]), np.cos(steps[:, 2]))
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    pieces = np.maximum(1.0, np.ceil(lengths / spacing - 1e-9))
+    if pieces.sum() >= MAX_WAYPOINTS:
+        raise PlanningError(
+            f"path is {lengths.sum():.4g} m long, which at {spacing:g} m are more than "
+            f"{MAX_WAYPOINTS} waypoints; ask for a shorter one")
+    counts = pieces.astype(np.intp)
+    segment = np.repeat(np.arange(len(steps)), counts)
+    within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
+    dense = poses[segment] + steps[segment] * (within / counts[segment])[:, None]
+    return np.vstack([dense, poses[-1:]])
+
+
+def _goals_within(
+    start: NDArray[np.float64], goal: NDArray[np.float64], tolerance: float,
+) -> Iterator[NDArray[np.float64]]:
+    """Yield other goals on rings of increasing distance, on each ring those to the start first."""
+    if tolerance <= 0.0:
+        return
+    rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / _RING_STEP)))
+    towards_start = math.atan2(start[1] - goal[1], start[0] - goal[0])
+    turns = sorted((2.0 * math.pi * k / _RING_GOALS for k in range(_RING_GOALS)),
+                   key=lambda turn: -math.cos(turn))
+    for ring in range(1, rings + 1):
+        # A hair within the tolerance, so that rounding does not carry a goal out of it.
+        distance = tolerance * ring / rings * (1.0 - 1e-6)
+        for turn in turns:
+            angle = towards_start + turn
+            yield goal + distance * np.array([math.cos(angle), math.sin(angle), 0.0])

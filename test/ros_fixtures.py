@@ -1,0 +1,82 @@
+"""ROS for tests: a context and a domain of their own, executors that spin in the background."""
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+TIMEOUT = 20.0
+"""Longest wait for anything [s]; only a broken system takes that long."""
+
+
+def domain_id() -> int:
+    """Return a domain (1 to 100) of this test process, so that runs side by side do not meet."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
+    run = os.getppid() if "PYTEST_XDIST_WORKER" in os.environ else os.getpid()
+    return 1 + (run * 7 + int(worker)) % 100
+
+
+def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
+    """Return the condition's first true value; fail with what was waited for."""
+    end = time.monotonic() + timeout
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.005)
+    raise AssertionError(f"waited {timeout} s for {what}")
+
+
+class RosRun:
+    """A context with nodes, each spun by an executor in a thread of its own."""
+
+    def __init__(self) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain_id())
+        self._spinning: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
+
+    def spin(self, node: Node) -> Node:
+        """Spin a node of this context in the background from now on."""
+        executor = SingleThreadedExecutor(context=self.context)
+        executor.add_node(node)
+        thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
+        thread.start()
+        self._spinning.append((node, executor, thread))
+        return node
+
+    def is_alive(self, node: Node) -> bool:
+        """Tell whether a node is still being spun; an exception in a callback ends that."""
+        return any(thread.is_alive() for other, _, thread in self._spinning if other is node)
+
+    def close(self) -> None:
+        """End all nodes and the context."""
+        for _, executor, _ in self._spinning:
+            executor.shutdown()
+        for _, _, thread in self._spinning:
+            thread.join(TIMEOUT)
+        for node, _, _ in self._spinning:
+            node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+def call(client, request, timeout: float = TIMEOUT):
+    """Call a service and return its response."""
+    assert client.wait_for_service(timeout), f"no service {client.srv_name}"
+    done = threading.Event()
+    future = client.call_async(request)
+    future.add_done_callback(lambda _: done.set())
+    assert done.wait(timeout), f"no answer from {client.srv_name}"
+    return future.result()
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin()
+    except ExternalShutdownException:
+        pass
