@@ -2,4 +2,8 @@
 
 
 class PlanningError(Exception):
-    """A request to the planner that has no meaning: the text names the argument and what would be right."""
+    """A request that has no meaning; the text names the argument and what would be right."""
+
+
+class DemoError(Exception):
+    """The demo could not be carried out; the text says which part failed and how."""
