@@ -7,7 +7,7 @@ from setuptools import setup
 
 NAME = "rover_planner"
 PACKAGES = ["rover_physics", "msg_adapters", "rover_planner"]
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link to this file
 
 # Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba and osqp are not in it.
 # Upper bounds: the next version that may break. constraints.txt holds the versions tested.
