@@ -21,7 +21,7 @@ help: ## list what there is
 
 .PHONY: demo
 demo: $(READY) ## plan over DDS on a made Mars terrain; MAP=terrain.npz for another
-	@$(BIN)/python -m rover_planner demo $(if $(MAP),"$(MAP)")
+	@$(BIN)/python -m rover_planner demo $(if $(MAP),--map "$(MAP)")
 
 .PHONY: test
 test: lint kernels ## lint, type check and all tests
@@ -46,7 +46,7 @@ bench: kernels ## measure the time of a full evaluation
 
 .PHONY: clean
 clean: ## remove the environment and everything that was made
-	rm -rf "$(VENV)" build dist install log out *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf "$(VENV)" build dist install log demo_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find $(PACKAGES) test -name __pycache__ -prune -exec rm -rf {} +
 
 $(READY): setup.py pyproject.toml constraints.txt .ci/make_venv
