@@ -86,6 +86,11 @@ class TraverseServer(Node):
         self.add_post_set_parameters_callback(self._apply_parameters)
         self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
 
+    @property
+    def service(self) -> TraverseService:
+        """What the node knows."""
+        return self._service
+
     def _create_publishers(self) -> None:
         qos = result_qos()
         self._plan = self.create_publisher(Path, "~/plan", qos)
@@ -153,7 +158,7 @@ class TraverseServer(Node):
         known = 100.0 * np.isfinite(taken.elevation).mean()
         self.get_logger().info(
             f"map from {source}: {columns} x {rows} cells of {taken.resolution:g} m, "
-            f"{known:.0f} % known")
+            f"{known:.1f} % known")
 
     def _take_joints(self, state: JointState) -> None:
         try:
@@ -274,27 +279,39 @@ def _file_of_url(url: str) -> FilePath | None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the node until it is told to stop; 2 if a parameter is wrong."""
+    """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
     logger = rclpy.logging.get_logger(NODE_NAME)
-    node = None
     try:
         logger.info("compiling kernels; the first start takes longest")
         warm_up()
         rclpy.init(args=arguments)
-        node = TraverseServer()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.spin()
+        _run(TraverseServer)
     except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        return 0
     except _BAD_INPUT as error:
         logger.fatal(str(error))
         return 2
     finally:
-        if node is not None:
-            node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _run(make_node: Callable[[], Node]) -> None:
+    """Make a node and spin it until the context ends."""
+    node = None
+    try:
+        executor = SingleThreadedExecutor()
+        node = make_node()
+        executor.add_node(node)
+        executor.spin()
+    except Exception as error:
+        # Whoever is told to stop half-way through the start fails on a context that has ended.
+        if rclpy.ok():
+            raise
+        raise ExternalShutdownException from error
+    finally:
+        if node is not None:
+            node.destroy_node()
 
 
 if __name__ == "__main__":

@@ -105,6 +105,16 @@ class TraverseService:
         return self._terrain
 
     @property
+    def path(self) -> NDArray[np.float64] | None:
+        """Poses (n, 3) of the last path, None if there is none or it could not be understood."""
+        return self._path
+
+    @property
+    def joints(self) -> dict[str, float]:
+        """Measured joint angles [rad] by name."""
+        return dict(self._joints)
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints whose angles matter: the suspension's and the manipulator's."""
         return SUSPENSION_JOINTS + self._manipulator_joints()

@@ -16,3 +16,53 @@ def terrain_dir() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real maps in {folder}; set ROVER_TERRAIN_DIR to their folder")
     return folder
+
+
+@pytest.fixture
+def ros():
+    """Return a ROS context of the test's own; nodes spin in the background and end with it."""
+    from ros_fixtures import RosRun
+
+    run = RosRun()
+    yield run
+    run.close()
+
+
+@pytest.fixture
+def client(ros):
+    """Return the other side of the traverse server's contract."""
+    from planner_client import PlannerClient
+
+    return ros.spin(PlannerClient(ros))
+
+
+@pytest.fixture
+def start_server(ros):
+    """Return a function that starts a traverse server with parameters."""
+    from rclpy.parameter import Parameter
+
+    from rover_physics.sweep import warm_up
+    from rover_planner.traverse_server import TraverseServer
+
+    warm_up()
+
+    def start(**overrides):
+        parameters = [Parameter(name, value=value) for name, value in overrides.items()]
+        return ros.spin(TraverseServer(context=ros.context, parameter_overrides=parameters))
+
+    return start
+
+
+@pytest.fixture
+def server(start_server):
+    """Return a traverse server without a map."""
+    return start_server()
+
+
+@pytest.fixture
+def mapped(server, client):
+    """Return a traverse server that has a passable map."""
+    from grounds import make_terrain, waves
+
+    client.send_terrain(make_terrain(waves))
+    return server

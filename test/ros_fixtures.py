@@ -1,5 +1,6 @@
 """ROS for tests: a context and a domain of their own, executors that spin in the background."""
 
+import contextlib
 import os
 import threading
 import time
@@ -76,7 +77,5 @@ def call(client, request, timeout: float = TIMEOUT):
 
 
 def _spin(executor: SingleThreadedExecutor) -> None:
-    try:
+    with contextlib.suppress(ExternalShutdownException):
         executor.spin()
-    except ExternalShutdownException:
-        pass

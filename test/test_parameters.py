@@ -1,4 +1,4 @@
-"""One table makes declaration, checks and documentation, and bad values are refused with reasons."""
+"""One table makes declaration, checks and documentation; bad values are refused."""
 
 import math
 from pathlib import Path
@@ -16,14 +16,6 @@ from rover_planner.parameters import (
     declare_parameters,
     parameters_document,
 )
-from ros_fixtures import RosRun
-
-
-@pytest.fixture
-def ros():
-    run = RosRun()
-    yield run
-    run.close()
 
 
 @pytest.fixture
