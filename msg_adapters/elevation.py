@@ -260,14 +260,14 @@ def _detect_grid(xy: NDArray[np.float64], precision: float) -> _Grid | None:
     index = np.rint((xy - origin) / resolution)
     off_centre = np.abs(xy - (origin + index * resolution)).max()
     columns, rows = grid.cells(xy)
-    single = len(np.unique(rows * grid.columns + columns)) == len(xy)
+    single = np.bincount(rows * grid.columns + columns).max() == 1
     on_centre = off_centre <= max(_MAX_OFF_CENTRE * resolution, noise)
     return grid if single and on_centre else None
 
 
 def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, float] | None:
     """Return the first value and the spacing of equidistant values (0 for one value), or None."""
-    ordered = np.unique(values)
+    ordered = np.sort(values)
     starts = np.concatenate([[True], np.diff(ordered) > noise])
     distinct = ordered[starts]
     if len(distinct) == 1:
