@@ -1,0 +1,308 @@
+"""A rigid cylindrical wheel on the terrain: its vertical gap, where it touches and in what frame.
+
+The lower half of the cylinder is sampled in the wheel's own, cambered plane: on circles across its
+width and angles along each circle. The smallest vertical gap between sample and terrain is the gap
+of the wheel; it is refined along the circle by the root of its derivative. Contact angles count from
+the lowest point of the circle, positive towards the front, so a wheel climbing has positive angles.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rover_physics.ground import height_at_cell, is_cell_on_map, look_up
+from rover_physics.kernels import allocating_kernel, kernel
+from rover_physics.rover import Rover
+
+TOUCHING, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
+COARSE, QUICK, NEAR, FULL, EXACT = 0, 1, 2, 3, 4
+REFINEMENTS = 6
+CIRCLE_REACH = 2e-2
+"""How far above the nearest circle, in wheel radii, another one is looked at more closely."""
+PRUNING_MARGIN = 2e-2
+"""Rows are passed over that stay farther than this, in wheel radii, above the nearest sample."""
+COMPLIANCE = 2e-3
+"""Depth, in wheel radii, to which a real wheel and ground give way: circles whose gaps differ by less
+share the load. Wheels on a plane thus touch in the middle, not on an edge chosen by rounding."""
+
+
+class WheelSamples(NamedTuple):
+    """Where the cylinder of a wheel is sampled."""
+
+    radius: float
+    """Wheel radius [m]."""
+    angles: np.ndarray
+    """(k,) contact angles [rad], ascending."""
+    sines: np.ndarray
+    """(k,) their sines."""
+    cosines: np.ndarray
+    """(k,) their cosines."""
+    spacing_sine: float
+    """Sine of the angle between neighbouring samples."""
+    spacing_cosine: float
+    """Cosine of the angle between neighbouring samples."""
+    laterals: np.ndarray
+    """(m,) distances from the middle plane along the wheel's axis [m], ascending."""
+
+
+class Touch(NamedTuple):
+    """Where the six wheels touch; written by `find_touch` and `find_contact`."""
+
+    gap: np.ndarray
+    """(6,) smallest vertical gap, negative inside the ground [m]."""
+    sine: np.ndarray
+    """(6,) sine of the contact angle."""
+    cosine: np.ndarray
+    """(6,) cosine of the contact angle."""
+    point: np.ndarray
+    """(6, 3) touching point [m], map frame."""
+    normal: np.ndarray
+    """(6, 3) surface normal that governs how the gap changes, with z = 1, map frame."""
+    nearest: np.ndarray
+    """(6,) index of the circle that touches."""
+    circle_gap: np.ndarray
+    """(6, m) smallest gap on each circle [m]."""
+    circle_sine: np.ndarray
+    """(6, m) sine of the angle where it is."""
+    circle_cosine: np.ndarray
+    """(6, m) cosine of the angle where it is."""
+
+
+def sample_wheel(rover: Rover, resolution: float) -> WheelSamples:
+    """Choose samples no farther apart than the cells of a terrain of `resolution` [m]."""
+    wheel = rover.wheel
+    half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 8, 24))
+    half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 1, 4))
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * half_angles + 1)
+    laterals = np.linspace(-0.5 * wheel.width, 0.5 * wheel.width, 2 * half_laterals + 1)
+    return WheelSamples(
+        float(wheel.radius),
+        angles,
+        np.sin(angles),
+        np.cos(angles),
+        float(np.sin(angles[1] - angles[0])),
+        float(np.cos(angles[1] - angles[0])),
+        laterals,
+    )
+
+
+@allocating_kernel
+def new_touch(samples):
+    """Return an empty set of touches."""
+    circles = samples.laterals.size
+    return Touch(
+        np.empty(6),
+        np.empty(6),
+        np.empty(6),
+        np.empty((6, 3)),
+        np.empty((6, 3)),
+        np.zeros(6, np.int64),
+        np.empty((6, circles)),
+        np.empty((6, circles)),
+        np.empty((6, circles)),
+    )
+
+
+@kernel
+def find_touch(ground, samples, placement, wheel, scope, touch):
+    """Find where `wheel` is nearest to the ground and write it into row `wheel` of `touch`.
+
+    `scope` says how thoroughly: COARSE looks at every other sample of the middle circle, QUICK at all
+    samples and closer at the nearest, NEAR only around the direction found last, FULL closer at each
+    circle, EXACT closer at each local minimum of each circle. Returns TOUCHING, or OFF_MAP or
+    UNKNOWN_GROUND where any sample lies there; such samples are passed over, and the gap is NaN
+    where there is no other.
+    """
+    status = TOUCHING
+    if scope == NEAR:
+        s, c = touch.sine[wheel], touch.cosine[wheel]
+        _refine(ground, samples, placement, wheel, touch.nearest[wheel], s, c, touch)
+    else:
+        status = _scan(ground, samples, placement, wheel, scope, touch)
+        if touch.circle_gap[wheel, touch.nearest[wheel]] == np.inf:
+            touch.gap[wheel] = np.nan
+            return status
+        if scope != EXACT:
+            _refine_circles(ground, samples, placement, wheel, scope == FULL, touch)
+    m = touch.nearest[wheel]
+    touch.gap[wheel] = touch.circle_gap[wheel, m]
+    s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+    _write_point(samples, placement, wheel, s, c, samples.laterals[m], touch)
+    height, slope_x, slope_y = look_up(ground, touch.point[wheel, 0], touch.point[wheel, 1])
+    _write_normal(placement, wheel, s, c, slope_x, slope_y, touch)
+    return status
+
+
+@kernel
+def _refine_circles(ground, samples, placement, wheel, all_circles, touch):
+    """Look closer at the nearest sample of the nearest circle, or of all circles that may be nearest."""
+    best = touch.nearest[wheel]
+    reach = touch.circle_gap[wheel, best] + CIRCLE_REACH * samples.radius
+    for m in range(samples.laterals.size):
+        if m == best or (all_circles and touch.circle_gap[wheel, m] <= reach):
+            s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+            _refine(ground, samples, placement, wheel, m, s, c, touch)
+    for m in range(samples.laterals.size):
+        if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
+            touch.nearest[wheel] = m
+
+
+@kernel
+def _scan(ground, samples, placement, wheel, scope, touch):
+    """Write the nearest sample of each circle into `touch`; return the status of the worst sample.
+
+    Rows of samples at one angle are passed over where even the highest ground around stays farther
+    below them than the nearest sample by PRUNING_MARGIN.
+    """
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    elevation, ceiling, scale = ground.elevation, ground.ceiling, ground.inverse_resolution
+    sines, cosines, laterals, radius = (
+        samples.sines, samples.cosines, samples.laterals, samples.radius
+    )  # fmt: skip
+    circle_gap, circle_sine, circle_cosine = (
+        touch.circle_gap, touch.circle_sine, touch.circle_cosine
+    )  # fmt: skip
+    first_m, last_m, stride = 0, laterals.size - 1, 1
+    if scope == COARSE:
+        first_m = last_m = last_m // 2
+        stride = 2
+    centre_x = (centres[wheel, 0] - ground.x0) * scale
+    centre_y = (centres[wheel, 1] - ground.y0) * scale
+    centre_z = centres[wheel, 2]
+    axis_x, axis_y, axis_z = R[0, 1] * scale, R[1, 1] * scale, R[2, 1]
+    rim = abs(axis_z) * laterals[laterals.size - 1]
+    margin = np.inf if scope == EXACT else PRUNING_MARGIN * radius
+    for m in range(laterals.size):
+        circle_gap[wheel, m] = np.inf
+    best, best_m, status = np.inf, first_m, TOUCHING
+    rows = (sines.size - 1) // stride + 1
+    for visit in range(rows):
+        k = stride * (rows // 2 + ((visit + 1) // 2) * (1 - 2 * (visit % 2)))
+        row_x = centre_x + scale * radius * (sines[k] * forward[0] - cosines[k] * up[0])
+        row_y = centre_y + scale * radius * (sines[k] * forward[1] - cosines[k] * up[1])
+        row_z = centre_z - radius * cosines[k] * up[2]
+        if is_cell_on_map(elevation, row_x, row_y):
+            highest = ceiling[int(row_y + 0.5), int(row_x + 0.5)]
+            if row_z - rim - highest > best + margin:
+                continue
+        for m in range(first_m, last_m + 1):
+            gx, gy = row_x + laterals[m] * axis_x, row_y + laterals[m] * axis_y
+            if not is_cell_on_map(elevation, gx, gy):
+                status = OFF_MAP
+                continue
+            gap = row_z + laterals[m] * axis_z - height_at_cell(elevation, gx, gy)
+            if gap != gap:
+                if status == TOUCHING:
+                    status = UNKNOWN_GROUND
+            elif scope == EXACT:
+                if gap < best + CIRCLE_REACH * radius:
+                    _refine(ground, samples, placement, wheel, m, sines[k], cosines[k], touch)
+                    gap = touch.circle_gap[wheel, m]
+            elif gap < circle_gap[wheel, m]:
+                circle_gap[wheel, m] = gap
+                circle_sine[wheel, m], circle_cosine[wheel, m] = sines[k], cosines[k]
+            if gap < best:
+                best, best_m = gap, m
+    touch.nearest[wheel] = best_m
+    return status
+
+
+@kernel
+def _refine(ground, samples, placement, wheel, m, s, c, touch):
+    """Find the angle on circle m, near (s, c), where the gap is smallest, and write it into `touch`.
+
+    On a plane the circle touches in the direction of the plane's normal, so each trial looks in the
+    direction of the normal found last; where that leaves the bracket, as on an edge, it is halved.
+    What `touch` holds for the circle is kept where it is lower, unless it is the start (s, c) itself.
+    """
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    lateral, radius = samples.laterals[m], samples.radius
+    x = centres[wheel, 0] + lateral * R[0, 1]
+    y = centres[wheel, 1] + lateral * R[1, 1]
+    z = centres[wheel, 2] + lateral * R[2, 1]
+    best_gap, best_s, best_c = touch.circle_gap[wheel, m], s, c
+    if s == touch.circle_sine[wheel, m] and c == touch.circle_cosine[wheel, m]:
+        best_gap = np.inf
+    turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
+    back_s, back_c = s * turn_c - c * turn_s, c * turn_c + s * turn_s
+    ahead_s, ahead_c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
+    if back_c < 0.0:
+        back_s, back_c = -1.0, 0.0
+    if ahead_c < 0.0:
+        ahead_s, ahead_c = 1.0, 0.0
+    for trial in range(REFINEMENTS):
+        height, slope_x, slope_y = look_up(
+            ground,
+            x + radius * (s * forward[0] - c * up[0]),
+            y + radius * (s * forward[1] - c * up[1]),
+        )
+        gap = z - radius * c * up[2] - height
+        if gap < best_gap:
+            best_gap, best_s, best_c = gap, s, c
+            touch.circle_gap[wheel, m] = gap
+            touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
+        rise = slope_x * forward[0] + slope_y * forward[1]
+        fall = up[2] - slope_x * up[0] - slope_y * up[1]
+        turn = s * fall - c * rise
+        length = np.sqrt(rise * rise + fall * fall)
+        if not abs(turn) > 1e-6 * length:
+            break
+        if turn > 0.0:
+            ahead_s, ahead_c = s, c
+        else:
+            back_s, back_c = s, c
+        s, c = rise / length, fall / length
+        if not (s * back_c > c * back_s and s * ahead_c < c * ahead_s) or trial > 2:
+            s, c = back_s + ahead_s, back_c + ahead_c
+            length = np.sqrt(s * s + c * c)
+            s, c = s / length, c / length
+
+
+@kernel
+def _write_point(samples, placement, wheel, s, c, lateral, touch):
+    """Write the point of the cylinder at the angle of sine s and cosine c and at `lateral`."""
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    touch.sine[wheel], touch.cosine[wheel] = s, c
+    for i in range(3):
+        radial = samples.radius * (s * forward[i] - c * up[i])
+        touch.point[wheel, i] = centres[wheel, i] + lateral * R[i, 1] + radial
+
+
+@kernel
+def _write_normal(placement, wheel, s, c, slope_x, slope_y, touch):
+    """Write the wheel's radial direction with the terrain's slope along the axis, scaled to z = 1.
+
+    The part of the terrain's normal along the circle is left out: it vanishes where wheel and ground
+    are tangent, and where the wheel rests on an edge the wheel's own radius is the normal.
+    """
+    R, forward, up, normal = placement.R, placement.forward, placement.up, touch.normal
+    radial_x = -s * forward[0] + c * up[0]
+    radial_y = -s * forward[1] + c * up[1]
+    radial_z = c * up[2]
+    along_radius = radial_z - slope_x * radial_x - slope_y * radial_y
+    along_axis = R[2, 1] - slope_x * R[0, 1] - slope_y * R[1, 1]
+    z = max(along_radius * radial_z + along_axis * R[2, 1], 0.02 * along_radius)
+    normal[wheel, 0] = (along_radius * radial_x + along_axis * R[0, 1]) / z
+    normal[wheel, 1] = (along_radius * radial_y + along_axis * R[1, 1]) / z
+    normal[wheel, 2] = 1.0
+
+
+@kernel
+def find_contact(samples, placement, wheel, touch):
+    """Replace the touch of `wheel` by the mean contact over the circles that share the load.
+
+    Each circle counts by how far its own touching point stays below the lowest plus COMPLIANCE radii.
+    The touch has to come from a FULL or EXACT `find_touch`.
+    """
+    allowance = COMPLIANCE * samples.radius
+    total, sine_sum, cosine_sum, lateral_sum = 0.0, 0.0, 0.0, 0.0
+    for m in range(samples.laterals.size):
+        weight = 1.0 - (touch.circle_gap[wheel, m] - touch.gap[wheel]) / allowance
+        if weight > 0.0:
+            total += weight
+            sine_sum += weight * touch.circle_sine[wheel, m]
+            cosine_sum += weight * touch.circle_cosine[wheel, m]
+            lateral_sum += weight * samples.laterals[m]
+    length = np.sqrt(sine_sum * sine_sum + cosine_sum * cosine_sum)
+    s, c = sine_sum / length, cosine_sum / length
+    _write_point(samples, placement, wheel, s, c, lateral_sum / total, touch)

@@ -1,0 +1,104 @@
+"""Bilinear look-ups of elevation and friction inside kernels, with gaps and the map's edge told apart."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import uint64
+from scipy.ndimage import maximum_filter
+
+from rover_physics.kernels import kernel
+from rover_physics.terrain import Terrain
+
+
+class Ground(NamedTuple):
+    """A terrain as the kernels read it."""
+
+    elevation: np.ndarray
+    """(ny, nx) elevation [m], NaN where unknown."""
+    ceiling: np.ndarray
+    """(ny, nx) highest elevation around each cell, as far as half a wheel width and its cells reach
+    [m]; infinite beside unknown cells and the map's edge."""
+    friction: np.ndarray
+    """(ny, nx) friction coefficient, NaN where the rover's own holds; (0, 0) without a layer."""
+    x0: float
+    """x of the centre of cell [0, 0] [m]."""
+    y0: float
+    """y of the centre of cell [0, 0] [m]."""
+    inverse_resolution: float
+    """Cells per metre [1/m]."""
+
+
+@lru_cache(maxsize=4)
+def pack_ground(terrain: Terrain, wheel_width: float) -> Ground:
+    """Return `terrain` in the form the kernels read for wheels of `wheel_width` [m]."""
+    elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
+    friction = np.empty((0, 0)) if terrain.friction is None else terrain.friction
+    reach = int(np.ceil(0.5 * wheel_width / terrain.resolution + 1.5))
+    ceiling = maximum_filter(
+        np.where(np.isnan(elevation), np.inf, elevation),
+        size=2 * reach + 1,
+        mode="constant",
+        cval=np.inf,
+    )
+    return Ground(
+        elevation,
+        ceiling,
+        np.ascontiguousarray(friction, dtype=np.float64),
+        float(terrain.origin[0]),
+        float(terrain.origin[1]),
+        1.0 / float(terrain.resolution),
+    )
+
+
+@kernel
+def is_cell_on_map(grid, gx, gy):
+    """Tell whether (gx, gy), counted in cells from cell [0, 0], lies within the outermost centres."""
+    return gx >= 0.0 and gy >= 0.0 and gx <= grid.shape[1] - 1 and gy <= grid.shape[0] - 1
+
+
+@kernel
+def height_at_cell(elevation, gx, gy):
+    """Return the elevation [m] at (gx, gy), counted in cells from cell [0, 0], on the map."""
+    i = min(uint64(gy), uint64(elevation.shape[0] - 2))
+    j = min(uint64(gx), uint64(elevation.shape[1] - 2))
+    u, v = gx - j, gy - i
+    next_i, next_j = i + uint64(1), j + uint64(1)
+    here, above = elevation[i, j], elevation[next_i, j]
+    lower = here + u * (elevation[i, next_j] - here)
+    upper = above + u * (elevation[next_i, next_j] - above)
+    return lower + v * (upper - lower)
+
+
+@kernel
+def look_up(ground, x, y):
+    """Return elevation [m] and its gradient (d/dx, d/dy) at (x, y) [m]; NaN where there is none."""
+    elevation = ground.elevation
+    gx = (x - ground.x0) * ground.inverse_resolution
+    gy = (y - ground.y0) * ground.inverse_resolution
+    if not is_cell_on_map(elevation, gx, gy):
+        return np.nan, np.nan, np.nan
+    i = min(uint64(gy), uint64(elevation.shape[0] - 2))
+    j = min(uint64(gx), uint64(elevation.shape[1] - 2))
+    u, v = gx - j, gy - i
+    next_i, next_j = i + uint64(1), j + uint64(1)
+    here, above = elevation[i, j], elevation[next_i, j]
+    along_lower = elevation[i, next_j] - here
+    along_upper = elevation[next_i, next_j] - above
+    lower = here + u * along_lower
+    upper = above + u * along_upper
+    slope_x = (along_lower + v * (along_upper - along_lower)) * ground.inverse_resolution
+    slope_y = (upper - lower) * ground.inverse_resolution
+    return lower + v * (upper - lower), slope_x, slope_y
+
+
+@kernel
+def friction_at(ground, x, y, default):
+    """Return the friction coefficient of the cell nearest to (x, y) [m], else `default`."""
+    ny, nx = ground.friction.shape
+    if ny == 0:
+        return default
+    j = min(max(int((x - ground.x0) * ground.inverse_resolution + 0.5), 0), nx - 1)
+    i = min(max(int((y - ground.y0) * ground.inverse_resolution + 0.5), 0), ny - 1)
+    mu = ground.friction[i, j]
+    return mu if mu > 0.0 else default

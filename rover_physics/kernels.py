@@ -1,0 +1,52 @@
+"""How the numerical kernels are compiled: plain scalar code, compiled once by numba and cached beside it."""
+
+import hashlib
+from pathlib import Path
+
+import numba
+
+COMPILE_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+def kernel(function):
+    """Compile a scalar function that other kernels call; it can't allocate.
+
+    Arrays are not reference-counted in it: counting every array of every argument at every call took
+    most of the time of a settled pose.
+    """
+    return numba.njit(_nrt=False, **COMPILE_OPTIONS)(function)
+
+
+def allocating_kernel(function):
+    """Compile a function that makes work space for kernels."""
+    return numba.njit(**COMPILE_OPTIONS)(function)
+
+
+def sweep_kernel(function):
+    """Compile a function whose `prange` loop runs over the poses of a path."""
+    return numba.njit(parallel=True, **COMPILE_OPTIONS)(function)
+
+
+def drop_stale_kernels(folder: Path) -> None:
+    """Remove cached kernels in `folder` that were compiled from other sources.
+
+    numba looks only at the file that holds a kernel, not at the files of the kernels it calls, so an
+    edit in one file would leave compiled callers in another file as they were.
+    """
+    cache = folder / "__pycache__"
+    digest = hashlib.sha256()
+    for source in sorted(folder.glob("*.py")):
+        digest.update(source.read_bytes())
+    stamp = cache / "kernels.sha256"
+    try:
+        if stamp.exists() and stamp.read_text() == digest.hexdigest():
+            return
+        cache.mkdir(exist_ok=True)
+        for compiled in [*cache.glob("*.nbi"), *cache.glob("*.nbc")]:
+            compiled.unlink(missing_ok=True)
+        stamp.write_text(digest.hexdigest())
+    except OSError:
+        return  # a read-only installation: its sources do not change under us
+
+
+drop_stale_kernels(Path(__file__).parent)

@@ -1,0 +1,197 @@
+"""The quasi-static model along a path: poses in, `PathPrediction` out."""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.contact import sample_wheel
+from rover_physics.errors import ModelError, PoseError
+from rover_physics.evaluation import (
+    EQUAL,
+    NO_EQUILIBRIUM,
+    OPTIMAL,
+    Columns,
+    Settings,
+    evaluate_poses,
+    find_tip_over,
+    new_columns,
+    new_work,
+)
+from rover_physics.ground import pack_ground
+from rover_physics.linkage import Linkage, pack_linkage, place, place_masses
+from rover_physics.manipulator import body_mass_and_com
+from rover_physics.prediction import PathPrediction
+from rover_physics.rover import Rover, load_rover
+from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
+from rover_physics.terrain import Terrain
+
+__all__ = [
+    "NOT_SETTLED",
+    "NO_EQUILIBRIUM",
+    "OFF_MAP",
+    "POLICIES",
+    "SETTLED",
+    "UNKNOWN_GROUND",
+    "sweep_path",
+    "warm_up",
+]
+
+POLICIES = {"equal": EQUAL, "optimal": OPTIMAL}
+_one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
+
+
+def sweep_path(
+    rover: Rover,
+    terrain: Terrain,
+    poses: ArrayLike,
+    *,
+    friction: float | None = None,
+    max_torque: float | None = None,
+    policy: str = "equal",
+    joint_angles: Mapping[str, float] | None = None,
+    payload: float | None = None,
+) -> PathPrediction:
+    """Predict the rover at each pose of a path.
+
+    Args:
+        rover: The rover.
+        terrain: The ground; its friction layer holds where it has one.
+        poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
+        friction: Friction coefficient instead of the rover's own.
+        max_torque: Largest wheel torque [N m] instead of the rover's own.
+        policy: "equal": all wheels pull alike; "optimal": the torques that need least friction.
+        joint_angles: Arm angles [rad] by joint name; stowed where not given.
+        payload: Mass at the arm's tip [kg] instead of the rover's own.
+
+    Raises:
+        PoseError: poses of wrong shape, or not finite.
+        ModelError: an argument that makes no sense.
+    """
+    poses = check_poses(poses)
+    mass, com = body_mass_and_com(rover, joint_angles, payload)
+    linkage = pack_linkage(rover, mass, com)
+    samples = sample_wheel(rover, terrain.resolution)
+    settings = _make_settings(rover, linkage, samples, policy, friction, max_torque)
+    columns = new_columns(len(poses))
+    ground = pack_ground(terrain, rover.wheel.width)
+    with _one_sweep_at_a_time:
+        evaluate_poses(ground, linkage, samples, settings, poses, columns)
+    return _collect(poses, columns, settings, policy)
+
+
+def check_poses(poses: ArrayLike) -> np.ndarray:
+    """Return poses as float array (n, 3).
+
+    Raises:
+        PoseError: Wrong shape or type, no pose, or values that are not finite.
+    """
+    try:
+        array = np.ascontiguousarray(poses, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise PoseError(f"poses are not numbers: {error}") from error
+    if array.ndim != 2 or array.shape[1] != 3 or not len(array):
+        raise PoseError(f"poses have shape {array.shape}; it must be (n, 3): x, y, yaw, n >= 1")
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        row, column = wrong[0]
+        name, value = ["x", "y", "yaw"][column], array[row, column]
+        raise PoseError(f"{name} of pose {row} is {value}; poses must be finite")
+    return array
+
+
+def _make_settings(rover, linkage, samples, policy, friction, max_torque) -> Settings:
+    if policy not in POLICIES:
+        raise ModelError(f"no torque policy {policy!r}; policies are {', '.join(POLICIES)}")
+    mu = rover.friction if friction is None else friction
+    torque = rover.wheel.max_torque if max_torque is None else max_torque
+    for name, value in (("friction", mu), ("max_torque", torque)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise ModelError(f"{name} is {value}; it must be above 0")
+    flat_angle, flat_measure = _tip_over_on_flat_ground(linkage, samples)
+    if not flat_angle > 0.0:
+        raise ModelError(
+            f"rover {rover.name!r} tips over on flat ground: its centre of mass with arm and payload "
+            "is outside its wheels"
+        )
+    top_speed = rover.wheel.max_speed * rover.wheel.radius
+    return Settings(
+        policy=POLICIES[policy],
+        friction=float(mu),
+        max_torque=float(torque),
+        speed=float(min(rover.nominal_speed, top_speed)),
+        max_wheel_speed=float(rover.wheel.max_speed),
+        flat_angle=flat_angle,
+        flat_measure=flat_measure,
+    )
+
+
+def _tip_over_on_flat_ground(linkage: Linkage, samples) -> tuple[float, float]:
+    work = new_work(samples)
+    q = np.zeros(6)
+    place(linkage, 0.0, 0.0, 0.0, q, work.placement)
+    place_masses(linkage, q, work.placement)
+    work.touch.point[:] = work.placement.centres
+    work.touch.point[:, 2] -= linkage.radius
+    return find_tip_over(linkage, work)
+
+
+def _collect(
+    poses: np.ndarray, columns: Columns, settings: Settings, policy: str
+) -> PathPrediction:
+    settled = columns.status == SETTLED
+    position = np.column_stack([poses[:, :2], columns.q[:, 0]])
+    position[~settled] = np.nan
+    rocker = columns.q[:, 3]
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    climbs = np.nan_to_num(np.diff(position[:, 2]))
+    durations = np.hypot(steps, climbs) / settings.speed
+    power = np.nan_to_num(columns.power)
+    work = 0.5 * (power[1:] + power[:-1]) * durations
+    return PathPrediction(
+        poses=poses,
+        status=columns.status,
+        settled=settled,
+        position=position,
+        roll=columns.q[:, 1],
+        pitch=columns.q[:, 2],
+        rocker_angle=np.column_stack([rocker, -rocker]),
+        bogie_angle=columns.q[:, 4:6],
+        wheel_centres=columns.centres,
+        contact_points=columns.points,
+        contact_angle=columns.contact_angle,
+        wheel_loads=columns.N,
+        tangential=columns.T,
+        lateral=columns.S,
+        torque=columns.torque,
+        friction=columns.friction,
+        friction_utilisation=columns.utilisation,
+        slip_ratio=columns.slip,
+        torque_saturation=columns.saturation,
+        tip_over_ratio=columns.tip_over_ratio,
+        tip_over_force_angle=columns.force_angle,
+        belly_clearance=columns.clearance,
+        power=columns.power,
+        energy=_accumulate(work, settled),
+        time=_accumulate(durations, settled),
+        distance=np.concatenate([[0.0], np.cumsum(steps)]),
+        policy=policy,
+    )
+
+
+def _accumulate(increments: np.ndarray, settled: np.ndarray) -> np.ndarray:
+    return np.where(settled, np.concatenate([[0.0], np.cumsum(increments)]), np.nan)
+
+
+def warm_up() -> None:
+    """Compile the kernels, or load them from the cache, by sweeping a level patch."""
+    rover = load_rover("lsr1")
+    patch = Terrain(np.zeros((64, 64)), 0.05, (-1.6, -1.6))
+    for layer in (None, np.ones((64, 64))):
+        sweep_path(rover, replace(patch, friction=layer), np.zeros((1, 3)))
+
+
+if __name__ == "__main__":
+    warm_up()
