@@ -1,11 +1,12 @@
-"""Candidate paths in the plane between two poses: a direct connection and a fan of curves beside it.
+"""Candidate paths in the plane between two poses: a direct connection and a fan beside it.
 
-Every candidate is driven forward, leaves the start along its heading and arrives along the goal's heading.
-The direct connection is a cubic Hermite curve, a straight line where both headings point along it. The
-fan adds a cosine bump across the chord to it, whose slope is zero at both ends, so both headings stay
-exact. Curves tighter than the smallest radius are dropped. Where even the direct connection is too
-tight (headings that oppose each other, a goal behind the rover) the arcs and lines of Dubins (1957) take
-over; they connect any two poses with the smallest radius, so there is always a candidate.
+Every candidate is driven forward, leaves the start along its heading and arrives along the goal's
+heading. The direct connection is a cubic Hermite curve, a straight line where both headings point
+along it. The fan adds a cosine bump across the chord to it, whose slope is zero at both ends, so
+both headings stay exact. Curves tighter than the smallest radius are dropped. Where even the
+direct connection is too tight (headings that oppose each other, a goal behind the rover) the arcs
+and lines of Dubins (1957) take over; they connect any two poses with the smallest radius, so there
+is always a candidate.
 """
 
 from collections.abc import Callable
@@ -19,13 +20,15 @@ from rover_planner.errors import PlanningError
 MIN_RADIUS = 0.8
 """Smallest radius of a candidate [m], unless told: the wheelbase of the LSR-1 preset.
 
-With the radius equal to the wheelbase and steered end wheels, those on the inside turn by about 40 degrees.
+With the radius equal to the wheelbase and steered end wheels, those on the inside turn by about
+40 degrees.
 """
 
 MAX_WAYPOINTS = 100_000
 """Longest path worth sweeping [waypoints]; a longer one is a slip in the units of the request."""
 
 _SAME_PLACE = 1e-9
+_LONG_WAY_ROUND = 1.5
 _FINE_SAMPLES = 2001
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
 
@@ -41,7 +44,7 @@ def generate_candidates(
     waypoint_spacing: float = 0.02,
     min_radius: float = MIN_RADIUS,
 ) -> list[np.ndarray]:
-    """Make candidate paths from start to goal, the direct connection first, then outwards to both sides.
+    """Make candidate paths from start to goal, the direct one first, then outwards to both sides.
 
     Args:
         start: x, y [m] and yaw [rad] of the body origin in the map frame.
@@ -52,9 +55,10 @@ def generate_candidates(
         min_radius: Radius of the tightest curve the rover may drive [m].
 
     Returns:
-        One to `count` arrays (n, 3) of x, y [m] and yaw [rad, in -pi to pi], yaw along the tangent. The
-        waypoints of a path are equally far apart along it, at most `waypoint_spacing`; the first is the
-        start and the last the goal. One single pose where start and goal are the same.
+        One to `count` arrays (n, 3) of x, y [m] and yaw [rad, in -pi to pi], yaw along the
+        tangent. The waypoints of a path are equally far apart along it, at most
+        `waypoint_spacing`; the first is the start and the last the goal. One single pose where
+        start and goal are the same.
 
     Raises:
         PlanningError: An argument is NaN or out of range, or the path has more than MAX_WAYPOINTS.
@@ -76,13 +80,12 @@ def generate_candidates(
     if chord > _SAME_PLACE:
         paths = _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius)
     if not paths:
-        for x, y, yaw in dubins_paths(start, goal, min_radius, waypoint_spacing)[:count]:
-            paths.append(np.column_stack([x, y, yaw]))
+        paths = _build_arcs(start, goal, count, waypoint_spacing, min_radius)
     return [_pin_ends(path, start, goal) for path in paths]
 
 
 def lateral_offsets(count: int, spacing: float) -> list[float]:
-    """List the lateral offsets of a fan [m]: 0, then to the left and right in turn, further each time."""
+    """List the lateral offsets of a fan [m]: 0, then left and right in turn, ever further."""
     return [spacing * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(count)]
 
 
@@ -102,11 +105,19 @@ def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> lis
     return [_sample(curve, waypoint_spacing) for curve in curves if _drivable(curve, min_radius)]
 
 
+def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
+    """Sample the Dubins paths that are no long way round."""
+    words = dubins_paths(start, goal, min_radius, waypoint_spacing)
+    paths = [np.column_stack(word) for word in words[:count]]
+    longest = _LONG_WAY_ROUND * path_length(paths[0])
+    return [path for path in paths if path_length(path) <= longest]
+
+
 def _connect(start, goal, scale: float, offset: float = 0.0) -> Curve:
     """Return a curve of its parameter in 0 to 1: the Hermite cubic plus a bump of `offset` metres.
 
-    `scale` times the chord is the length of the end tangents. The curve returns positions and first
-    derivatives, each (n, 2).
+    `scale` times the chord is the length of the end tangents. The curve returns positions and
+    first derivatives, each (n, 2).
     """
     chord = goal[:2] - start[:2]
     length = np.hypot(*chord)
@@ -155,7 +166,7 @@ def _sample(curve: Curve, waypoint_spacing: float) -> np.ndarray:
 
 
 def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Put the exact start and goal at the ends of a path; their yaw is already right but for rounding."""
+    """Put the exact start and goal at the ends of a path, which are right but for rounding."""
     path[0], path[-1] = start, goal
     path[:, 2] = _wrap(path[:, 2])
     return path

@@ -1,8 +1,8 @@
-"""Dubins paths: the shortest forward connections of two poses by arcs of one radius and straight lines.
+"""Dubins paths: forward connections of two poses by arcs of one radius and straight lines.
 
-Dubins, L. E. (1957), On curves of minimal length with a constraint on average curvature, American Journal
-of Mathematics 79(3). The six words are solved in the normalised form of Shkel and Lumelsky (2001),
-Classification of the Dubins set, Robotics and Autonomous Systems 34.
+Dubins, L. E. (1957), On curves of minimal length with a constraint on average curvature, American
+Journal of Mathematics 79(3). The six words are solved in the normalised form of Shkel and Lumelsky
+(2001), Classification of the Dubins set, Robotics and Autonomous Systems 34.
 """
 
 import numpy as np
@@ -16,12 +16,14 @@ def dubins_paths(
     """Connect two poses by every Dubins word that exists, the shortest first.
 
     Args:
-        start, goal: x, y [m] and yaw [rad], (3,) each.
+        start: x, y [m] and yaw [rad], (3,).
+        goal: The same.
         radius: Radius of the arcs [m].
         waypoint_spacing: Largest distance between waypoints along the path [m].
 
     Returns:
-        One to six paths, each x (n,), y (n,) [m] and yaw (n,) [rad], with waypoints equally far apart.
+        One to six paths, each x (n,), y (n,) [m] and yaw (n,) [rad], with waypoints equally far
+        apart.
     """
     dx, dy = (goal[:2] - start[:2]) / radius
     bearing = np.arctan2(dy, dx)
@@ -34,7 +36,7 @@ def dubins_paths(
 def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, float, float]]]:
     """Solve the six words for headings a, b to the chord [rad] and its length d [radii].
 
-    Returns each word that exists with the lengths of its three pieces [radii, which is rad on arcs].
+    Returns each word that exists with the lengths of its three pieces [radii; rad on arcs].
     """
     sa, ca, sb, cb, cab = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.cos(a - b)
     words = []
@@ -85,7 +87,7 @@ def _drive(start, word, pieces, radius, waypoint_spacing):
 
 
 def _advance(x, y, yaw, turn, s):
-    """Move by s [radii] along a unit arc to the left (turn 1), to the right (-1) or straight on (0)."""
+    """Move by s [radii] along a unit arc to the left (turn 1), right (-1), or straight (0)."""
     if turn == 0.0:
         return x + s * np.cos(yaw), y + s * np.sin(yaw), yaw + 0.0 * s
     after = yaw + turn * s

@@ -16,7 +16,6 @@ _STARTS = 200
 _RAYS = 72
 _HALF_CONE = np.deg2rad(50.0)
 _WIDE_CONE = np.deg2rad(75.0)
-_GENTLE = 1.0
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,8 @@ class _Ground:
     terrain: Terrain
     slope: NDArray[np.float64]
     """Mean slope under the rover (ny, nx) [rise over run], NaN where its footprint is unknown."""
+    gentle: NDArray[np.bool_]
+    """Where the footprint (ny, nx) is known and its slope at most half of the tilt limit."""
     difficulty: NDArray[np.float64]
     """Slopes and steps (ny, nx) as a share of what the rover is built for, NaN likewise."""
     reach: float
@@ -77,9 +78,9 @@ class _Ground:
 def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: int = 4) -> Mission:
     """Choose a start and goals from what a map shows; the verdicts are the model's business.
 
-    The start is on gentle known ground with much known ground ahead. Goals on the plain are on
-    known ground in sight of the start. Then come the steepest known ground, unknown ground where
-    the map has any, and a place beyond the map's edge.
+    The start is on gentle known ground with much of the same ahead. Goals on the plain can be
+    reached over such ground as the crow flies, rocks aside. Then come the steepest known ground,
+    unknown ground where the map has any, and a place beyond its edge.
 
     Args:
         terrain: The map, with or without unknown cells.
@@ -132,40 +133,42 @@ def _survey(terrain: Terrain, rover: Rover) -> _Ground:
     step = ndimage.maximum_filter(z, wheel) - ndimage.minimum_filter(z, wheel)
     rise = step - slope * wheel * terrain.resolution
     worst = ndimage.maximum_filter(rise, side)
-    difficulty = np.maximum(slope / (0.5 * np.tan(rover.limits.tilt)), worst / rover.wheel.radius)
+    gentle_slope = 0.5 * np.tan(rover.limits.tilt)
+    difficulty = np.maximum(slope / gentle_slope, worst / rover.wheel.radius)
     wheelbase = 2 * footprint_radius(rover)
     return _Ground(
         terrain,
         np.where(whole, slope, np.nan),
+        whole & (slope <= gentle_slope),
         np.where(whole, difficulty, np.nan),
         reach=8 * wheelbase,
-        near=2 * wheelbase,
+        near=1.5 * wheelbase,
     )
 
 
 def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
-    """Choose the place and heading on gentle ground with the most known ground ahead."""
+    """Choose the place and heading on gentle ground with the most of it ahead."""
     rows, columns = np.nonzero(np.isfinite(ground.difficulty))
     share = ground.difficulty[rows, columns]
-    gentle = share <= max(0.5 * _GENTLE, np.quantile(share, 0.1))
+    gentle = share <= max(0.5, np.quantile(share, 0.1))
     chosen = rng.permutation(np.nonzero(gentle)[0])[:_STARTS]
     x, y = ground.place(rows[chosen], columns[chosen])
     bearings = np.linspace(-np.pi, np.pi, _RAYS, endpoint=False)
     sight = _sight(ground, x, y, bearings)
     cone = round(_HALF_CONE / (2 * np.pi / _RAYS))
-    ahead = sum(np.roll(sight, k, axis=1) for k in range(-cone, cone + 1))
+    ahead = np.sum([np.roll(sight, k, axis=1) for k in range(-cone, cone + 1)], axis=0)
     best, ray = np.unravel_index(np.argmax(ahead), ahead.shape)
     return (float(x[best]), float(y[best]), float(bearings[ray]))
 
 
 def _sight(ground: _Ground, x, y, bearings) -> NDArray[np.float64]:
-    """Return how far [m] the ground is known from places (n,) in directions (m,): (n, m)."""
+    """Return how far [m] the ground is gentle from places (n,) in directions (m,): (n, m)."""
     step = max(2 * ground.terrain.resolution, ground.reach / 60)
     distances = np.arange(0.0, ground.reach, step)
     px = x[:, None, None] + distances * np.cos(bearings)[:, None]
     py = y[:, None, None] + distances * np.sin(bearings)[:, None]
     row, column, inside = ground.cells(px, py)
-    clear = inside & np.isfinite(ground.difficulty[row, column])
+    clear = inside & ground.gentle[row, column]
     return step * np.cumprod(clear, axis=2).sum(axis=2)
 
 
@@ -173,7 +176,7 @@ def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
     """Choose goals in sight of the start, in directions spread over the cone ahead."""
     bearings = start[2] + np.linspace(-_HALF_CONE, _HALF_CONE, 4 * count + 1)
     sight = _sight(ground, np.array([start[0]]), np.array([start[1]]), bearings)[0]
-    goals = []
+    goals: list[Pose] = []
     for sector in np.array_split(np.arange(len(bearings)), count):
         ray = sector[np.argmax(sight[sector])]
         if sight[ray] < ground.near:
@@ -181,7 +184,9 @@ def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
         distance = rng.uniform(0.6, 0.9) * sight[ray]
         x = start[0] + distance * np.cos(bearings[ray])
         y = start[1] + distance * np.sin(bearings[ray])
-        goals.append(_facing(start, *_gentlest_near(ground, x, y)))
+        goal = _facing(start, *_gentlest_near(ground, x, y))
+        if all(np.hypot(goal[0] - p[0], goal[1] - p[1]) > 0.5 * ground.near for p in goals):
+            goals.append(goal)
     return goals
 
 
@@ -198,8 +203,11 @@ def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
 
 
 def _choose_steep(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the steepest known ground ahead within reach."""
-    return _choose_cell(ground, start, np.where(np.isfinite(ground.slope), ground.slope, -np.inf))
+    """Choose the steepest known ground, somewhat rather ahead than behind."""
+    distance, turn = _polar(ground, start)
+    score = ground.slope * (1 - turn / (2 * np.pi))
+    score = np.where(distance <= 1.2 * ground.reach, score, -np.inf)
+    return _choose_cell(ground, start, np.where(np.isfinite(score), score, -np.inf))
 
 
 def _choose_unknown(ground: _Ground, start: Pose) -> Pose | None:
@@ -207,8 +215,8 @@ def _choose_unknown(ground: _Ground, start: Pose) -> Pose | None:
     unknown = np.isnan(ground.terrain.elevation)
     depth = ndimage.distance_transform_edt(np.pad(unknown, 1))[1:-1, 1:-1]
     depth *= ground.terrain.resolution
-    distance, _ = _polar(ground, start)
-    score = np.where(depth > 0.1 * ground.near, -distance, -np.inf)
+    distance, turn = _polar(ground, start)
+    score = np.where(depth > 0.1 * ground.near, -distance * (1 + turn), -np.inf)
     return _choose_cell(ground, start, score)
 
 
@@ -217,9 +225,9 @@ def _choose_off_map(ground: _Ground, start: Pose) -> Pose | None:
     bearings = start[2] + np.linspace(-_WIDE_CONE, _WIDE_CONE, 61)
     xmin, xmax, ymin, ymax = ground.terrain.bounds
     with np.errstate(divide="ignore"):
-        along_x = np.where(np.cos(bearings) > 0, xmax - start[0], xmin - start[0])
-        along_y = np.where(np.sin(bearings) > 0, ymax - start[1], ymin - start[1])
-        edge = np.minimum(along_x / np.cos(bearings), along_y / np.sin(bearings))
+        along_x = np.where(np.cos(bearings) > 0, xmax - start[0], start[0] - xmin)
+        along_y = np.where(np.sin(bearings) > 0, ymax - start[1], start[1] - ymin)
+        edge = np.minimum(along_x / abs(np.cos(bearings)), along_y / abs(np.sin(bearings)))
     nearest = int(np.argmin(edge))
     distance = max(edge[nearest], 0.5 * ground.near) + 0.5 * ground.near
     x = start[0] + distance * np.cos(bearings[nearest])
@@ -228,17 +236,14 @@ def _choose_off_map(ground: _Ground, start: Pose) -> Pose | None:
 
 
 def _choose_cell(ground: _Ground, start: Pose, score: NDArray[np.float64]) -> Pose | None:
-    """Return the cell of the highest score (ny, nx) ahead within reach, None if all are -inf."""
-    distance, turn = _polar(ground, start)
-    for cone, reach in ((_HALF_CONE, 1.0), (_WIDE_CONE, 1.5), (np.pi, np.inf)):
-        ahead = (turn <= cone) & (distance <= reach * ground.reach)
-        ahead &= distance >= ground.near
-        allowed = np.where(ahead, score, -np.inf)
-        best = np.unravel_index(np.argmax(allowed), allowed.shape)
-        if np.isfinite(allowed[best]):
-            x, y = ground.place(*best)
-            return _facing(start, float(x), float(y))
-    return None
+    """Return the cell of the highest score (ny, nx) not too near, None if all are -inf."""
+    distance, _ = _polar(ground, start)
+    allowed = np.where(distance >= ground.near, score, -np.inf)
+    best = np.unravel_index(np.argmax(allowed), allowed.shape)
+    if not np.isfinite(allowed[best]):
+        return None
+    x, y = ground.place(*best)
+    return _facing(start, float(x), float(y))
 
 
 def _polar(ground: _Ground, start: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

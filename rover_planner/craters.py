@@ -1,0 +1,103 @@
+"""Craters: how many of which diameter, and the relief of a simple one with rim and ejecta.
+
+Fresh simple craters are about a fifth as deep, rim to floor, as they are wide, and their rim
+stands about 0.036 diameters over the plain (Pike 1977, Size-dependence in the shape of fresh
+impact craters on the Moon). The bowl is a paraboloid; the ejecta blanket thins with the cube of
+the distance (McGetchin, Settle and Head 1973, Radial thickness variation in impact crater
+ejecta). The number of craters of diameter D and larger falls with D^-2, that of a surface in
+equilibrium, where new craters wipe out old ones (Trask 1966, in Ranger VIII and IX; Gault 1970,
+Radio Science 5).
+"""
+
+import numpy as np
+
+from rover_planner.errors import PlanningError
+
+DEPTH_TO_DIAMETER = 0.2
+"""Depth of a fresh crater, from rim to floor, over its diameter."""
+RIM_TO_DIAMETER = 0.036
+"""Height of a fresh crater's rim over the plain, over its diameter."""
+NUMBER_EXPONENT = 2.0
+"""Craters of diameter D and larger are proportional to D to minus this power."""
+EJECTA_REACH = 3.0
+"""Where the ejecta blanket ends [crater radii]."""
+
+
+def crater_profile(distance, diameter: float) -> np.ndarray:
+    """Return the height of a fresh crater over the plain it is in.
+
+    Args:
+        distance: Distances from its centre [m], any shape.
+        diameter: Diameter from rim to rim [m].
+
+    Returns:
+        Heights [m] of the same shape: negative on the floor, highest on the rim, zero from
+        EJECTA_REACH radii on.
+    """
+    r = np.asarray(distance, dtype=float) / (0.5 * diameter)
+    rim = RIM_TO_DIAMETER * diameter
+    depth = DEPTH_TO_DIAMETER * diameter
+    bowl = rim - depth * (1 - r**2)
+    outside = np.clip(r, 1.0, EJECTA_REACH) ** -3.0
+    end = EJECTA_REACH**-3.0
+    return np.where(r < 1, bowl, rim * (outside - end) / (1 - end))
+
+
+def sample_diameters(
+    rng: np.random.Generator, density: float, area: float, smallest: float, largest: float
+) -> np.ndarray:
+    """Draw the diameters of the craters on a piece of ground.
+
+    Args:
+        rng: Source of the random numbers.
+        density: Craters of 1 m and larger per square metre [1/m^2] if the law held down to there.
+        area: Size of the ground [m^2].
+        smallest: Diameter [m] of the smallest craters drawn.
+        largest: Diameter [m] of the largest.
+
+    Returns:
+        Diameters (n,) [m], largest first; n is Poisson distributed.
+
+    Raises:
+        PlanningError: A negative density, or diameters that are not 0 < smallest < largest.
+    """
+    if not 0 <= density < np.inf:
+        raise PlanningError(f"crater density is {density!r} 1/m^2; it must not be negative")
+    if not 0 < smallest < largest < np.inf:
+        raise PlanningError(
+            f"crater diameters are {smallest!r} to {largest!r} m; they must be above 0 and ascend"
+        )
+    most, least = smallest**-NUMBER_EXPONENT, largest**-NUMBER_EXPONENT
+    count = rng.poisson(density * area * (most - least))
+    drawn = (least + rng.random(count) * (most - least)) ** (-1 / NUMBER_EXPONENT)
+    return np.sort(drawn)[::-1]
+
+
+def add_crater(
+    elevation: np.ndarray,
+    resolution: float,
+    column: float,
+    row: float,
+    diameter: float,
+    freshness: float,
+) -> None:
+    """Dig a crater into an elevation grid, in place.
+
+    Args:
+        elevation: Heights (ny, nx) [m].
+        resolution: Cell size [m].
+        column: Centre along x [cells, may be a fraction or off the grid].
+        row: Centre along y, the same.
+        diameter: Diameter [m].
+        freshness: 1 for a fresh crater; less scales its relief down as wear does.
+    """
+    ny, nx = elevation.shape
+    reach = EJECTA_REACH * 0.5 * diameter / resolution
+    i0, i1 = max(0, int(column - reach)), min(nx, int(column + reach) + 2)
+    j0, j1 = max(0, int(row - reach)), min(ny, int(row + reach) + 2)
+    if i0 >= i1 or j0 >= j1:
+        return
+    x = (np.arange(i0, i1) - column) * resolution
+    y = (np.arange(j0, j1) - row) * resolution
+    relief = crater_profile(np.hypot(x[None, :], y[:, None]), diameter)
+    elevation[j0:j1, i0:i1] += freshness * relief
