@@ -1,0 +1,84 @@
+"""The files of the `predict` command: poses in, the model's predictions out."""
+
+import io
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.limits import Verdict
+from rover_physics.prediction import PathPrediction
+from rover_planner.errors import PlanningError
+
+ARRAYS = (
+    "settled",
+    "position",
+    "roll",
+    "pitch",
+    "rocker_angle",
+    "bogie_angle",
+    "wheel_centres",
+    "wheel_loads",
+    "tangential",
+    "lateral",
+    "friction_utilisation",
+    "slip_ratio",
+    "torque_saturation",
+    "tip_over_ratio",
+    "tip_over_force_angle",
+    "belly_clearance",
+    "energy",
+    "time",
+)
+"""The arrays of a prediction that the output file holds, under the same names."""
+
+
+def read_poses(path: Path) -> NDArray[np.float64]:
+    """Read `poses` (n, 3), x, y [m] and yaw [rad] of the body origin, from an .npz file.
+
+    Raises:
+        PlanningError: No such file, no .npz file, no such array, or not numbers of that shape.
+    """
+    try:
+        archive = np.load(path, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise PlanningError(f"{path} holds one bare array; it must be an .npz file")
+        with archive:
+            if "poses" not in archive:
+                names = ", ".join(archive.files) or "nothing"
+                raise PlanningError(f"{path} has no array 'poses'; it has {names}")
+            poses = archive["poses"]
+    except FileNotFoundError:
+        raise PlanningError(f"no poses file {path}") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise PlanningError(f"{path} is no readable .npz file of poses: {error}") from None
+    if poses.dtype.kind not in "fiu":
+        raise PlanningError(f"poses in {path} are of type {poses.dtype}; they must be numbers")
+    if poses.ndim != 2 or poses.shape[1] != 3 or len(poses) == 0:
+        raise PlanningError(
+            f"poses in {path} have shape {poses.shape}; they must be (n, 3): x, y, yaw"
+        )
+    return poses.astype(np.float64)
+
+
+def write_prediction(path: Path, prediction: PathPrediction, verdict: Verdict) -> None:
+    """Write a prediction and its verdict to an .npz file of exactly that name.
+
+    Beside the ARRAYS it holds `reason` (n,) text, empty where passable, `traversable` () bool and
+    `first_failure` () int, -1 if there is none.
+
+    Raises:
+        PlanningError: The file cannot be written.
+    """
+    arrays = {name: getattr(prediction, name) for name in ARRAYS}
+    arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
+    arrays["traversable"] = np.array(verdict.traversable, dtype=np.bool_)
+    arrays["first_failure"] = np.array(verdict.first_failure, dtype=np.int64)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    try:
+        path.write_bytes(buffer.getvalue())
+    except OSError as error:
+        raise PlanningError(f"cannot write {path}: {error.strerror}") from None

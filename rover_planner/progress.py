@@ -1,0 +1,43 @@
+"""What the terminal shows while a command works."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+
+@contextmanager
+def show_progress() -> Iterator[Callable[[str], None]]:
+    """Show a spinner with the step being worked on; nothing where stderr is not a terminal.
+
+    Yields:
+        A function that is told the next step.
+    """
+    console = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        task = progress.add_task("start")
+        yield lambda step: progress.update(task, description=step)
+
+
+class Steps:
+    """Says on the terminal what is being done and how long it took."""
+
+    def __init__(self) -> None:
+        self.console = Console(highlight=False)
+        if not self.console.is_terminal:
+            self.console = Console(highlight=False, width=160)
+
+    @contextmanager
+    def step(self, text: str) -> Iterator[Any]:
+        """Show a spinner while the block runs, then a line; the block may change the text."""
+        began = time.monotonic()
+        with self.console.status(text) as status:
+            yield status
+        took = time.monotonic() - began
+        self.console.print(f"[green]✓[/green] {status.status} [dim]{took:.1f} s[/dim]")
