@@ -9,6 +9,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.paths import quaternions
+from rover_physics.prediction import PathPrediction
 
 PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
 IMPASSABLE = ColorRGBA(r=0.85, g=0.15, b=0.10, a=1.0)
@@ -21,7 +22,8 @@ _TEXT_ABOVE = 0.6
 
 
 def path_markers(
-    prediction, reasons: Sequence[str], rows: NDArray[np.intp], frame_id: str, stamp,
+    prediction: PathPrediction, reasons: Sequence[str], rows: NDArray[np.intp], frame_id: str,
+    stamp,
 ) -> MarkerArray:
     """Draw a judged path; the first marker clears what was drawn before.
 
@@ -103,7 +105,7 @@ def _failing_text(position, reason: str, frame_id: str, stamp) -> Marker:
     return text
 
 
-def _drawable_positions(prediction) -> NDArray[np.float64]:
+def _drawable_positions(prediction: PathPrediction) -> NDArray[np.float64]:
     """Return (n, 3) positions; where a pose did not settle, at the height last known."""
     positions = np.column_stack([prediction.poses[:, :2], prediction.position[:, 2]])
     known = np.flatnonzero(np.isfinite(positions[:, 2]))

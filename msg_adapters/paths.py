@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
+from rover_physics.prediction import PathPrediction
 
 _NORM_TOLERANCE = 0.01
 """How far the squared length of a quaternion may be from 1, as in tf2."""
@@ -115,7 +116,7 @@ def decimate(poses: ArrayLike, spacing: float) -> NDArray[np.intp]:
 
 
 def settled_path(
-    prediction, rows: Sequence[int] | NDArray[np.intp], frame_id: str, stamp,
+    prediction: PathPrediction, rows: Sequence[int] | NDArray[np.intp], frame_id: str, stamp,
 ) -> Path:
     """Write settled waypoints of a prediction as a path with the body's full orientation.
 

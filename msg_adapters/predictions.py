@@ -10,6 +10,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.errors import MessageError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.prediction import PathPrediction
 
 MEASURES = ("tip_over_ratio", "tip_over_force_angle")
 """Columns of the tip-over margin: the paper's ratio, and the force-angle measure over flat."""
@@ -48,13 +49,15 @@ def array_values(message: Float64MultiArray) -> NDArray[np.float64]:
     return values.reshape(sizes)
 
 
-def tip_over_array(prediction) -> Float64MultiArray:
+def tip_over_array(prediction: PathPrediction) -> Float64MultiArray:
     """Write the tip-over margins of a PathPrediction (n waypoints) as (n, 2), see MEASURES."""
     margins = [getattr(prediction, measure) for measure in MEASURES]
     return waypoint_array(np.column_stack(margins), "measure")
 
 
-def joint_trajectory(prediction, wheel_radius: float, frame_id: str, stamp) -> JointTrajectory:
+def joint_trajectory(
+    prediction: PathPrediction, wheel_radius: float, frame_id: str, stamp,
+) -> JointTrajectory:
     """Write the joints along a path, up to the first waypoint that did not settle.
 
     Positions are the suspension angles and the angles the wheels have rolled without slip [rad];
@@ -90,12 +93,14 @@ def empty_trajectory(frame_id: str, stamp) -> JointTrajectory:
     return trajectory
 
 
-def suspension_angles(prediction) -> NDArray[np.float64]:
+def suspension_angles(prediction: PathPrediction) -> NDArray[np.float64]:
     """Return (n, 4) angles [rad] of SUSPENSION_JOINTS at each waypoint of a PathPrediction."""
     return np.hstack([prediction.rocker_angle, prediction.bogie_angle])
 
 
-def _rolled_angles(prediction, wheel_radius: float, count: int) -> NDArray[np.float64]:
+def _rolled_angles(
+    prediction: PathPrediction, wheel_radius: float, count: int,
+) -> NDArray[np.float64]:
     """Return (count, 6) angles [rad] that the wheels have rolled, negative backwards."""
     steps = np.diff(prediction.wheel_centres[:count], axis=0)
     yaw = prediction.poses[1:count, 2]

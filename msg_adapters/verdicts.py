@@ -9,6 +9,8 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 STATUS_NAME = "traverse_server: can the rover traverse"
+PER_WAYPOINT = ("reasons", "codes")
+"""Entries of a verdict with a text for each waypoint; only in JSON."""
 
 
 def verdict_to_json(verdict: Mapping[str, Any]) -> str:
@@ -23,7 +25,7 @@ def verdict_to_diagnostics(
 
     Args:
         verdict: At least `traversable` and `reason`; every entry becomes a key and a value, a
-            nested one as JSON.
+            nested one as JSON, but for the PER_WAYPOINT ones, which are too long to read.
         hardware_id: Name of the rover.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
@@ -38,7 +40,7 @@ def verdict_to_diagnostics(
         name=STATUS_NAME, message=verdict["reason"] or "traversable", hardware_id=hardware_id)
     status.values = [
         KeyValue(key=key, value=value if isinstance(value, str) else json.dumps(value))
-        for key, value in _plain(verdict).items()]
+        for key, value in _plain(verdict).items() if key not in PER_WAYPOINT]
     message = DiagnosticArray(status=[status])
     message.header.frame_id = frame_id
     message.header.stamp = stamp

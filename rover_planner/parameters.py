@@ -77,7 +77,7 @@ class ParameterSpec:
 TRAVERSE_SERVER = (
     ParameterSpec("rover", "lsr1", "Rover to ask about: a preset's name or a rover file."),
     ParameterSpec(
-        "friction", 0.0, "Coulomb friction everywhere; 0 takes the map's, else the rover file's.",
+        "friction", 0.0, "Coulomb friction where the map has none; 0 takes the rover file's.",
         bounds=(0.0, 10.0)),
     ParameterSpec(
         "max_torque", 0.0, "Largest torque of a wheel; 0 takes the rover file's.", "N m",
@@ -163,6 +163,8 @@ def check_changes(
             parameter.name: parameter.value for parameter in parameters
             if parameter.name in by_name}
         try:
+            if any(not parameter.name for parameter in parameters):
+                raise ParameterError("a parameter has no name; name one of " + ", ".join(by_name))
             for name, value in changes.items():
                 by_name[name].check(value)
             if changes:

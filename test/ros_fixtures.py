@@ -40,13 +40,14 @@ class RosRun:
     def __init__(self) -> None:
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain_id())
+        self._ending = threading.Event()
         self._spinning: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
 
     def spin(self, node: Node) -> Node:
         """Spin a node of this context in the background from now on."""
         executor = SingleThreadedExecutor(context=self.context)
         executor.add_node(node)
-        thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
+        thread = threading.Thread(target=self._spin, args=(executor,), daemon=True)
         thread.start()
         self._spinning.append((node, executor, thread))
         return node
@@ -57,13 +58,19 @@ class RosRun:
 
     def close(self) -> None:
         """End all nodes and the context."""
-        for _, executor, _ in self._spinning:
-            executor.shutdown()
-        for _, _, thread in self._spinning:
+        self._ending.set()
+        for node, executor, thread in self._spinning:
+            executor.wake()
             thread.join(TIMEOUT)
-        for node, _, _ in self._spinning:
+            executor.shutdown()
             node.destroy_node()
         rclpy.shutdown(context=self.context)
+
+    def _spin(self, executor: SingleThreadedExecutor) -> None:
+        # Not executor.spin(): now and then that sleeps through executor.shutdown().
+        with contextlib.suppress(ExternalShutdownException):
+            while not self._ending.is_set():
+                executor.spin_once(timeout_sec=0.2)
 
 
 def call(client, request, timeout: float = TIMEOUT):
@@ -74,8 +81,3 @@ def call(client, request, timeout: float = TIMEOUT):
     future.add_done_callback(lambda _: done.set())
     assert done.wait(timeout), f"no answer from {client.srv_name}"
     return future.result()
-
-
-def _spin(executor: SingleThreadedExecutor) -> None:
-    with contextlib.suppress(ExternalShutdownException):
-        executor.spin()

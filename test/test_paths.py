@@ -1,7 +1,6 @@
 """Poses keep place and heading through messages, and poses without meaning are refused."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from msg_adapters.paths import (
     path_to_poses,
     poses_path,
     quaternions,
-    settled_path,
     stamped_pose,
     stamped_pose_to_array,
     yaw_from_quaternion,
@@ -127,18 +125,3 @@ def test_decimation_keeps_the_ends_and_the_spacing():
 
 def test_decimation_copes_with_standing_still():
     np.testing.assert_array_equal(decimate(np.zeros((5, 3)), 0.1), [0, 4])
-
-
-def test_a_settled_path_has_height_and_full_orientation():
-    angles = np.array([[0.1, -0.2, 0.3], [0.0, 0.1, -2.0], [0.2, 0.0, 1.0]])
-    waypoints = SimpleNamespace(
-        poses=np.column_stack([[0.0, 1.0, 2.0], [0.0, 0.0, 0.0], angles[:, 2]]),
-        position=np.array([[0.0, 0.0, 0.2], [1.0, 0.0, 0.3], [2.0, 0.0, 0.4]]),
-        roll=angles[:, 0], pitch=angles[:, 1])
-    path = settled_path(waypoints, [0, 2], "map", None)
-    assert [pose.pose.position.z for pose in path.poses] == [0.2, 0.4]
-    orientation = path.poses[1].pose.orientation
-    np.testing.assert_allclose(
-        rotation_of_quaternion(orientation.x, orientation.y, orientation.z, orientation.w),
-        rotation(*angles[2]), atol=1e-14)
-    assert all(pose.header.frame_id == "map" for pose in path.poses)

@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
 from msg_adapters.markers import IMPASSABLE, PASSABLE, path_markers
-from msg_adapters.paths import settled_path
+from msg_adapters.paths import quaternions, settled_path
 from msg_adapters.predictions import (
     JOINTS,
     MEASURES,
@@ -104,11 +104,15 @@ def test_wheels_roll_forwards_by_the_way_they_go(prediction, rover):
     assert np.all((rolled[-1] > 0.97 * flat) & (rolled[-1] < 1.05 * flat))
 
 
-def test_a_settled_path_has_the_predicted_positions(prediction):
+def test_a_settled_path_has_height_and_full_orientation(prediction):
     path = settled_path(prediction, [0, 10, 49], "map", STAMP)
     for pose, i in zip(path.poses, (0, 10, 49), strict=True):
         place = pose.pose.position
         np.testing.assert_array_equal((place.x, place.y, place.z), prediction.position[i])
+        turn = pose.pose.orientation
+        np.testing.assert_array_equal((turn.x, turn.y, turn.z, turn.w), quaternions(
+            prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]))
+        assert abs(turn.x) > 1e-3 and abs(turn.y) > 1e-3
         assert pose.header == path.header and path.header.stamp == STAMP
 
 

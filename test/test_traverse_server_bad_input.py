@@ -167,7 +167,7 @@ def test_parameters_take_effect_and_bad_ones_are_refused_with_reasons(mapped, cl
             ("friction", math.nan, "nan"), ("friction", -1.0, "friction"),
             ("friction", "rough", "Wrong parameter type"), ("policy", "fair", "one of equal"),
             ("rover", "lsr9", "lsr9"), ("map_frame", "odom", "read-only"),
-            ("no_such", 1.0, "undeclared"), ("", 1.0, "undeclared")]:
+            ("no_such", 1.0, "undeclared"), ("", 1.0, "has no name")]:
         accepted, reason = client.set_parameter(name, value)
         assert not accepted and reason and text in reason, (name, value, reason)
         assert ros.is_alive(mapped)

@@ -13,7 +13,6 @@ from ros_fixtures import RosRun, domain_id
 from rover_physics.terrain import Terrain, save_terrain
 
 
-
 @pytest.fixture
 def start_process():
     processes = []

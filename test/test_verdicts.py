@@ -32,8 +32,10 @@ def test_level_and_text_follow_the_verdict(verdict, warn, level, text):
     assert status.message == text and status.hardware_id == "lsr1" and status.name
 
 
-def test_every_entry_becomes_a_key_and_a_value():
-    verdict = BAD | {"mismatch": {"rocker_left": np.float64(0.25)}, "goal": [1.0, math.nan]}
+def test_every_entry_but_those_per_waypoint_becomes_a_key_and_a_value():
+    verdict = BAD | {
+        "codes": ["", "tilt"], "mismatch": {"rocker_left": np.float64(0.25)},
+        "goal": [1.0, math.nan]}
     values = {entry.key: entry.value for entry in status_of(verdict).values}
     assert values == {
         "traversable": "false", "code": "tilt", "reason": "tilt 0.6 rad", "first_failure": "7",
