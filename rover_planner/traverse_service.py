@@ -1,5 +1,6 @@
 """What a traverse server knows and decides, without ROS: map, path, joints in, judgements out."""
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -22,8 +23,9 @@ from rover_planner.path_query import (
 )
 
 _RING_STEP = 0.1
-_MAX_RINGS = 6
+_MAX_RINGS = 4
 _RING_GOALS = 8
+_QUERIES_PER_RING = 4
 
 
 @dataclass(frozen=True)
@@ -156,18 +158,15 @@ class TraverseService:
         if self._terrain is None:
             return self._refuse_for_want_of_a_map()
         start, goal = np.asarray(start, np.float64), np.asarray(goal, np.float64)
-        exact = self._query(start, goal)
-        found, reached, tried = exact, goal, 0
-        if not exact.traversable and exact.chosen.verdict.first_failure > 0:
-            for alternative in _goals_within(start, goal, tolerance):
+        answer, reached, tried = self._query(start, goal), goal, 0
+        if not answer.traversable and answer.chosen.verdict.first_failure > 0:
+            for alternative in self._goals_to_stand_on(start, goal, tolerance):
                 tried += 1
-                if not self._can_stand(alternative):
-                    continue
-                answer = self._query(start, alternative)
-                if answer.traversable:
-                    found, reached = answer, alternative
+                other = self._query(start, alternative)
+                if other.traversable:
+                    answer, reached = other, alternative
                     break
-        return self._judge_answer(found, goal, reached, tried)
+        return self._judge_answer(answer, goal, reached, tried)
 
     def check_last_path(self) -> Judgement:
         """Judge the last path that was received.
@@ -192,6 +191,16 @@ class TraverseService:
         return answer_path_query(
             self._settings.rover, self._terrain, start, goal, self._settings.query,
             self._manipulator_angles())
+
+    def _goals_to_stand_on(self, start, goal, tolerance: float) -> Iterator[NDArray[np.float64]]:
+        """Yield other goals at which the rover can stand, the nearest first, a few of each ring.
+
+        A ring's goals on the start's side come first: where those cannot be reached, the ones
+        behind them rarely can, and each costs a sweep of all candidates.
+        """
+        for ring in _rings_within(start, goal, tolerance):
+            standing = (pose for pose in ring if self._can_stand(pose))
+            yield from itertools.islice(standing, _QUERIES_PER_RING)
 
     def _can_stand(self, pose: NDArray[np.float64]) -> bool:
         """Tell whether the rover can stand at a pose (3,), without asking how it gets there."""
@@ -300,10 +309,10 @@ def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
     return np.vstack([dense, poses[-1:]])
 
 
-def _goals_within(
+def _rings_within(
     start: NDArray[np.float64], goal: NDArray[np.float64], tolerance: float,
-) -> Iterator[NDArray[np.float64]]:
-    """Yield other goals on rings of increasing distance, on each ring those to the start first."""
+) -> Iterator[list[NDArray[np.float64]]]:
+    """Yield rings of goals of increasing distance, on each ring those towards the start first."""
     if tolerance <= 0.0:
         return
     rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / _RING_STEP)))
@@ -313,6 +322,6 @@ def _goals_within(
     for ring in range(1, rings + 1):
         # A hair within the tolerance, so that rounding does not carry a goal out of it.
         distance = tolerance * ring / rings * (1.0 - 1e-6)
-        for turn in turns:
-            angle = towards_start + turn
-            yield goal + distance * np.array([math.cos(angle), math.sin(angle), 0.0])
+        angles = [towards_start + turn for turn in turns]
+        yield [goal + distance * np.array([math.cos(angle), math.sin(angle), 0.0])
+               for angle in angles]

@@ -16,7 +16,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses
 from msg_adapters.predictions import JOINTS, MEASURES, array_values
-from rover_physics.terrain import save_terrain
+from rover_physics.terrain import load_terrain, save_terrain
 from rover_planner.qos import map_qos
 from rover_planner.traverse_server import WHEEL_TOPICS
 
@@ -212,3 +212,15 @@ def test_the_measured_suspension_raises_a_warning_where_it_disagrees(mapped, cli
     assert answer.success and not verdict["suspension_agrees"]
     assert verdict["suspension_mismatch"]["rocker_left"] == pytest.approx(0.5, abs=0.05)
     assert results["verdict"].status[0].level == DiagnosticStatus.WARN
+
+
+def test_a_real_map_is_answered_for_over_dds_as_from_its_file(
+    server, client, terrain_dir,
+):
+    terrain = load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz")
+    client.send_terrain(terrain)
+    np.testing.assert_array_equal(server.service.terrain.elevation, terrain.elevation)
+    plan, verdict, _ = ask(client, start=(-4.0, 0.0, 0.0), goal=(6.0, 1.0, 0.0))
+    assert verdict["traversable"] == "true" and len(plan.poses) > 40
+    plan, verdict, _ = ask(client, start=(-3.5, -7.0, 0.0), goal=(3.0, -7.0, 0.0))
+    assert plan.poses == [] and verdict["code"] not in ("", "off_map", "unknown_ground")

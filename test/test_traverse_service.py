@@ -10,7 +10,7 @@ from grounds import make_terrain, rocky, wall_at, waves
 import rover_planner.traverse_service as traverse_service_module
 from rover_physics.errors import RoverFileError
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.terrain import Terrain
+from rover_physics.terrain import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters import TRAVERSE_SERVER
 from rover_planner.traverse_service import (
@@ -208,3 +208,36 @@ def test_densify_keeps_the_given_poses_and_the_spacing():
 def test_densify_refuses_an_endless_path():
     with pytest.raises(PlanningError, match="more than 100000 waypoints"):
         densify(np.array([[0.0, 0.0, 0.0], [1e300, 0.0, 0.0]]), 0.02)
+
+
+PHYSICAL = {"tilt", "tip_over", "wheel_lift", "friction", "torque", "belly", "suspension",
+            "wheel_drop", "not_settled", "no_equilibrium"}
+
+
+@pytest.mark.parametrize(("start", "goal", "codes"), [
+    ((-4.0, 0.0, 0.0), (6.0, 1.0, 0.0), {""}),
+    ((-4.0, 8.0, 0.0), (2.0, 8.0, 0.0), {""}),
+    ((-3.5, -7.0, 0.0), (3.0, -7.0, 0.0), PHYSICAL),
+    ((4.0, 4.0, 0.8), (15.0, 12.0, 0.8), PHYSICAL),
+    ((18.0, 0.0, 0.0), (24.0, 0.0, 0.0), {"off_map"})],
+    ids=["plain", "another plain", "crater rim", "hill", "off the map"])
+def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
+    terrain_dir, start, goal, codes,
+):
+    service = make_service(load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz"))
+    verdict = service.answer(start, goal).verdict
+    assert verdict["code"] in codes, verdict["reason"]
+    assert verdict["traversable"] == (not verdict["reason"]) == (codes == {""})
+
+
+def test_the_real_martian_ground_is_passed_where_it_is_known(terrain_dir):
+    terrain = load_terrain(terrain_dir / "mer_spirit_sol1352_hazcam_3cm.npz")
+    north = math.pi / 2
+    start, goal = (-48.5, -20.5, north), (-48.5, -18.0, north)
+    strict = make_service(terrain).answer(start, goal).verdict
+    assert not strict["traversable"] and strict["code"] == "unknown_ground"
+    lenient = make_service(terrain, unknown_cells="interpolate", max_gap=0.3)
+    assert lenient.answer(start, goal).traversable
+    shadow = lenient.answer((-48.0, -20.0, 0.0), (-40.0, -20.0, 0.0)).verdict
+    assert shadow["code"] == "unknown_ground"
+    assert -46.0 < shadow["failure_pose"][0] < -42.0
