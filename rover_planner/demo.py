@@ -276,7 +276,9 @@ def _draw(
             answer = answer_path_query(rover, ground, mission.start, goal.pose)
             labelled.append(LabelledAnswer(goal.name, goal.intent, answer))
         status.update("draw the picture")
-        draw_answers(picture, rover, terrain, labelled, f"Can {rover.name} traverse?")
+        passable = sum(one.answer.traversable for one in labelled)
+        title = f"{rover.name}: {passable} of {len(labelled)} goals can be reached"
+        draw_answers(picture, rover, terrain, labelled, title)
     return sum(
         one.answer.traversable == answer["traversable"]
         and one.answer.chosen.verdict.code == answer["code"]

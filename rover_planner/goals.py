@@ -216,7 +216,7 @@ def _choose_unknown(ground: _Ground, start: Pose) -> Pose | None:
     depth = ndimage.distance_transform_edt(np.pad(unknown, 1))[1:-1, 1:-1]
     depth *= ground.terrain.resolution
     distance, turn = _polar(ground, start)
-    score = np.where(depth > 0.1 * ground.near, -distance * (1 + turn), -np.inf)
+    score = np.where(depth > 0.1 * ground.near, -distance * (1 + 2 * turn), -np.inf)
     return _choose_cell(ground, start, score)
 
 
@@ -255,8 +255,10 @@ def _polar(ground: _Ground, start: Pose) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def _facing(start: Pose, x: float, y: float) -> Pose:
-    """Return a pose at x, y that looks away from the start."""
-    return (x, y, float(np.arctan2(y - start[1], x - start[0])))
+    """Return a pose at x, y whose heading is one that a gentle curve from the start ends with."""
+    bearing = np.arctan2(y - start[1], x - start[0])
+    turn = float(np.angle(np.exp(1j * (bearing - start[2]))))
+    return (x, y, float(bearing + (0.5 * turn if abs(turn) < _WIDE_CONE else 0.0)))
 
 
 def _odd_cells(width: float, resolution: float) -> int:

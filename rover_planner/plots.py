@@ -327,9 +327,11 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
         panels[-1, column].set_xlabel("distance along the path [m]")
     for row, (_, name, limit) in enumerate(rows):
         highest = max(_highest(one.answer.chosen, name) for one in shown)
-        panels[row, 0].set_ylim(0, 1.08 * max(highest, limit or 0.0, 1e-3))
+        if limit is not None:
+            highest = max(limit, min(highest, 2 * max(limit, 1.0)))
+        panels[row, 0].set_ylim(0, 1.08 * max(highest, 1e-3))
     figure.align_ylabels(panels[:, 0])
-    figure.legend(handles=_wheel_legend(), loc="outside lower center", ncols=8)
+    figure.legend(handles=_wheel_legend(), loc="outside lower center", ncols=4)
 
 
 def _highest(candidate: Candidate, name: str) -> float:
@@ -351,8 +353,9 @@ def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     values = np.asarray(getattr(candidate.prediction, name))
     steps = np.hypot(*np.diff(candidate.poses[:, :2], axis=0).T)
     distance = np.concatenate([[0.0], np.cumsum(steps)])
-    if values.ndim == 1:
-        axes.plot(distance, values, color=_INK, lw=1.3)
+    columns = values.reshape(len(values), -1)
+    if np.allclose(columns, columns[:, :1], equal_nan=True):
+        axes.plot(distance, columns[:, 0], color=_INK, lw=1.3)
     else:
         for wheel, series in zip(WHEELS, values.T, strict=True):
             position, side = wheel.split("_")
@@ -379,5 +382,6 @@ def _wheel_legend() -> list[Line2D]:
         for position in ("front", "middle", "rear")
         for side in ("left", "right")
     ]
+    handles.append(Line2D([], [], color=_INK, lw=1.3, label="rover, or all wheels alike"))
     handles.append(Line2D([], [], color=_INK, lw=1.0, ls=":", label="safety limit"))
     return handles
