@@ -15,7 +15,8 @@ from rover_physics.kernels import allocating_kernel, kernel
 from rover_physics.rover import Rover
 
 TOUCHING, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
-COARSE, QUICK, NEAR, FULL, EXACT = 0, 1, 2, 3, 4
+COARSE, QUICK, NEAR, FULL, EXACT = np.arange(5)
+"""Scopes of `find_touch`. Not plain integers, or each value would be compiled apart."""
 REFINEMENTS = 6
 CIRCLE_REACH = 2e-2
 """How far above the nearest circle, in wheel radii, another one is looked at more closely."""

@@ -176,19 +176,23 @@ def _moment_about(pivots, side, origin, length, R, fx, fy, fz):
 def _add_weights(linkage, placement, B):
     """Add what the weights of all parts ask of the ground to the right-hand side."""
     centres, part_coms = placement.centres, placement.part_coms
-    _add_weight(linkage, placement, B, part_coms, 0, linkage.body_mass, -1, False)
-    for side in range(2):
-        _add_weight(linkage, placement, B, part_coms, 1 + side, linkage.rocker_mass, side, False)
-        _add_weight(linkage, placement, B, part_coms, 3 + side, linkage.bogie_mass, side, True)
+    for part in range(5):
+        mass = linkage.body_mass
+        if part > 2:
+            mass = linkage.bogie_mass
+        elif part > 0:
+            mass = linkage.rocker_mass
+        _add_weight(
+            linkage, placement, B, part_coms, part, mass, (part - 1) % 2, part > 0, part > 2
+        )
     for wheel in range(6):
         on_bogie = linkage.on_bogie[wheel]
-        _add_weight(
-            linkage, placement, B, centres, wheel, linkage.wheel_mass, wheel // 3, on_bogie
-        )
+        mass = linkage.wheel_mass
+        _add_weight(linkage, placement, B, centres, wheel, mass, wheel // 3, wheel >= 0, on_bogie)
 
 
 @kernel
-def _add_weight(linkage, placement, B, points, row, mass, side, on_bogie):
+def _add_weight(linkage, placement, B, points, row, mass, side, on_rocker, on_bogie):
     R, origin, length = placement.R, placement.origin, linkage.length
     weight = mass / linkage.mass
     rx = (points[row, 0] - origin[0]) / length
@@ -196,11 +200,13 @@ def _add_weight(linkage, placement, B, points, row, mass, side, on_bogie):
     B[2, 0] += weight
     B[3, 0] += ry * weight
     B[4, 0] -= rx * weight
-    if side < 0:
+    if not on_rocker:
         return
-    about_axis = -weight * (ry * R[0, 1] - rx * R[1, 1])
+    px = (placement.rocker_pivots[side, 0] - origin[0]) / length
+    py = (placement.rocker_pivots[side, 1] - origin[1]) / length
+    about = weight * ((ry - py) * R[0, 1] - (rx - px) * R[1, 1])
+    B[8, 0] += about if side == 0 else -about
     if on_bogie:
-        pivot = _moment_about(placement.bogie_pivots, side, origin, length, R, 0.0, 0.0, -weight)
-        B[6 + side, 0] -= about_axis - pivot
-    pivot = _moment_about(placement.rocker_pivots, side, origin, length, R, 0.0, 0.0, -weight)
-    B[8, 0] -= (1.0 if side == 0 else -1.0) * (about_axis - pivot)
+        px = (placement.bogie_pivots[side, 0] - origin[0]) / length
+        py = (placement.bogie_pivots[side, 1] - origin[1]) / length
+        B[6 + side, 0] += weight * ((ry - py) * R[0, 1] - (rx - px) * R[1, 1])

@@ -14,6 +14,11 @@ from rover_physics.linkage import Placement, new_placement, place_masses
 from rover_physics.settling import SETTLED, settle
 from rover_physics.soil import coulomb_slip
 from rover_physics.stability import CORNERS, find_support, tip_over_angles
+from rover_physics.torques import (
+    TorqueSearch,
+    minimise_friction,
+    new_torque_search,
+)
 
 NO_EQUILIBRIUM = 4
 EQUAL, OPTIMAL = 0, 1
@@ -79,6 +84,7 @@ class Work(NamedTuple):
     placement: Placement
     touch: Touch
     balance: Balance
+    search: TorqueSearch
     J: np.ndarray
     step: np.ndarray
     corners: np.ndarray
@@ -92,6 +98,7 @@ def new_work(samples):
         new_placement(),
         new_touch(samples),
         new_balance(),
+        new_torque_search(),
         np.empty((6, 6)),
         np.empty((6, 1)),
         np.empty((CORNERS, 3)),
@@ -119,7 +126,8 @@ def evaluate_pose(ground, linkage, samples, settings, poses, i, work, columns):
     )  # fmt: skip
     if status == SETTLED:
         place_masses(linkage, q, placement)
-        if not balance_forces(linkage, placement, touch, 1, work.balance):
+        columns_needed = 1 if settings.policy == EQUAL else 6
+        if not balance_forces(linkage, placement, touch, columns_needed, work.balance):
             status = NO_EQUILIBRIUM
     columns.status[i] = status
     if status != SETTLED:
@@ -144,14 +152,21 @@ def _write_geometry(placement, touch, i, columns):
 
 @kernel
 def _write_forces(ground, linkage, settings, work, i, columns):
-    balance, point = work.balance, work.touch.point
+    search, point = work.search, work.touch.point
     weight = linkage.mass * linkage.gravity
+    for wheel in range(6):
+        search.mu[wheel] = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
+    if settings.policy == EQUAL:
+        for wheel in range(6):
+            search.N[wheel] = work.balance.normal[wheel, 0]
+            search.T[wheel] = work.balance.tangential[wheel, 0]
+            search.S[wheel] = work.balance.lateral[wheel, 0]
+    else:
+        minimise_friction(work.balance, settings.max_torque / (linkage.radius * weight), search)
     power = 0.0
     for wheel in range(6):
-        N = weight * balance.normal[wheel, 0]
-        T = weight * balance.tangential[wheel, 0]
-        S = weight * balance.lateral[wheel, 0]
-        mu = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
+        N, T, S = weight * search.N[wheel], weight * search.T[wheel], weight * search.S[wheel]
+        mu = search.mu[wheel]
         torque = linkage.radius * T
         utilisation = np.sqrt(T * T + S * S) / (mu * N) if N > 0.0 else np.inf
         slip = coulomb_slip(utilisation)

@@ -5,6 +5,17 @@ from pathlib import Path
 
 import numba
 
+LOOPS_ONLY = {
+    "prange": True,
+    "comprehension": False,
+    "reduction": False,
+    "inplace_binop": False,
+    "setitem": False,
+    "numpy": False,
+    "stencil": False,
+    "fusion": False,
+}
+"""What numba may make parallel. Looking for more than the loop doubles the time to compile."""
 COMPILE_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -24,7 +35,7 @@ def allocating_kernel(function):
 
 def sweep_kernel(function):
     """Compile a function whose `prange` loop runs over the poses of a path."""
-    return numba.njit(parallel=True, **COMPILE_OPTIONS)(function)
+    return numba.njit(parallel=LOOPS_ONLY, **COMPILE_OPTIONS)(function)
 
 
 def drop_stale_kernels(folder: Path) -> None:

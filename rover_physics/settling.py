@@ -26,6 +26,7 @@ GAP_TOLERANCE = 1e-6
 NEWTON_STEPS = 20
 QUICK_ATTEMPTS = 3
 RECOVERIES = 8
+LEVEL, SLOPED = np.arange(2)
 RELAXATION_STEPS = 12
 RELAXATION = 0.3
 
@@ -93,7 +94,7 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
     for iteration in range(NEWTON_STEPS):
         if worst <= GAP_TOLERANCE or np.isnan(worst):
             return worst
-        if not _find_step(linkage, placement, touch, False, J, step):
+        if not _find_step(linkage, placement, touch, SLOPED, J, step):
             return worst
         fraction = _limit_step(step)
         improved = np.inf
@@ -127,7 +128,7 @@ def _relax(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
 @kernel
 def _descend(linkage, placement, touch, q, fraction, J, step):
     """Take a fraction of the step that closes the gaps if the ground is level under each wheel."""
-    if _find_step(linkage, placement, touch, True, J, step):
+    if _find_step(linkage, placement, touch, LEVEL, J, step):
         fraction *= _limit_step(step)
         for i in range(6):
             q[i] -= fraction * step[i, 0]
@@ -143,8 +144,8 @@ def _limit_step(step):
 
 
 @kernel
-def _find_step(linkage, placement, touch, flat, J, step):
-    """Solve J step = gaps; with `flat` the ground is taken as level under each wheel."""
+def _find_step(linkage, placement, touch, ground_is, J, step):
+    """Solve J step = gaps; the ground counts as SLOPED as it is, or as LEVEL under each wheel."""
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
     rocker_pivots, bogie_pivots = placement.rocker_pivots, placement.bogie_pivots
@@ -154,7 +155,7 @@ def _find_step(linkage, placement, touch, flat, J, step):
     nx, ny = 0.0, 0.0
     for i in range(6):
         side = i // 3
-        if not flat:
+        if ground_is == SLOPED:
             nx, ny = normal[i, 0], normal[i, 1]
         dx, dy, dz = point[i, 0] - origin[0], point[i, 1] - origin[1], point[i, 2] - origin[2]
         J[i, 0] = 1.0

@@ -1,0 +1,199 @@
+"""The torque set that needs least friction, within the five degrees that equilibrium leaves free (policy optimal).
+
+Three questions in turn, each asked only as far as the next one needs: which set keeps all wheels on
+the ground, which of those keeps the torques within their limit, and which of those needs the least
+friction, sqrt(T^2 + S^2) <= u mu N at the smallest u. Each is the least level of a family of convex
+sets and is answered by the method of centres: go to the analytic centre of the set at a level by
+damped Newton steps on its self-concordant barrier, then lower the level towards what the centre needs.
+
+Source: Boyd and El Ghaoui, "Method of centers for minimizing generalized eigenvalues", Linear Algebra
+and its Applications 188, 1993.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rover_physics.equilibrium import FREE_TORQUES
+from rover_physics.kernels import allocating_kernel, kernel
+from rover_physics.linear import solve_in_place
+
+LOAD, TORQUE, FRICTION = np.arange(3)
+FOUND, LIFTS, SATURATES = np.arange(3)
+LEVELS = 60
+NEWTON_STEPS = 12
+STAY = 0.1
+"""Share of the old level kept above what the centre needs, so that the centre stays inside."""
+LOAD_KEPT = 1e-4
+"""Wheel load, in weights, that counts as on the ground."""
+PRECISION = 1e-5
+"""Relative precision of the smallest level."""
+
+
+class TorqueSearch(NamedTuple):
+    """Work space of the search, in units of the rover's weight."""
+
+    y: np.ndarray
+    """(5,) the free degrees: how much more wheels 0 to 4 pull than the common pull."""
+    N: np.ndarray
+    """(6,) wheel loads at y."""
+    T: np.ndarray
+    """(6,) tractions at y."""
+    S: np.ndarray
+    """(6,) lateral forces at y."""
+    mu: np.ndarray
+    """(6,) friction coefficients."""
+    H: np.ndarray
+    """(5, 5) Hessian of the barrier."""
+    g: np.ndarray
+    """(5, 1) gradient of the barrier, then the Newton step."""
+    gradient: np.ndarray
+    """(5,) gradient, kept."""
+
+
+@allocating_kernel
+def new_torque_search():
+    """Return empty work space."""
+    return TorqueSearch(
+        np.zeros(FREE_TORQUES),
+        np.empty(6),
+        np.empty(6),
+        np.empty(6),
+        np.empty(6),
+        np.empty((FREE_TORQUES, FREE_TORQUES)),
+        np.empty((FREE_TORQUES, 1)),
+        np.empty(FREE_TORQUES),
+    )
+
+
+@kernel
+def apply_torques(balance, search):
+    """Write the wheel forces at y into the search."""
+    y = search.y
+    for i in range(6):
+        N, T, S = balance.normal[i, 0], balance.tangential[i, 0], balance.lateral[i, 0]
+        for k in range(FREE_TORQUES):
+            N += balance.normal[i, 1 + k] * y[k]
+            T += balance.tangential[i, 1 + k] * y[k]
+            S += balance.lateral[i, 1 + k] * y[k]
+        search.N[i], search.T[i], search.S[i] = N, T, S
+
+
+@kernel
+def minimise_friction(balance, max_traction, search):
+    """Find the torques, starting from equal ones, that need least friction; forces are left in `search`.
+
+    `max_traction` is the largest torque over wheel radius and weight. Returns FOUND; LIFTS where no
+    torques keep all wheels on the ground, or SATURATES where none of those are within the limit:
+    then the set that comes nearest is left.
+    """
+    search.y[:] = 0.0
+    apply_torques(balance, search)
+    if _needed(search, LOAD) > -LOAD_KEPT:
+        _lower(balance, LOAD, -LOAD_KEPT, np.inf, search)
+        if _needed(search, LOAD) > -LOAD_KEPT:
+            return LIFTS
+    if _needed(search, TORQUE) >= max_traction:
+        _lower(balance, TORQUE, 0.999 * max_traction, np.inf, search)
+        if _needed(search, TORQUE) >= max_traction:
+            return SATURATES
+    _lower(balance, FRICTION, 1e-6, max_traction, search)
+    return FOUND
+
+
+@kernel
+def _needed(search, goal):
+    """Return the level that the present forces need."""
+    worst = -np.inf
+    for i in range(6):
+        if goal == LOAD:
+            level = -search.N[i]
+        elif goal == TORQUE:
+            level = abs(search.T[i])
+        else:
+            across = np.sqrt(search.T[i] * search.T[i] + search.S[i] * search.S[i])
+            level = across / (search.mu[i] * search.N[i])
+        worst = max(worst, level)
+    return worst
+
+
+@kernel
+def _lower(balance, goal, enough, max_traction, search):
+    """Lower the level of `goal` until it is `enough` or the smallest."""
+    needed = _needed(search, goal)
+    level = needed + 0.1 * abs(needed) + 1e-3
+    stalled = 0
+    for lowering in range(LEVELS):
+        if needed <= enough or stalled == 3:
+            return
+        for newton in range(NEWTON_STEPS):
+            _write_barrier(balance, goal, level, max_traction, search)
+            if not _take_newton_step(balance, search):
+                break
+        now = _needed(search, goal)
+        stalled = stalled + 1 if level - now < PRECISION * max(abs(now), 1e-3) else 0
+        needed = now
+        level = now + STAY * (level - now)
+
+
+@kernel
+def _take_newton_step(balance, search):
+    """Take a damped Newton step on the barrier; False once at its minimum."""
+    for k in range(FREE_TORQUES):
+        search.gradient[k] = search.g[k, 0]
+    if not solve_in_place(search.H, search.g, 1):
+        return False
+    decrement = 0.0
+    for k in range(FREE_TORQUES):
+        decrement += search.gradient[k] * search.g[k, 0]
+    decrement = np.sqrt(max(decrement, 0.0))
+    if not decrement > 1e-3:
+        return False
+    for k in range(FREE_TORQUES):
+        search.y[k] -= search.g[k, 0] / (1.0 + decrement)
+    apply_torques(balance, search)
+    return True
+
+
+@kernel
+def _write_barrier(balance, goal, level, max_traction, search):
+    """Write gradient and Hessian of the barrier of the set at `level`."""
+    search.H[:, :] = 0.0
+    search.g[:, :] = 0.0
+    traction = level if goal == TORQUE else max_traction
+    for i in range(6):
+        if goal == FRICTION:
+            _add_cone(balance, i, level * search.mu[i], search)
+        else:
+            room = search.N[i] + (level if goal == LOAD else 0.0)
+            _add_log(balance.normal, i, 1.0 / room, 1.0 / (room * room), search)
+        if traction < np.inf:
+            above, below = traction - search.T[i], traction + search.T[i]
+            slope = 1.0 / below - 1.0 / above
+            curvature = 1.0 / (below * below) + 1.0 / (above * above)
+            _add_log(balance.tangential, i, slope, curvature, search)
+
+
+@kernel
+def _add_log(rows, i, slope, curvature, search):
+    """Add -log of a linear function's room: rows[i] is its gradient."""
+    for j in range(FREE_TORQUES):
+        search.g[j, 0] -= slope * rows[i, 1 + j]
+        for k in range(FREE_TORQUES):
+            search.H[j, k] += curvature * rows[i, 1 + j] * rows[i, 1 + k]
+
+
+@kernel
+def _add_cone(balance, i, mu, search):
+    """Add -log((mu N)^2 - T^2 - S^2) of wheel i."""
+    n, t, s = balance.normal, balance.tangential, balance.lateral
+    N, T, S = search.N[i], search.T[i], search.S[i]
+    room = mu * mu * N * N - T * T - S * S
+    for j in range(FREE_TORQUES):
+        nj, tj, sj = mu * mu * n[i, 1 + j], t[i, 1 + j], s[i, 1 + j]
+        gj = 2.0 * (N * nj - T * tj - S * sj) / room
+        search.g[j, 0] -= gj
+        for k in range(FREE_TORQUES):
+            nk, tk, sk = n[i, 1 + k], t[i, 1 + k], s[i, 1 + k]
+            gk = 2.0 * (mu * mu * N * nk - T * tk - S * sk) / room
+            search.H[j, k] += gj * gk - 2.0 * (nj * nk - tj * tk - sj * sk) / room
