@@ -18,6 +18,8 @@ TOUCHING, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
 COARSE, QUICK, NEAR, FULL, EXACT = np.arange(5)
 """Scopes of `find_touch`. Not plain integers, or each value would be compiled apart."""
 REFINEMENTS = 6
+TURN_TOLERANCE = 1e-4
+"""Error of the contact angle [rad] at which the search along the circle stops."""
 CIRCLE_REACH = 2e-2
 """How far above the nearest circle, in wheel radii, another one is looked at more closely."""
 PRUNING_MARGIN = 2e-2
@@ -246,7 +248,7 @@ def _refine(ground, samples, placement, wheel, m, s, c, touch):
         fall = up[2] - slope_x * up[0] - slope_y * up[1]
         turn = s * fall - c * rise
         length = np.sqrt(rise * rise + fall * fall)
-        if not abs(turn) > 1e-6 * length:
+        if not abs(turn) > TURN_TOLERANCE * length:
             break
         if turn > 0.0:
             ahead_s, ahead_c = s, c

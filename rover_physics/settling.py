@@ -21,8 +21,10 @@ from rover_physics.linear import solve_in_place
 from rover_physics.linkage import place, rocker_sign
 
 SETTLED, OFF_MAP, UNKNOWN_GROUND, NOT_SETTLED = 0, 1, 2, 3
-GAP_TOLERANCE = 1e-6
-"""Largest gap left in a settled pose [m]."""
+GAP_TOLERANCE = 3e-5
+"""Largest gap left in a settled pose [m], found by a search of its own."""
+NEWTON_TOLERANCE = 5e-6
+"""Largest gap at which Newton's method stops [m]."""
 NEWTON_STEPS = 20
 QUICK_ATTEMPTS = 3
 RECOVERIES = 8
@@ -92,7 +94,7 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
     for wheel in range(6):
         worst = max(worst, abs(touch.gap[wheel]))
     for iteration in range(NEWTON_STEPS):
-        if worst <= GAP_TOLERANCE or np.isnan(worst):
+        if worst <= NEWTON_TOLERANCE or np.isnan(worst):
             return worst
         if not _find_step(linkage, placement, touch, SLOPED, J, step):
             return worst
