@@ -14,6 +14,7 @@ import pytest
 from rover_physics.terrain import Terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.mars_terrain import make_mars_terrain
+from rover_planner.path_query import PathQueryOptions
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("matplotlib", reason="needs matplotlib")
@@ -138,6 +139,14 @@ def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     assert err.count("\n") == 1
     assert "traverse_server" in err
     assert_nothing_left(demo)
+
+
+def test_the_picture_is_of_the_same_candidates_as_the_server_judges():
+    from rover_planner.parameters import TRAVERSE_SERVER
+    from rover_planner.traverse_service import settings_from_parameters
+
+    defaults = {spec.name: spec.default for spec in TRAVERSE_SERVER}
+    assert settings_from_parameters(defaults).query == PathQueryOptions()
 
 
 @pytest.mark.parametrize("content", [None, b"no map"])
