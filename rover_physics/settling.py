@@ -27,9 +27,11 @@ NEWTON_TOLERANCE = 5e-6
 """Largest gap at which Newton's method stops [m]."""
 NEWTON_STEPS = 20
 QUICK_ATTEMPTS = 3
-RECOVERIES = 8
+RECOVERIES = 5
 LEVEL, SLOPED = np.arange(2)
-RELAXATION_STEPS = 12
+RELAXATION_STEPS = 60
+RELAXED = 0.01
+"""Largest gap, in wheel radii, at which relaxation hands over to Newton's method."""
 RELAXATION = 0.3
 
 
@@ -48,7 +50,7 @@ def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     _descend(linkage, placement, touch, q, 1.0, J, step)
     place(linkage, x, y, yaw, q, placement)
     _touch_all(ground, samples, placement, QUICK, touch)
-    for attempt in range(QUICK_ATTEMPTS):
+    for _ in range(QUICK_ATTEMPTS):
         _newton(ground, linkage, samples, x, y, yaw, q, placement, NEAR, touch, J, step)
         status, worst = _touch_all(ground, samples, placement, FULL, touch)
         if worst <= GAP_TOLERANCE or np.isnan(worst):
@@ -93,7 +95,7 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
     worst = 0.0
     for wheel in range(6):
         worst = max(worst, abs(touch.gap[wheel]))
-    for iteration in range(NEWTON_STEPS):
+    for _ in range(NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE or np.isnan(worst):
             return worst
         if not _find_step(linkage, placement, touch, SLOPED, J, step):
@@ -101,7 +103,7 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
         fraction = _limit_step(step)
         improved = np.inf
         taken = 0.0
-        for halving in range(6):
+        for _ in range(6):
             for i in range(6):
                 q[i] -= (fraction - taken) * step[i, 0]
             taken = fraction
@@ -118,12 +120,16 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
 
 @kernel
 def _relax(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
-    """Let the wheels fall or rise by part of their gaps, several times: slow, but it does not cycle."""
-    for iteration in range(RELAXATION_STEPS):
+    """Let the wheels fall or rise by part of their gaps until all are small.
+
+    Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to its
+    top, as it would on the ground.
+    """
+    for _ in range(RELAXATION_STEPS):
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
         status, worst = _touch_all(ground, samples, placement, EXACT, touch)
-        if np.isnan(worst):
+        if not worst > RELAXED * linkage.radius:
             return
 
 
