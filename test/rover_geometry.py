@@ -91,33 +91,25 @@ def contact_frames(prediction: PathPrediction, i: int) -> np.ndarray:
     return np.stack([n, np.cross(a, n), np.broadcast_to(a, n.shape)], axis=1)
 
 
-def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return what is left of the nine balance equations of waypoint i, in units of the weight.
+def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
+    """Return the nine sums that balance sets to zero, in units of the weight.
 
     Three forces and three moments about the body origin of the whole rover, the moment about each
     bogie pivot (eq 15), and the difference of the moments about the rocker pivots (eq 14 for both
     sides). Moments are divided by weight and wheelbase.
+
+    Args:
+        rover: The rover.
+        placed: Where its parts are.
+        acting: (force [N], place [m], side, whether on the bogie) of all that acts.
     """
-    placed = place_rover(rover, prediction, i)
-    frames = contact_frames(prediction, i)
-    shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
-    forces = np.einsum("kw,wkx->wx", np.array(shares), frames)
-    acting = [
-        (force, point, wheel // 3, placed.on_bogie[wheel])
-        for wheel, (force, point) in enumerate(
-            zip(forces, prediction.contact_points[i], strict=True)
-        )
-    ]
-    acting += [
-        (-mass * rover.gravity * UP, point, side, bogie)
-        for mass, point, side, bogie in placed.masses
-    ]
     axis = placed.attitude[:, 1]
 
     def moment(pivot, choose):
-        return sum(np.cross(p - pivot, f) for f, p, side, bogie in acting if choose(side, bogie))
+        about = (np.cross(p - pivot, f) for f, p, side, bogie in acting if choose(side, bogie))
+        return sum(about, start=np.zeros(3))
 
-    total_force = sum(force for force, *_ in acting)
+    total_force = sum((force for force, *_ in acting), start=np.zeros(3))
     total_moment = moment(placed.origin, lambda side, bogie: True)
     about_bogies = [
         axis @ moment(placed.bogie_pivots[k], lambda side, bogie, k=k: bogie and side == k)
@@ -131,6 +123,49 @@ def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.nd
     base = wheels["front"][0] - wheels["rear"][0]
     moments = [*total_moment, *about_bogies, about_rockers[0] - about_rockers[1]]
     return np.array([*total_force, *(np.array(moments) / base)]) / rover.weight
+
+
+def _on_wheels(prediction: PathPrediction, i: int, placed: Placed, forces: np.ndarray) -> list:
+    points = prediction.contact_points[i]
+    return [(forces[k], points[k], k // 3, placed.on_bogie[k]) for k in range(6)]
+
+
+def _weights(rover: Rover, placed: Placed) -> list:
+    g = rover.gravity * UP
+    return [(-mass * g, point, side, bogie) for mass, point, side, bogie in placed.masses]
+
+
+def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
+    """Return what is left of the nine balance equations of waypoint i; see `balance_sums`."""
+    placed = place_rover(rover, prediction, i)
+    shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
+    forces = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(prediction, i))
+    acting = _on_wheels(prediction, i, placed, forces) + _weights(rover, placed)
+    return balance_sums(rover, placed, acting)
+
+
+def balance_matrix(
+    rover: Rover, prediction: PathPrediction, i: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return A (9, 14), b (9,) and the wheels' places along the body (6,) [m] of waypoint i.
+
+    A @ (N, T, s0, s1) = b is its balance, all forces in units of the weight, S = s0 + s1 along.
+    """
+    placed, frames = place_rover(rover, prediction, i), contact_frames(prediction, i)
+    along = (placed.wheels - placed.origin) @ placed.attitude[:, 0]
+    columns = []
+    for kind in range(2):
+        for wheel in range(6):
+            forces = np.zeros((6, 3))
+            forces[wheel] = rover.weight * frames[wheel, kind]
+            columns.append(forces)
+    columns.append(rover.weight * frames[:, 2])
+    columns.append(rover.weight * along[:, None] * frames[:, 2])
+    sums = [
+        balance_sums(rover, placed, _on_wheels(prediction, i, placed, forces))
+        for forces in columns
+    ]
+    return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed)), along
 
 
 def wheel_gaps(

@@ -281,14 +281,3 @@ def test_in_figure_4_opposite_torques_change_loads_oppositely():
     assert there == pytest.approx(-back)
     assert np.abs(there).max() > 1.0
 
-
-# Policy optimal
-
-
-@pytest.mark.parametrize("make", [fractal, rocky])
-def test_optimal_torques_never_use_more_friction_than_equal_ones(make):
-    ground, poses = make(2), random_poses(2, 60, 1.8)
-    equal = sweep_path(LSR1, ground, poses, policy="equal").friction_utilisation.max(axis=1)
-    optimal = sweep_path(LSR1, ground, poses, policy="optimal").friction_utilisation.max(axis=1)
-    settled = ~np.isnan(equal)
-    assert (optimal[settled] <= equal[settled] * (1.0 + 1e-6) + 1e-9).all()

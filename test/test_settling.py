@@ -22,6 +22,8 @@ from rover_physics.sweep import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND, s
 from rover_physics.terrain import Terrain
 
 LSR1 = load_rover("lsr1")
+GAP = 3e-5  # what a settled pose may leave open [m]
+ANGLE = 4.0 * GAP / 0.4  # and what that may turn [rad]
 SWAP = [3, 4, 5, 0, 1, 2]
 slopes = st.floats(-0.4, 0.4)
 headings = st.floats(-np.pi, np.pi)
@@ -88,8 +90,8 @@ def test_wheels_touch_by_an_independent_dense_look_at_the_circles_of_the_model()
             for case, prediction, i in every_waypoint()
         ]
     )
-    assert gaps.max() <= 1e-6
-    assert (gaps >= -1e-6).mean() >= 0.90
+    assert gaps.max() <= GAP
+    assert (gaps >= -GAP).mean() >= 0.95
     assert gaps.min() >= -1e-3
 
 
@@ -193,11 +195,11 @@ def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw)
     R = attitude_of(prediction, 0)
     normal = np.array([-slope_x, -slope_y, 1.0])
     normal /= np.linalg.norm(normal)
-    assert R[:, 2] == pytest.approx(normal, abs=1e-5)
-    assert prediction.rocker_angle[0] == pytest.approx([0.0, 0.0], abs=1e-5)
-    assert prediction.bogie_angle[0] == pytest.approx([0.0, 0.0], abs=1e-5)
+    assert R[:, 2] == pytest.approx(normal, abs=ANGLE)
+    assert prediction.rocker_angle[0] == pytest.approx([0.0, 0.0], abs=ANGLE)
+    assert prediction.bogie_angle[0] == pytest.approx([0.0, 0.0], abs=ANGLE)
     foot = prediction.position[0] - normal * 0.30
-    assert foot[2] == pytest.approx(slope_x * foot[0] + slope_y * foot[1] + height, abs=3e-6)
+    assert foot[2] == pytest.approx(slope_x * foot[0] + slope_y * foot[1] + height, abs=2.0 * GAP)
 
 
 @few
@@ -210,8 +212,8 @@ def test_turned_by_quarters_with_its_path_the_ground_changes_nothing(seed, quart
     here = sweep_path(LSR1, ground, poses)
     there = sweep_path(LSR1, turned_ground, turned_poses)
     for name in ("status", "roll", "pitch", "rocker_angle", "bogie_angle"):
-        assert getattr(there, name) == pytest.approx(getattr(here, name), abs=1e-5), name
-    assert there.position[:, 2] == pytest.approx(here.position[:, 2], abs=2e-6)
+        assert getattr(there, name) == pytest.approx(getattr(here, name), abs=ANGLE), name
+    assert there.position[:, 2] == pytest.approx(here.position[:, 2], abs=2.0 * GAP)
     assert there.wheel_loads == pytest.approx(here.wheel_loads, abs=1e-3 * LSR1.weight)
 
 
@@ -222,13 +224,13 @@ def test_mirrored_ground_swaps_right_and_left(seed):
     here = sweep_path(LSR1, ground, poses)
     there = sweep_path(LSR1, *mirrored(ground, poses))
     assert there.status.tolist() == here.status.tolist()
-    assert there.position[:, 2] == pytest.approx(here.position[:, 2], abs=2e-6)
-    assert there.roll == pytest.approx(-here.roll, abs=1e-5)
-    assert there.pitch == pytest.approx(here.pitch, abs=1e-5)
-    assert there.rocker_angle == pytest.approx(here.rocker_angle[:, ::-1], abs=1e-5)
-    assert there.bogie_angle == pytest.approx(here.bogie_angle[:, ::-1], abs=1e-5)
+    assert there.position[:, 2] == pytest.approx(here.position[:, 2], abs=2.0 * GAP)
+    assert there.roll == pytest.approx(-here.roll, abs=ANGLE)
+    assert there.pitch == pytest.approx(here.pitch, abs=ANGLE)
+    assert there.rocker_angle == pytest.approx(here.rocker_angle[:, ::-1], abs=ANGLE)
+    assert there.bogie_angle == pytest.approx(here.bogie_angle[:, ::-1], abs=ANGLE)
     centres = here.wheel_centres[:, SWAP] * [1.0, -1.0, 1.0]
-    assert there.wheel_centres == pytest.approx(centres, abs=1e-5)
+    assert there.wheel_centres == pytest.approx(centres, abs=ANGLE)
 
 
 @few
@@ -240,9 +242,9 @@ def test_moved_with_its_path_the_ground_changes_nothing(seed, dx, dy, dz):
     shift = np.array([dx, dy, dz])
     here = sweep_path(LSR1, ground, poses)
     there = sweep_path(LSR1, moved, poses + np.array([dx, dy, 0.0]))
-    assert there.position == pytest.approx(here.position + shift, abs=2e-6)
-    assert there.roll == pytest.approx(here.roll, abs=1e-5)
-    assert there.bogie_angle == pytest.approx(here.bogie_angle, abs=1e-5)
+    assert there.position == pytest.approx(here.position + shift, abs=2.0 * GAP)
+    assert there.roll == pytest.approx(here.roll, abs=ANGLE)
+    assert there.bogie_angle == pytest.approx(here.bogie_angle, abs=ANGLE)
 
 
 @few
@@ -273,7 +275,7 @@ def test_what_is_called_settled_on_rough_ground_has_no_wheel_in_the_air():
     prediction = sweep_path(LSR1, ground, poses)
     circles = circles_of_the_model(ground)
     for i in np.flatnonzero(prediction.settled):
-        assert wheel_gaps(LSR1, ground, prediction, i, circles, angles=801).max() <= 1e-6
+        assert wheel_gaps(LSR1, ground, prediction, i, circles, angles=801).max() <= GAP
 
 
 def known_to_the_left_of(x_edge: float) -> Terrain:
