@@ -19,3 +19,7 @@ class PoseError(RoverError):
 
 class ModelError(RoverError):
     """A model argument outside its range, such as an unknown policy or a friction of zero."""
+
+
+class SoilError(RoverError):
+    """A soil file with a wrong key, or a soil that is not in it; the text names soil and key."""
