@@ -1,4 +1,4 @@
-"""The terrain: an elevation grid with unknown cells and an optional friction layer."""
+"""The terrain: an elevation grid with unknown cells; layers of friction, soil and uncertainty."""
 
 import zipfile
 import zlib
@@ -12,6 +12,15 @@ from scipy import ndimage, sparse
 from scipy.sparse import linalg
 
 from rover_physics.errors import TerrainError
+from rover_physics.terrain_checks import (
+    as_elevation,
+    as_elevation_std,
+    as_friction,
+    as_origin,
+    as_resolution,
+    as_soil,
+    as_soil_names,
+)
 
 _EDGE_TOLERANCE = 1e-9  # cells; rounding of (x - origin) / resolution at the map's edge
 
@@ -24,7 +33,8 @@ class Terrain:
     Arrays are taken as they are where type and layout fit, not copied: do not write into them.
 
     Raises:
-        TerrainError: Wrong shape or type, resolution not above 0, infinite heights, no known cell.
+        TerrainError: Wrong shape or type, resolution not above 0, infinite heights, no known cell,
+            or a value of a layer out of its range.
     """
 
     elevation: NDArray[np.float64]
@@ -35,27 +45,35 @@ class Terrain:
     """Centre (x, y) of cell [0, 0] in [m], map frame."""
     friction: NDArray[np.float64] | None = None
     """Coulomb coefficients (ny, nx), NaN where the rover's default holds; None: everywhere."""
+    soil: NDArray[np.int32] | None = None
+    """Indices (ny, nx) into ``soil_names``, -1 where the default soil holds; None: everywhere."""
+    soil_names: tuple[str, ...] = ()
+    """Names of the soils that ``soil`` points to. Which soils exist is not checked here."""
+    elevation_std: NDArray[np.float64] | None = None
+    """Standard deviation of the heights (ny, nx) in [m], at least 0, known wherever the height is
+    known; None: the heights are exact."""
 
     def __post_init__(self) -> None:
-        elevation = _as_grid("elevation", self.elevation)
-        if not np.isfinite(elevation).any():
-            ny, nx = elevation.shape
+        elevation = as_elevation(self.elevation)
+        soil_names = as_soil_names(self.soil_names)
+        checked: dict[str, Any] = {
+            "elevation": elevation,
+            "resolution": as_resolution(self.resolution),
+            "origin": as_origin(self.origin),
+            "soil_names": soil_names,
+        }
+        if self.friction is not None:
+            checked["friction"] = as_friction(self.friction, elevation)
+        if self.soil is not None:
+            checked["soil"] = as_soil(self.soil, soil_names, elevation)
+        elif soil_names:
             raise TerrainError(
-                f"elevation has no known cell: all {ny} x {nx} are NaN; at least one must be known"
+                f"soil_names are {', '.join(soil_names)} without a soil layer that points to them"
             )
-        friction = self.friction
-        if friction is not None:
-            friction = _as_grid("friction", friction)
-            if friction.shape != elevation.shape:
-                raise TerrainError(
-                    f"friction has shape {friction.shape}; it must be that of elevation, "
-                    f"{elevation.shape}"
-                )
-            _refuse_first(friction, friction <= 0.0, "friction", "above 0, or NaN for the default")
-        object.__setattr__(self, "elevation", elevation)
-        object.__setattr__(self, "resolution", _as_resolution(self.resolution))
-        object.__setattr__(self, "origin", _as_origin(self.origin))
-        object.__setattr__(self, "friction", friction)
+        if self.elevation_std is not None:
+            checked["elevation_std"] = as_elevation_std(self.elevation_std, elevation)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -112,7 +130,8 @@ class Terrain:
             max_gap: Largest width of a region in [m].
 
         Returns:
-            A terrain with the gaps filled; larger regions stay NaN. Friction is as it was.
+            A terrain with the gaps filled; larger regions stay NaN. Friction and soil are as they
+            were. A filled cell is as uncertain as the most uncertain cell around its gap.
 
         Raises:
             TerrainError: max_gap is negative or not a number.
@@ -122,7 +141,12 @@ class Terrain:
         gaps = _small_gaps(np.isnan(self.elevation), int(max_gap / self.resolution + 1e-9))
         if not gaps.any():
             return self
-        return replace(self, elevation=_fill_harmonic(self.elevation, gaps))
+        std = self.elevation_std
+        return replace(
+            self,
+            elevation=_fill_harmonic(self.elevation, gaps),
+            elevation_std=None if std is None else _fill_with_largest(std, gaps),
+        )
 
     def _grid_coordinates(
         self, x: ArrayLike, y: ArrayLike
@@ -141,7 +165,8 @@ def load_terrain(path: str | Path) -> Terrain:
 
     Args:
         path: File with ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
-            optionally ``friction`` (ny, nx). Other entries, such as ``source``, are left alone.
+            optionally layers (ny, nx): ``friction``, ``soil`` with ``soil_names``, and
+            ``elevation_std`` [m]. Other entries, such as ``source``, are left alone.
 
     Raises:
         TerrainError: Unreadable file, or a missing or impossible entry; names file and entry.
@@ -158,6 +183,9 @@ def load_terrain(path: str | Path) -> Terrain:
             resolution=entries["resolution"],
             origin=entries["origin"],
             friction=entries.get("friction"),
+            soil=entries.get("soil"),
+            soil_names=entries.get("soil_names", ()),
+            elevation_std=entries.get("elevation_std"),
         )
     except TerrainError as error:
         raise TerrainError(f"{path}: {error}") from None
@@ -178,8 +206,11 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
     entries["elevation"] = terrain.elevation
     entries["resolution"] = np.float64(terrain.resolution)
     entries["origin"] = np.asarray(terrain.origin)
-    if terrain.friction is not None:
-        entries["friction"] = terrain.friction
+    for layer in ("friction", "soil", "elevation_std"):
+        if getattr(terrain, layer) is not None:
+            entries[layer] = getattr(terrain, layer)
+    if terrain.soil_names:
+        entries["soil_names"] = np.array(terrain.soil_names)
     try:
         with open(path, "wb") as file:
             np.savez_compressed(file, **entries)
@@ -189,7 +220,15 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
 
 def _read_npz(path: Path) -> dict[str, Any]:
     """Read the entries that a terrain needs, without unpickling anything."""
-    wanted = ("elevation", "resolution", "origin", "friction")
+    wanted = (
+        "elevation",
+        "resolution",
+        "origin",
+        "friction",
+        "soil",
+        "soil_names",
+        "elevation_std",
+    )
     name = ""
     try:
         archive = np.load(path, allow_pickle=False)
@@ -206,51 +245,6 @@ def _read_npz(path: Path) -> dict[str, Any]:
         what = f"entry {name} is damaged or not numeric" if name else "not an .npz file"
         reason = " ".join(str(error).split())
         raise TerrainError(f"{path}: {what} ({reason})") from error
-
-
-def _as_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return a grid as C-contiguous float64 after checking type, shape and infinities."""
-    grid = np.asarray(values)
-    if grid.dtype.kind not in "fiu":
-        raise TerrainError(f"{name} has type {grid.dtype}; it must be an array of numbers")
-    if grid.ndim != 2 or min(grid.shape) < 2:
-        raise TerrainError(
-            f"{name} has shape {grid.shape}; it must be (ny, nx), at least 2 rows and 2 columns"
-        )
-    grid = np.ascontiguousarray(grid, dtype=np.float64)
-    _refuse_first(grid, np.isinf(grid), name, "finite, or NaN where unknown")
-    return grid
-
-
-def _refuse_first(grid: NDArray[np.float64], bad: NDArray[np.bool_], name: str, must: str) -> None:
-    """Raise an error that names the first bad cell, if there is one."""
-    if bad.any():
-        row, column = (int(k) for k in np.argwhere(bad)[0])
-        value = grid[row, column]
-        raise TerrainError(f"{name}[{row}, {column}] is {value}; it must be {must}")
-
-
-def _as_resolution(value: Any) -> float:
-    """Return the cell size as a float after checking it."""
-    number = np.asarray(value)
-    if number.dtype.kind in "fiu" and number.size == 1:
-        resolution = float(number.reshape(()))
-        if np.isfinite(resolution) and resolution > 0.0:
-            return resolution
-    raise TerrainError(f"resolution is {value}; it must be one number above 0 in m")
-
-
-def _as_origin(value: Any) -> tuple[float, float]:
-    """Return the origin as two floats after checking it."""
-    try:
-        point = np.asarray(value)
-    except ValueError:
-        point = np.empty(0)
-    if point.dtype.kind in "fiu" and point.shape == (2,) and np.isfinite(point).all():
-        return (float(point[0]), float(point[1]))
-    raise TerrainError(
-        f"origin is {value}; it must be two numbers in m, x and y of the centre of cell [0, 0]"
-    )
 
 
 def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:
@@ -289,4 +283,17 @@ def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> N
         right_side[~inner] += elevation[rows + down, columns + along][~inner]
     filled = elevation.copy()
     filled[gaps] = linalg.spsolve(matrix.tocsc(), right_side)
+    return filled
+
+
+def _fill_with_largest(std: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Give the cells of each gap the largest standard deviation around it."""
+    filled = std.copy()
+    labels, _ = ndimage.label(gaps)
+    for label, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
+        # A gap is off the map's edge, so there is a cell all around it.
+        window = (slice(rows.start - 1, rows.stop + 1), slice(columns.start - 1, columns.stop + 1))
+        gap = labels[window] == label
+        rim = ndimage.binary_dilation(gap) & ~gap
+        filled[window][gap] = std[window][rim].max()
     return filled

@@ -152,6 +152,79 @@ def test_unknown_friction_is_allowed():
     assert Terrain(FLAT, 0.1, friction=friction).friction is not None
 
 
+SOIL = np.full((4, 5), -1)
+NAMES = ("dry_sand", "slab")
+
+
+def test_soils_are_indices_into_names():
+    soil = SOIL.astype(np.int64)
+    soil[0, 1] = 1
+    terrain = Terrain(FLAT, 0.1, soil=soil, soil_names=list(NAMES))
+    assert terrain.soil is not None and terrain.soil.dtype == np.int32
+    assert terrain.soil_names == NAMES
+    assert Terrain(FLAT, 0.1, soil=SOIL).soil_names == ()
+
+
+@pytest.mark.parametrize(
+    ("soil", "names", "text"),
+    [
+        (np.full((5, 4), -1), NAMES, r"soil has shape \(5, 4\); it must be that of elevation"),
+        (SOIL + 3, NAMES, r"soil\[0, 0\] is 2; it must be -1 for the default, or 0 to 1"),
+        (np.full((4, 5), -2), NAMES, r"soil\[0, 0\] is -2"),
+        (np.full((4, 5), 2**32), NAMES, r"soil\[0, 0\] is 4294967296"),
+        (np.full((4, 5), 255, np.uint8), NAMES, r"soil\[0, 0\] is 255"),
+        (np.zeros((4, 5), int), (), r"soil\[0, 0\] is 0; .* as there are no soil_names"),
+        (np.zeros((4, 5)), NAMES, "soil has type float64; it must be an array of whole numbers"),
+        (np.zeros((4, 5), bool), NAMES, "soil has type bool"),
+        (SOIL, "dry_sand", "soil_names is dry_sand; it must be a list of different names"),
+        (SOIL, ("a", ""), r"soil_names is \['a', ''\]"),
+        (SOIL, ("a", 3), r"soil_names is \['a', 3\]"),
+        (SOIL, ("a", "b", "a"), "soil_names has 'a' twice"),
+        (SOIL, np.array([["a"]]), "soil_names is"),
+        (None, NAMES, "soil_names are dry_sand, slab without a soil layer"),
+    ],
+)
+def test_a_wrong_soil_layer_is_refused(soil, names, text):
+    with pytest.raises(TerrainError, match=text):
+        Terrain(FLAT, 0.1, soil=soil, soil_names=names)
+
+
+@pytest.mark.parametrize(
+    ("std", "text"),
+    [
+        (np.zeros((5, 4)), r"elevation_std has shape \(5, 4\)"),
+        (np.full((4, 5), -0.01), r"elevation_std\[0, 0\] is -0.01; it must be at least 0"),
+        (np.full((4, 5), np.inf), r"elevation_std\[0, 0\] is inf"),
+        (np.full((4, 5), np.nan), r"elevation_std\[0, 0\] is nan; .* where the height is known"),
+        (np.full((4, 5), "x"), "elevation_std has type"),
+    ],
+)
+def test_a_wrong_uncertainty_is_refused(std, text):
+    with pytest.raises(TerrainError, match=text):
+        Terrain(FLAT, 0.1, elevation_std=std)
+
+
+def test_the_uncertainty_may_be_unknown_where_the_height_is():
+    heights = np.where(np.arange(20).reshape(4, 5) == 7, np.nan, 0.0)
+    std = np.where(np.isnan(heights), np.nan, 0.02)
+    assert Terrain(heights, 0.1, elevation_std=std).elevation_std is not None
+
+
+def test_a_filled_gap_is_as_uncertain_as_the_worst_of_its_rim():
+    _, gapped = with_gap()
+    heights = gapped.elevation.copy()
+    heights[2, 2] = np.nan
+    heights[3, 3] = np.nan
+    std = np.where(np.isnan(heights), np.nan, 0.01)
+    std[7, 10], std[2, 3], std[15, 15] = 0.05, 0.03, 0.9
+    filled = Terrain(heights, 0.1, elevation_std=std).fill_gaps(0.3).elevation_std
+    assert filled is not None
+    assert (filled[8:11, 9:14] == 0.05).all()
+    assert (filled[2, 2], filled[3, 3]) == (0.03, 0.03)
+    known = np.isfinite(heights)
+    assert np.array_equal(filled[known], std[known])
+
+
 def with_gap(ny=20, nx=24, rows=slice(8, 11), columns=slice(9, 14)):
     terrain = plane(ny, nx, 0.1, (0.0, 0.0))
     heights = terrain.elevation.copy()
@@ -231,6 +304,28 @@ def test_a_saved_terrain_is_loaded_as_it_was(tmp_path):
     assert loaded.friction is not None
     assert np.array_equal(loaded.friction, friction, equal_nan=True)
     assert (loaded.resolution, loaded.origin) == (0.25, (3.0, -4.0))
+    assert (loaded.soil, loaded.soil_names, loaded.elevation_std) == (None, (), None)
+
+
+def test_saved_soils_and_uncertainty_are_loaded_as_they_were(tmp_path):
+    soil = np.random.default_rng(4).integers(-1, 2, (4, 5))
+    std = np.random.default_rng(5).uniform(0.0, 0.1, (4, 5))
+    terrain = Terrain(FLAT, 0.25, soil=soil, soil_names=NAMES, elevation_std=std)
+    save_terrain(tmp_path / "a.npz", terrain)
+    loaded = load_terrain(tmp_path / "a.npz")
+    assert loaded.soil_names == NAMES
+    assert np.array_equal(loaded.soil, soil)
+    assert np.array_equal(loaded.elevation_std, std)
+
+
+def test_a_file_with_a_wrong_soil_is_named(tmp_path):
+    entries = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0], "soil": SOIL + 1}
+    np.savez(tmp_path / "map.npz", **entries, soil_names="dry_sand")
+    with pytest.raises(TerrainError, match=r"map\.npz: soil_names is dry_sand; it must be a list"):
+        load_terrain(tmp_path / "map.npz")
+    np.savez(tmp_path / "map.npz", **entries)
+    with pytest.raises(TerrainError, match=r"map\.npz: soil\[0, 0\] is 0; it must be -1"):
+        load_terrain(tmp_path / "map.npz")
 
 
 def test_a_file_with_float32_and_further_entries_is_loaded(tmp_path):

@@ -1,0 +1,121 @@
+"""Checks of what a terrain is made of; each returns the value in its own type and layout."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.errors import TerrainError
+
+
+def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
+    """Return heights of which at least one is known."""
+    elevation = _as_grid("elevation", values)
+    if not np.isfinite(elevation).any():
+        ny, nx = elevation.shape
+        raise TerrainError(
+            f"elevation has no known cell: all {ny} x {nx} are NaN; at least one must be known"
+        )
+    return elevation
+
+
+def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return friction coefficients above 0, or NaN."""
+    friction = _as_grid("friction", values)
+    _check_shape("friction", friction, elevation)
+    _refuse_first(friction, friction <= 0.0, "friction", "above 0, or NaN for the default")
+    return friction
+
+
+def as_soil(
+    values: ArrayLike, names: tuple[str, ...], elevation: NDArray[np.float64]
+) -> NDArray[np.int32]:
+    """Return indices of soils, from -1 to below the number of names."""
+    soil = np.asarray(values)
+    if soil.dtype.kind not in "iu":
+        raise TerrainError(f"soil has type {soil.dtype}; it must be an array of whole numbers")
+    _check_shape("soil", soil, elevation)
+    last = len(names) - 1
+    allowed = f"-1 for the default, or 0 to {last}, an index into soil_names"
+    must = allowed if names else "-1 for the default, as there are no soil_names"
+    # In the array's own type: an index too large for 32 bits must not wrap around to a small one.
+    _refuse_first(soil, (soil < -1) | (soil > last), "soil", must)
+    return np.ascontiguousarray(soil, dtype=np.int32)
+
+
+def as_soil_names(values: Any) -> tuple[str, ...]:
+    """Return names of soils, none empty, none twice."""
+    must = "a list of different names, none of them empty"
+    is_array = isinstance(values, np.ndarray)
+    if not isinstance(values, list | tuple) and not (is_array and values.ndim == 1):
+        raise TerrainError(f"soil_names is {values}; it must be {must}")
+    names = tuple(values.tolist() if is_array else values)
+    if not all(isinstance(name, str) and name.strip() for name in names):
+        raise TerrainError(f"soil_names is {list(names)}; it must be {must}")
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise TerrainError(f"soil_names has {twice!r} twice; it must be {must}")
+    return tuple(str(name) for name in names)
+
+
+def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return standard deviations of at least 0, known wherever the height is known."""
+    std = _as_grid("elevation_std", values)
+    _check_shape("elevation_std", std, elevation)
+    _refuse_first(std, std < 0.0, "elevation_std", "at least 0")
+    missing = np.isnan(std) & np.isfinite(elevation)
+    _refuse_first(std, missing, "elevation_std", "a number in m where the height is known")
+    return std
+
+
+def as_resolution(value: Any) -> float:
+    """Return the cell size as a float above 0."""
+    number = np.asarray(value)
+    if number.dtype.kind in "fiu" and number.size == 1:
+        resolution = float(number.reshape(()))
+        if np.isfinite(resolution) and resolution > 0.0:
+            return resolution
+    raise TerrainError(f"resolution is {value}; it must be one number above 0 in m")
+
+
+def as_origin(value: Any) -> tuple[float, float]:
+    """Return the origin as two finite floats."""
+    try:
+        point = np.asarray(value)
+    except ValueError:
+        point = np.empty(0)
+    if point.dtype.kind in "fiu" and point.shape == (2,) and np.isfinite(point).all():
+        return (float(point[0]), float(point[1]))
+    raise TerrainError(
+        f"origin is {value}; it must be two numbers in m, x and y of the centre of cell [0, 0]"
+    )
+
+
+def _as_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return a grid as C-contiguous float64 after checking type, shape and infinities."""
+    grid = np.asarray(values)
+    if grid.dtype.kind not in "fiu":
+        raise TerrainError(f"{name} has type {grid.dtype}; it must be an array of numbers")
+    if grid.ndim != 2 or min(grid.shape) < 2:
+        raise TerrainError(
+            f"{name} has shape {grid.shape}; it must be (ny, nx), at least 2 rows and 2 columns"
+        )
+    grid = np.ascontiguousarray(grid, dtype=np.float64)
+    _refuse_first(grid, np.isinf(grid), name, "finite, or NaN where unknown")
+    return grid
+
+
+def _check_shape(name: str, layer: NDArray[Any], elevation: NDArray[np.float64]) -> None:
+    """Raise an error where a layer is not of the terrain's shape."""
+    if layer.shape != elevation.shape:
+        raise TerrainError(
+            f"{name} has shape {layer.shape}; it must be that of elevation, {elevation.shape}"
+        )
+
+
+def _refuse_first(grid: NDArray[Any], bad: NDArray[np.bool_], name: str, must: str) -> None:
+    """Raise an error that names the first bad cell, if there is one."""
+    if bad.any():
+        row, column = (int(k) for k in np.argwhere(bad)[0])
+        value = grid[row, column]
+        raise TerrainError(f"{name}[{row}, {column}] is {value}; it must be {must}")
