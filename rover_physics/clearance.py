@@ -9,7 +9,8 @@ from rover_physics.kernels import kernel
 def belly_clearance(ground, linkage, placement):
     """Return the smallest height [m] of the underside above the known ground below it.
 
-    Looked up at all cell centres within the outline of the underside; NaN where none is known there.
+    Looked up at all cell centres within the outline of the underside; NaN where none is known
+    there.
     """
     R, origin, belly = placement.R, placement.origin, linkage.belly
     elevation, scale = ground.elevation, ground.inverse_resolution

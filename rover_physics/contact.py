@@ -2,8 +2,9 @@
 
 The lower half of the cylinder is sampled in the wheel's own, cambered plane: on circles across its
 width and angles along each circle. The smallest vertical gap between sample and terrain is the gap
-of the wheel; it is refined along the circle by the root of its derivative. Contact angles count from
-the lowest point of the circle, positive towards the front, so a wheel climbing has positive angles.
+of the wheel; it is refined along the circle by the root of its derivative. Contact angles count
+from the lowest point of the circle, positive towards the front, so a wheel climbing has positive
+angles.
 """
 
 from typing import NamedTuple
@@ -17,16 +18,18 @@ from rover_physics.rover import Rover
 TOUCHING, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
 COARSE, QUICK, NEAR, FULL, EXACT = np.arange(5)
 """Scopes of `find_touch`. Not plain integers, or each value would be compiled apart."""
-REFINEMENTS = 6
+REFINEMENTS = 9
 TURN_TOLERANCE = 1e-4
 """Error of the contact angle [rad] at which the search along the circle stops."""
 CIRCLE_REACH = 2e-2
 """How far above the nearest circle, in wheel radii, another one is looked at more closely."""
+EXACT_REACH = 0.5
+"""The same for samples of an exact search: beside a face much can lie between two samples."""
 PRUNING_MARGIN = 2e-2
 """Rows are passed over that stay farther than this, in wheel radii, above the nearest sample."""
 COMPLIANCE = 2e-3
-"""Depth, in wheel radii, to which a real wheel and ground give way: circles whose gaps differ by less
-share the load. Wheels on a plane thus touch in the middle, not on an edge chosen by rounding."""
+"""Depth, in wheel radii, to which real wheels and ground give way: circles with gaps closer than
+that share the load. On a plane a wheel thus touches in its middle, not on an edge at random."""
 
 
 class WheelSamples(NamedTuple):
@@ -61,6 +64,10 @@ class Touch(NamedTuple):
     """(6, 3) touching point [m], map frame."""
     normal: np.ndarray
     """(6, 3) surface normal that governs how the gap changes, with z = 1, map frame."""
+    held_height: np.ndarray
+    """(6,) height [m] at which a wheel that climbs a face is held; NaN for the others."""
+    held_angle: np.ndarray
+    """(6,) contact angle with the face of a held wheel [rad]."""
     nearest: np.ndarray
     """(6,) index of the circle that touches."""
     circle_gap: np.ndarray
@@ -69,6 +76,12 @@ class Touch(NamedTuple):
     """(6, m) sine of the angle where it is."""
     circle_cosine: np.ndarray
     """(6, m) cosine of the angle where it is."""
+    first_row: np.ndarray
+    """(m,) index of the angle of the smallest sampled gap, of the wheel scanned last."""
+    second_gap: np.ndarray
+    """(m,) smallest sampled gap away from the first and its neighbours, as above."""
+    second_row: np.ndarray
+    """(m,) index of its angle."""
 
 
 def sample_wheel(rover: Rover, resolution: float) -> WheelSamples:
@@ -99,10 +112,15 @@ def new_touch(samples):
         np.empty(6),
         np.empty((6, 3)),
         np.empty((6, 3)),
+        np.full(6, np.nan),
+        np.full(6, np.nan),
         np.zeros(6, np.int64),
         np.empty((6, circles)),
         np.empty((6, circles)),
         np.empty((6, circles)),
+        np.zeros(circles, np.int64),
+        np.empty(circles),
+        np.zeros(circles, np.int64),
     )
 
 
@@ -110,13 +128,16 @@ def new_touch(samples):
 def find_touch(ground, samples, placement, wheel, scope, touch):
     """Find where `wheel` is nearest to the ground and write it into row `wheel` of `touch`.
 
-    `scope` says how thoroughly: COARSE looks at every other sample of the middle circle, QUICK at all
-    samples and closer at the nearest, NEAR only around the direction found last, FULL closer at each
-    circle, EXACT closer at each local minimum of each circle. Returns TOUCHING, or OFF_MAP or
-    UNKNOWN_GROUND where any sample lies there; such samples are passed over, and the gap is NaN
-    where there is no other.
+    `scope` says how thoroughly: COARSE looks at every other sample of the middle circle, QUICK
+    at all samples and closer at the nearest, NEAR only around the direction found last, FULL
+    closer at each circle, EXACT closer at each local minimum of each circle. Returns TOUCHING,
+    or OFF_MAP or UNKNOWN_GROUND where any sample lies there; such samples are passed over, and
+    the gap is NaN where there is no other.
     """
     status = TOUCHING
+    if touch.held_height[wheel] == touch.held_height[wheel]:
+        _hold(placement, wheel, touch)
+        return status
     if scope == NEAR:
         s, c = touch.sine[wheel], touch.cosine[wheel]
         _refine(ground, samples, placement, wheel, touch.nearest[wheel], s, c, touch)
@@ -137,14 +158,28 @@ def find_touch(ground, samples, placement, wheel, scope, touch):
 
 
 @kernel
+def _hold(placement, wheel, touch):
+    """Write the touch of a wheel whose centre is held at a height, whatever the ground."""
+    touch.gap[wheel] = placement.centres[wheel, 2] - touch.held_height[wheel]
+    for i in range(3):
+        touch.point[wheel, i] = placement.centres[wheel, i]
+        touch.normal[wheel, i] = 0.0
+    touch.normal[wheel, 2] = 1.0
+
+
+@kernel
 def _refine_circles(ground, samples, placement, wheel, all_circles, touch):
-    """Look closer at the nearest sample of the nearest circle, or of all circles that may be nearest."""
+    """Look closer at the nearest sample of the nearest circle, or of all that may be nearest."""
     best = touch.nearest[wheel]
     reach = touch.circle_gap[wheel, best] + CIRCLE_REACH * samples.radius
     for m in range(samples.laterals.size):
         if m == best or (all_circles and touch.circle_gap[wheel, m] <= reach):
             s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
             _refine(ground, samples, placement, wheel, m, s, c, touch)
+            if all_circles and touch.second_gap[m] <= reach:
+                k = touch.second_row[m]
+                s, c = samples.sines[k], samples.cosines[k]
+                _refine(ground, samples, placement, wheel, m, s, c, touch)
     for m in range(samples.laterals.size):
         if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
             touch.nearest[wheel] = m
@@ -175,8 +210,11 @@ def _scan(ground, samples, placement, wheel, scope, touch):
     axis_x, axis_y, axis_z = R[0, 1] * scale, R[1, 1] * scale, R[2, 1]
     rim = abs(axis_z) * laterals[laterals.size - 1]
     margin = np.inf if scope == EXACT else PRUNING_MARGIN * radius
+    first_row, second_gap, second_row = touch.first_row, touch.second_gap, touch.second_row
     for m in range(laterals.size):
         circle_gap[wheel, m] = np.inf
+        second_gap[m] = np.inf
+        first_row[m] = -2
     best, best_m, status = np.inf, first_m, TOUCHING
     rows = (sines.size - 1) // stride + 1
     for visit in range(rows):
@@ -198,12 +236,17 @@ def _scan(ground, samples, placement, wheel, scope, touch):
                 if status == TOUCHING:
                     status = UNKNOWN_GROUND
             elif scope == EXACT:
-                if gap < best + CIRCLE_REACH * radius:
+                if gap < best + EXACT_REACH * radius:
                     _refine(ground, samples, placement, wheel, m, sines[k], cosines[k], touch)
                     gap = touch.circle_gap[wheel, m]
             elif gap < circle_gap[wheel, m]:
+                if abs(k - first_row[m]) > stride:
+                    second_gap[m], second_row[m] = circle_gap[wheel, m], first_row[m]
+                first_row[m] = k
                 circle_gap[wheel, m] = gap
                 circle_sine[wheel, m], circle_cosine[wheel, m] = sines[k], cosines[k]
+            elif gap < second_gap[m] and abs(k - first_row[m]) > stride:
+                second_gap[m], second_row[m] = gap, k
             if gap < best:
                 best, best_m = gap, m
     touch.nearest[wheel] = best_m
@@ -212,18 +255,19 @@ def _scan(ground, samples, placement, wheel, scope, touch):
 
 @kernel
 def _refine(ground, samples, placement, wheel, m, s, c, touch):
-    """Find the angle on circle m, near (s, c), where the gap is smallest, and write it into `touch`.
+    """Find the angle on circle m, near (s, c), where the gap is smallest; write it into `touch`.
 
-    On a plane the circle touches in the direction of the plane's normal, so each trial looks in the
-    direction of the normal found last; where that leaves the bracket, as on an edge, it is halved.
-    What `touch` holds for the circle is kept where it is lower, unless it is the start (s, c) itself.
+    On a plane the circle touches in the direction of the plane's normal, so each trial looks in
+    the direction of the normal found last; where that leaves the bracket, as on an edge, it is
+    halved. What `touch` holds for the circle is kept where it is lower, unless it is the start
+    (s, c) itself.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     lateral, radius = samples.laterals[m], samples.radius
     x = centres[wheel, 0] + lateral * R[0, 1]
     y = centres[wheel, 1] + lateral * R[1, 1]
     z = centres[wheel, 2] + lateral * R[2, 1]
-    best_gap, best_s, best_c = touch.circle_gap[wheel, m], s, c
+    best_gap = touch.circle_gap[wheel, m]
     if s == touch.circle_sine[wheel, m] and c == touch.circle_cosine[wheel, m]:
         best_gap = np.inf
     turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
@@ -241,7 +285,7 @@ def _refine(ground, samples, placement, wheel, m, s, c, touch):
         )
         gap = z - radius * c * up[2] - height
         if gap < best_gap:
-            best_gap, best_s, best_c = gap, s, c
+            best_gap = gap
             touch.circle_gap[wheel, m] = gap
             touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
         rise = slope_x * forward[0] + slope_y * forward[1]
@@ -275,8 +319,9 @@ def _write_point(samples, placement, wheel, s, c, lateral, touch):
 def _write_normal(placement, wheel, s, c, slope_x, slope_y, touch):
     """Write the wheel's radial direction with the terrain's slope along the axis, scaled to z = 1.
 
-    The part of the terrain's normal along the circle is left out: it vanishes where wheel and ground
-    are tangent, and where the wheel rests on an edge the wheel's own radius is the normal.
+    The part of the terrain's normal along the circle is left out: it vanishes where wheel and
+    ground are tangent, and where the wheel rests on an edge the wheel's own radius is the
+    normal.
     """
     R, forward, up, normal = placement.R, placement.forward, placement.up, touch.normal
     radial_x = -s * forward[0] + c * up[0]
@@ -294,9 +339,13 @@ def _write_normal(placement, wheel, s, c, slope_x, slope_y, touch):
 def find_contact(samples, placement, wheel, touch):
     """Replace the touch of `wheel` by the mean contact over the circles that share the load.
 
-    Each circle counts by how far its own touching point stays below the lowest plus COMPLIANCE radii.
-    The touch has to come from a FULL or EXACT `find_touch`.
+    Each circle counts by how far its own touching point stays below the lowest plus COMPLIANCE
+    radii. The touch has to come from a FULL or EXACT `find_touch`.
     """
+    if touch.held_height[wheel] == touch.held_height[wheel]:
+        s, c = np.sin(touch.held_angle[wheel]), np.cos(touch.held_angle[wheel])
+        _write_point(samples, placement, wheel, s, c, 0.0, touch)
+        return
     allowance = COMPLIANCE * samples.radius
     total, sine_sum, cosine_sum, lateral_sum = 0.0, 0.0, 0.0, 0.0
     for m in range(samples.laterals.size):

@@ -1,4 +1,4 @@
-"""Static equilibrium of a settled rover: wheel loads for given torques (paper 3.2, eqs 8-15, in 3-D).
+"""Static equilibrium of a settled rover: wheel loads for given torques (paper 3.2 in 3-D).
 
 In the contact frame of a wheel, n points from the ground to the wheel's centre, a is the axis of
 the wheel and t = a x n points forward along the ground; the ground's force is N n + T t + S a.
@@ -19,25 +19,32 @@ from rover_physics.linear import solve_in_place
 
 UNKNOWNS = 9
 FREE_TORQUES = 5
+"""Degrees of freedom of the torques: how much more each wheel but the last pulls than all do."""
+FREE_FORCES = 9
+"""With four more of the lateral forces, which the suspension passes from wheel to wheel."""
+FREE_LATERAL = np.array([0, 1, 3, 4])
+"""Wheels whose lateral forces are the further degrees; the equal share makes up for them."""
 
 
 class Balance(NamedTuple):
     """How the forces of a settled rover depend on its wheel tractions, in units of its weight.
 
-    Column 0 holds the forces when all wheels pull alike; column 1 + k how they change when wheel k
-    pulls one unit more, and the common pull makes up for it.
+    Column 0 holds the forces when all wheels pull alike; column 1 + k, k < 5, how they change when
+    wheel k pulls one unit more and the common pull makes up for it; column 6 + k how they change
+    when wheel FREE_LATERAL[k] is pushed one unit more along its axis and the lateral shares make
+    up for it.
     """
 
     normal: np.ndarray
-    """(6, 6) wheel loads N."""
+    """(6, 10) wheel loads N."""
     tangential: np.ndarray
-    """(6, 6) tractions T."""
+    """(6, 10) tractions T."""
     lateral: np.ndarray
-    """(6, 6) lateral forces S."""
+    """(6, 10) lateral forces S."""
     A: np.ndarray
     """(9, 9) work space: the equations."""
     B: np.ndarray
-    """(9, 6) work space: right-hand sides, then solutions."""
+    """(9, 10) work space: right-hand sides, then solutions."""
     frames: np.ndarray
     """(6, 3, 3) contact frames: rows n, t, a of each wheel, map frame."""
 
@@ -46,11 +53,11 @@ class Balance(NamedTuple):
 def new_balance():
     """Return an empty balance."""
     return Balance(
-        np.empty((6, 6)),
-        np.empty((6, 6)),
-        np.empty((6, 6)),
+        np.empty((6, 1 + FREE_FORCES)),
+        np.empty((6, 1 + FREE_FORCES)),
+        np.empty((6, 1 + FREE_FORCES)),
         np.empty((UNKNOWNS, UNKNOWNS)),
-        np.empty((UNKNOWNS, 1 + FREE_TORQUES)),
+        np.empty((UNKNOWNS, 1 + FREE_FORCES)),
         np.empty((6, 3, 3)),
     )
 
@@ -59,19 +66,22 @@ def new_balance():
 def balance_forces(linkage, placement, touch, columns, balance):
     """Solve the balance of a settled rover into `balance`; False where the equations are singular.
 
-    `columns` is 1 for the common pull alone or 6 with the changes by single wheels 0 to 4.
+    `columns` is 1 for the common pull alone, 6 with the changes by torques, 10 with all.
     """
     _write_frames(placement, touch, balance.frames)
     _write_equations(linkage, placement, touch, columns, balance)
     B = balance.B
-    if not solve_in_place(balance.A, B, columns):
+    if not solve_in_place(balance.A, B, UNKNOWNS, columns):
         return False
     for k in range(columns):
         for i in range(6):
-            own = 1.0 if k == i + 1 else 0.0
             balance.normal[i, k] = B[i, k]
             balance.lateral[i, k] = B[6, k] + B[7, k] * _axle(linkage, placement, i)
-            balance.tangential[i, k] = B[8, k] + own
+            balance.tangential[i, k] = B[8, k]
+        if 0 < k <= FREE_TORQUES:
+            balance.tangential[k - 1, k] += 1.0
+        elif k > FREE_TORQUES:
+            balance.lateral[FREE_LATERAL[k - 1 - FREE_TORQUES], k] += 1.0
     return True
 
 
@@ -137,11 +147,17 @@ def _write_equations(linkage, placement, touch, columns, balance):
                     A, column, share, fx, fy, fz, mx, my, mz, side, about_bogie,
                     sign * about_rocker,
                 )  # fmt: skip
-            if kind == 1 and wheel + 1 < columns:
+            own = 0
+            if kind == 1 and wheel < FREE_TORQUES:
+                own = 1 + wheel
+            elif kind == 2:
+                for k in range(FREE_LATERAL.size):
+                    if FREE_LATERAL[k] == wheel:
+                        own = 1 + FREE_TORQUES + k
+            if 0 < own < columns:
                 _add_column(
-                    B, wheel + 1, -1.0, fx, fy, fz, mx, my, mz, side, about_bogie,
-                    sign * about_rocker,
-                )  # fmt: skip
+                    B, own, -1.0, fx, fy, fz, mx, my, mz, side, about_bogie, sign * about_rocker
+                )
     _add_weights(linkage, placement, B)
 
 

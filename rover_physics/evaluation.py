@@ -7,7 +7,7 @@ from numba import prange
 
 from rover_physics.clearance import belly_clearance
 from rover_physics.contact import Touch, new_touch
-from rover_physics.equilibrium import Balance, balance_forces, new_balance
+from rover_physics.equilibrium import FREE_FORCES, Balance, balance_forces, new_balance
 from rover_physics.ground import friction_at
 from rover_physics.kernels import allocating_kernel, kernel, sweep_kernel
 from rover_physics.linkage import Placement, new_placement, place_masses
@@ -107,26 +107,33 @@ def new_work(samples):
 
 
 @sweep_kernel
-def evaluate_poses(ground, linkage, samples, settings, poses, columns):
-    """Evaluate the model at poses (n, 3) into `columns`, each pose on its own."""
+def evaluate_poses(ground, linkage, samples, settings, poses, held, columns):
+    """Evaluate the model at poses (n, 3) into `columns`, each pose on its own.
+
+    held (n, 6, 2) gives height [m] and contact angle [rad] of wheels that climb a face, NaN for
+    those that rest on the ground; (0, 6, 2) where none climbs.
+    """
     n = poses.shape[0]
     for chunk in prange((n + CHUNK - 1) // CHUNK):
         work = new_work(samples)
         for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, n)):
-            evaluate_pose(ground, linkage, samples, settings, poses, i, work, columns)
+            evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, columns)
 
 
 @kernel
-def evaluate_pose(ground, linkage, samples, settings, poses, i, work, columns):
+def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, columns):
     """Evaluate the model at pose i into row i of `columns`."""
     q, placement, touch = columns.q[i], work.placement, work.touch
+    for wheel in range(6 if held.shape[0] > 0 else 0):
+        touch.held_height[wheel] = held[i, wheel, 0]
+        touch.held_angle[wheel] = held[i, wheel, 1]
     status = settle(
         ground, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
         q, placement, touch, work.J, work.step,
     )  # fmt: skip
     if status == SETTLED:
         place_masses(linkage, q, placement)
-        columns_needed = 1 if settings.policy == EQUAL else 6
+        columns_needed = 1 if settings.policy == EQUAL else 1 + FREE_FORCES
         if not balance_forces(linkage, placement, touch, columns_needed, work.balance):
             status = NO_EQUILIBRIUM
     columns.status[i] = status
@@ -191,7 +198,7 @@ def _wheel_speed(radius, slip, settings):
 
 @kernel
 def find_tip_over(linkage, work):
-    """Return the tip-over angle [rad] and force-angle measure [N m] of a placed rover under its weight."""
+    """Return tip-over angle [rad] and force-angle measure [N m] of a placed rover."""
     centre, force, moment = work.vectors[0], work.vectors[1], work.vectors[2]
     _write_centre_of_mass(linkage, work.placement, centre)
     force[0], force[1], force[2] = 0.0, 0.0, -linkage.mass * linkage.gravity

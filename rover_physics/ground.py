@@ -1,4 +1,4 @@
-"""Bilinear look-ups of elevation and friction inside kernels, with gaps and the map's edge told apart."""
+"""Bilinear look-ups of elevation and friction inside kernels; gaps and the edge are told apart."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -17,7 +17,7 @@ class Ground(NamedTuple):
     elevation: np.ndarray
     """(ny, nx) elevation [m], NaN where unknown."""
     ceiling: np.ndarray
-    """(ny, nx) highest elevation around each cell, as far as half a wheel width and its cells reach
+    """(ny, nx) highest elevation around each cell, as far as half a wheel and its cells reach
     [m]; infinite beside unknown cells and the map's edge."""
     friction: np.ndarray
     """(ny, nx) friction coefficient, NaN where the rover's own holds; (0, 0) without a layer."""
@@ -53,7 +53,7 @@ def pack_ground(terrain: Terrain, wheel_width: float) -> Ground:
 
 @kernel
 def is_cell_on_map(grid, gx, gy):
-    """Tell whether (gx, gy), counted in cells from cell [0, 0], lies within the outermost centres."""
+    """Tell whether (gx, gy), in cells from cell [0, 0], lies within the outermost centres."""
     return gx >= 0.0 and gy >= 0.0 and gx <= grid.shape[1] - 1 and gy <= grid.shape[0] - 1
 
 
@@ -72,7 +72,7 @@ def height_at_cell(elevation, gx, gy):
 
 @kernel
 def look_up(ground, x, y):
-    """Return elevation [m] and its gradient (d/dx, d/dy) at (x, y) [m]; NaN where there is none."""
+    """Return elevation [m] and its gradient at (x, y) [m]; NaN where there is none."""
     elevation = ground.elevation
     gx = (x - ground.x0) * ground.inverse_resolution
     gy = (y - ground.y0) * ground.inverse_resolution

@@ -1,4 +1,4 @@
-"""How the numerical kernels are compiled: plain scalar code, compiled once by numba and cached beside it."""
+"""How the numerical kernels are compiled: once, by numba, and cached beside their sources."""
 
 import hashlib
 from pathlib import Path
@@ -22,8 +22,8 @@ COMPILE_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 def kernel(function):
     """Compile a scalar function that other kernels call; it can't allocate.
 
-    Arrays are not reference-counted in it: counting every array of every argument at every call took
-    most of the time of a settled pose.
+    Arrays are not reference-counted in it: counting every array of every argument at every call
+    took most of the time of a settled pose.
     """
     return numba.njit(_nrt=False, **COMPILE_OPTIONS)(function)
 
@@ -41,8 +41,8 @@ def sweep_kernel(function):
 def drop_stale_kernels(folder: Path) -> None:
     """Remove cached kernels in `folder` that were compiled from other sources.
 
-    numba looks only at the file that holds a kernel, not at the files of the kernels it calls, so an
-    edit in one file would leave compiled callers in another file as they were.
+    numba looks only at the file that holds a kernel, not at the files of the kernels it calls,
+    so an edit in one file would leave compiled callers in another file as they were.
     """
     cache = folder / "__pycache__"
     digest = hashlib.sha256()

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from rover_physics.evaluation import NO_EQUILIBRIUM
-from rover_physics.names import SIDES, WHEELS
 from rover_physics.prediction import PathPrediction
+from rover_physics.reasons import check_limits, tilt_of
 from rover_physics.rover import Rover
 from rover_physics.settling import NOT_SETTLED, OFF_MAP, UNKNOWN_GROUND
 
@@ -22,8 +22,11 @@ CODES = (
     "wheel_lift",
     "friction",
     "torque",
+    "wheel_drop",
     "belly",
 )
+UNNEEDED_IN_A_FALL = ("wheel_lift", "friction", "torque")
+"""Limits that do not count while a wheel rolls off an edge."""
 _PLACELESS = {
     OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
     UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
@@ -33,7 +36,6 @@ _PLACELESS = {
     ),
     NO_EQUILIBRIUM: ("no_equilibrium", "the wheel loads are not determined in this configuration"),
 }
-_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -64,9 +66,11 @@ class Verdict:
     """Largest tilt of the body on the settled part [rad]."""
     min_belly_clearance: float
     """Smallest belly clearance on the settled part [m]."""
+    max_wheel_drop: float
+    """Largest drop of a wheel that rolled off an edge [m]."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the verdict as plain numbers and texts that JSON can hold; NaN and infinity as None."""
+        """Return the verdict as JSON can hold it: lists for tuples, None for NaN and infinity."""
         plain = asdict(self)
         plain["reasons"], plain["codes"] = list(self.reasons), list(self.codes)
         return {key: _plain(value) for key, value in plain.items()}
@@ -76,27 +80,28 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def tilt_of(prediction: PathPrediction) -> np.ndarray:
-    """Return the angle (n,) [rad] between the body's z axis and the vertical."""
-    upright = np.cos(prediction.roll) * np.cos(prediction.pitch)
-    return np.arccos(np.clip(upright, -1.0, 1.0))
-
-
 def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
     """Hold a prediction against the limits of the rover.
 
-    The first limit broken, in the order of CODES, is the reason of a waypoint.
+    The first limit broken, in the order of CODES, is the reason of a waypoint; a limit broken on
+    the way to a waypoint counts there, unless the waypoint has a reason of its own.
     """
-    n = len(prediction.poses)
-    codes, reasons = [""] * n, [""] * n
-    for i, status in enumerate(prediction.status.tolist()):
-        if status in _PLACELESS:
-            codes[i], reasons[i] = _PLACELESS[status]
-    for code, broken, describe in _checks(rover, prediction):
-        for i in np.flatnonzero(broken):
-            if not codes[i]:
-                codes[i], reasons[i] = code, describe(i)
-    first = next((i for i, code in enumerate(codes) if code), -1)
+    codes, reasons = _find_reasons(rover, prediction)
+    parts = [prediction]
+    if prediction.between is not None and len(prediction.between.poses):
+        parts.append(prediction.between)
+        owners = prediction.between.waypoint.tolist()
+        on_the_way = zip(*_find_reasons(rover, prediction.between), strict=True)
+        for i, (code, reason) in zip(owners, on_the_way, strict=True):
+            if code and not codes[i]:
+                codes[i], reasons[i] = code, f"on the way here: {reason}"
+    first: int = next((k for k, code in enumerate(codes) if code), -1)
+
+    def extreme(choose, values_of) -> float:
+        values = np.concatenate([np.ravel(values_of(part)) for part in parts])
+        known = values[~np.isnan(values)]
+        return float(choose(known)) if known.size else float("nan")
+
     return Verdict(
         traversable=first < 0,
         reasons=tuple(reasons),
@@ -105,76 +110,37 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
         code=codes[first] if first >= 0 else "",
         reason=reasons[first] if first >= 0 else "",
         policy=prediction.policy,
-        min_tip_over_ratio=_extreme(np.min, prediction.tip_over_ratio),
-        max_friction_utilisation=_extreme(np.max, prediction.friction_utilisation),
-        max_torque_saturation=_extreme(np.max, prediction.torque_saturation),
-        max_tilt=_extreme(np.max, tilt_of(prediction)),
-        min_belly_clearance=_extreme(np.min, prediction.belly_clearance),
+        min_tip_over_ratio=extreme(np.min, lambda part: part.tip_over_ratio),
+        max_friction_utilisation=extreme(np.max, _needed_friction),
+        max_torque_saturation=extreme(np.max, _needed_torque),
+        max_tilt=extreme(np.max, tilt_of),
+        min_belly_clearance=extreme(np.min, lambda part: part.belly_clearance),
+        max_wheel_drop=extreme(np.max, lambda part: part.wheel_drop),
     )
 
 
-def _extreme(choose, values: np.ndarray) -> float:
-    known = values[~np.isnan(values)]
-    return float(choose(known)) if known.size else float("nan")
+def _needed_friction(prediction: PathPrediction) -> np.ndarray:
+    falls = np.asarray(prediction.falling.any(axis=1))
+    return np.where(falls[:, None], np.nan, prediction.friction_utilisation)
 
 
-def _checks(rover: Rover, prediction: PathPrediction):
-    """Return for each limit its code, where it is broken (n,), and a description of waypoint i."""
-    limits, suspension = rover.limits, rover.suspension
-    tilt = tilt_of(prediction)
-    ratio = prediction.tip_over_ratio
-    loads, used = prediction.wheel_loads, prediction.friction_utilisation
-    saturation, belly = prediction.torque_saturation, prediction.belly_clearance
-
-    def worst(values: np.ndarray, i: int) -> tuple[str, float]:
-        wheel = int(np.argmax(values[i]))
-        return WHEELS[wheel], float(values[i, wheel])
-
-    def describe_tilt(i: int) -> str:
-        return f"tilt {np.degrees(tilt[i]):.1f} deg, limit {np.degrees(limits.tilt):.1f} deg"
-
-    def describe_tip_over(i: int) -> str:
-        return f"tip-over ratio {ratio[i]:.2f}, limit {limits.tip_over_ratio:.2f}"
-
-    def describe_lift(i: int) -> str:
-        name, lift = worst(-loads, i)
-        return f"{name} wheel lifts off: load {-lift:.2f} N under {prediction.policy} torques"
-
-    def describe_friction(i: int) -> str:
-        name, value = worst(used, i)
-        return (
-            f"{name} wheel slips: friction utilisation {value:.2f}, "
-            f"limit {limits.friction_utilisation:.2f}"
-        )
-
-    def describe_torque(i: int) -> str:
-        name, value = worst(saturation, i)
-        return f"{name} motor saturates: torque {value:.2f} of its limit {limits.torque_saturation:.2f}"
-
-    def describe_belly(i: int) -> str:
-        return f"belly clearance {belly[i]:.3f} m, limit {limits.belly_clearance:.3f} m"
-
-    joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle])
-    low = np.repeat([suspension.rocker_limits[0], suspension.bogie_limits[0]], 2)
-    high = np.repeat([suspension.rocker_limits[1], suspension.bogie_limits[1]], 2)
-    beyond = (joints < low - _TOLERANCE) | (joints > high + _TOLERANCE)
-
-    def describe_suspension(i: int) -> str:
-        joint = int(np.argmax(beyond[i]))
-        name = f"{SIDES[joint % 2]} {('rocker', 'bogie')[joint // 2]}"
-        return f"{name} angle {joints[i, joint]:.2f} rad, limits {low[joint]:.2f} to {high[joint]:.2f} rad"
-
-    settled = prediction.settled
-    return [
-        ("suspension", settled & beyond.any(axis=1), describe_suspension),
-        ("tilt", tilt > limits.tilt + _TOLERANCE, describe_tilt),
-        ("tip_over", ratio < limits.tip_over_ratio - _TOLERANCE, describe_tip_over),
-        ("wheel_lift", (loads < 0.0).any(axis=1), describe_lift),
-        ("friction", _above(used, limits.friction_utilisation), describe_friction),
-        ("torque", _above(saturation, limits.torque_saturation), describe_torque),
-        ("belly", belly < limits.belly_clearance - _TOLERANCE, describe_belly),
-    ]
+def _needed_torque(prediction: PathPrediction) -> np.ndarray:
+    falls = np.asarray(prediction.falling.any(axis=1))
+    return np.where(falls[:, None], np.nan, prediction.torque_saturation)
 
 
-def _above(values: np.ndarray, limit: float) -> np.ndarray:
-    return (values > limit + _TOLERANCE).any(axis=1)
+def _find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
+    n = len(prediction.poses)
+    codes, reasons = [""] * n, [""] * n
+    for i, status in enumerate(prediction.status.tolist()):
+        if status in _PLACELESS:
+            codes[i], reasons[i] = _PLACELESS[status]
+    falls = np.asarray(prediction.falling.any(axis=1))
+    for check in check_limits(rover, prediction):
+        broken = check.broken
+        if check.code in UNNEEDED_IN_A_FALL:
+            broken = broken & ~falls
+        for i in np.flatnonzero(broken).tolist():
+            if not codes[i]:
+                codes[i], reasons[i] = check.code, check.describe(i)
+    return codes, reasons

@@ -4,13 +4,12 @@ from rover_physics.kernels import kernel
 
 
 @kernel
-def solve_in_place(A, B, m):
+def solve_in_place(A, B, n, m):
     """Solve A X = B by Gaussian elimination with partial pivoting, overwriting both.
 
-    A (n, n), B (n, at least m) of which m columns are solved; on return they hold X. Returns False
-    where A is singular to working precision.
+    A (n, n) and B (n, m) are the upper left parts of the arrays; on return B holds X. Returns
+    False where A is singular to working precision.
     """
-    n = A.shape[0]
     for k in range(n):
         pivot = k
         largest = abs(A[k, k])

@@ -1,4 +1,4 @@
-"""The rocker-bogie linkage as the kernels see it: constants of a rover, and where its parts are in a configuration."""
+"""The rocker-bogie linkage as the kernels see it: its constants, and where its parts are."""
 
 from typing import NamedTuple
 
@@ -152,7 +152,7 @@ def to_map(R, origin, x, y, z, out, row):
 
 @kernel
 def rocker_sign(side):
-    """Return the sign of the right rocker's angle on `side`: the differential mirrors the rockers."""
+    """Return the sign of the rocker angle on `side`: the differential mirrors the rockers."""
     return 1.0 if side == 0 else -1.0
 
 
@@ -160,7 +160,8 @@ def rocker_sign(side):
 def place(linkage, x, y, yaw, q, placement):
     """Write where all parts are into `placement`.
 
-    q (6,): z of the body origin [m], roll, pitch, right rocker angle, right and left bogie angle [rad].
+    q (6,): z of the body origin [m], roll, pitch, right rocker angle, right and left bogie angle
+    [rad].
     """
     R, origin, wheels = placement.R, placement.origin, linkage.wheels
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
@@ -188,7 +189,7 @@ def place(linkage, x, y, yaw, q, placement):
 
 @kernel
 def place_masses(linkage, q, placement):
-    """Write where the centres of mass are into a placement already written by `place` with q (6,)."""
+    """Write where the centres of mass are into a placement written by `place` with q (6,)."""
     R, origin, coms = placement.R, placement.origin, placement.part_coms
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
     to_map(R, origin, linkage.body_com[0], linkage.body_com[1], linkage.body_com[2], coms, 0)

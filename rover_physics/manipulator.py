@@ -38,7 +38,8 @@ def body_mass_and_com(
 
     Args:
         rover: The rover.
-        joint_angles: Arm angles [rad] by joint name; joints left out stay stowed, other names are passed over.
+        joint_angles: Arm angles [rad] by joint name; joints left out stay stowed, other names
+            are passed over.
         payload: Mass at the tip [kg]; the rover file's by default.
 
     Raises:

@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PathPrediction:
-    """The rover along a path of n waypoints; NaN where it did not settle. Wheel and side order as in `names`."""
+    """The rover along a path of n waypoints; NaN where it did not settle; order as in `names`."""
 
     poses: Floats
     """(n, 3) x, y [m] and yaw [rad] of the body origin, map frame, as asked for."""
@@ -45,7 +45,7 @@ class PathPrediction:
     friction: Floats
     """(n, 6) friction coefficient mu at the contact."""
     friction_utilisation: Floats
-    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that would lift off."""
+    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that lifts off."""
     slip_ratio: Floats
     """(n, 6) i = 1 - v / (r omega) from the soil model."""
     torque_saturation: Floats
@@ -64,5 +64,13 @@ class PathPrediction:
     """(n,) time since the first waypoint at nominal speed [s]."""
     distance: Floats
     """(n,) way since the first waypoint, in the plane [m]."""
+    wheel_drop: Floats
+    """(n, 6) how far a wheel that rolled off an edge has dropped when it comes here [m]."""
+    falling: NDArray[np.bool_]
+    """(n, 6) True for wheels that roll off an edge here: no equilibrium is asked for."""
+    between: "PathPrediction | None"
+    """Poses between waypoints where contacts jump, as on faces and edges; None in itself."""
+    waypoint: NDArray[np.int64]
+    """(n,) index of the waypoint a row belongs to: its own, or the next if in between."""
     policy: str
     """Torque policy: "equal" or "optimal"."""

@@ -1,7 +1,8 @@
-"""Inverse kinematics: body pose and suspension angles with all six wheels just touching the terrain (paper 3.1).
+"""Inverse kinematics: the pose in which all six wheels just touch the terrain (paper 3.1).
 
-Six unknowns, q = (z, roll, pitch, right rocker angle, right and left bogie angle), and six conditions,
-the gaps of the wheels. This is the closure of the paper's eqs (1)-(7) in 3-D without small angles.
+Six unknowns, q = (z, roll, pitch, right rocker angle, right and left bogie angle), and six
+conditions, the gaps of the wheels. This is the closure of the paper's eqs (1)-(7) in 3-D without
+small angles.
 """
 
 import numpy as np
@@ -91,7 +92,7 @@ def _touch_all(ground, samples, placement, scope, touch):
 
 @kernel
 def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, step):
-    """Newton's method on the gaps in `touch` with a halving line search; returns the largest left."""
+    """Newton's method on the gaps with a halving line search; returns the largest left."""
     worst = 0.0
     for wheel in range(6):
         worst = max(worst, abs(touch.gap[wheel]))
@@ -122,8 +123,8 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
 def _relax(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Let the wheels fall or rise by part of their gaps until all are small.
 
-    Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to its
-    top, as it would on the ground.
+    Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
+    its top, as it would on the ground.
     """
     for _ in range(RELAXATION_STEPS):
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
@@ -180,10 +181,10 @@ def _find_step(linkage, placement, touch, ground_is, J, step):
             dz = point[i, 2] - bogie_pivots[side, 2]
             J[i, 4 + side] = _gap_rate(R[0, 1], R[1, 1], R[2, 1], dx, dy, dz, nx, ny)
         step[i, 0] = touch.gap[i]
-    return solve_in_place(J, step, 1)
+    return solve_in_place(J, step, 6, 1)
 
 
 @kernel
 def _gap_rate(ax, ay, az, dx, dy, dz, nx, ny):
-    """Return how fast the gap grows at (dx, dy, dz) from an axis (ax, ay, az) that it turns about."""
+    """Return how fast the gap at (dx, dy, dz) grows in a turn about the axis (ax, ay, az)."""
     return nx * (ay * dz - az * dy) + ny * (az * dx - ax * dz) + (ax * dy - ay * dx)

@@ -1,4 +1,4 @@
-"""Tip-over measures: the paper's ratio of angles and the force-angle measure of Papadopoulos and Rey.
+"""Tip-over measures: the paper's ratio of angles, and the force-angle measure.
 
 The support polygon of a rocker-bogie rover has four corners. A bogie turns freely, so the ground
 carries it along the line through its pivot: it supports the rover where that line meets the line

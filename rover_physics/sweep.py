@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.contact import sample_wheel
+from rover_physics.crossing import find_crossings
+from rover_physics.drops import find_drops, find_falling
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.evaluation import (
     EQUAL,
@@ -40,6 +42,7 @@ __all__ = [
 ]
 
 POLICIES = {"equal": EQUAL, "optimal": OPTIMAL}
+NONE_HELD = np.empty((0, 6, 2))
 _one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
 
 
@@ -75,11 +78,42 @@ def sweep_path(
     linkage = pack_linkage(rover, mass, com)
     samples = sample_wheel(rover, terrain.resolution)
     settings = _make_settings(rover, linkage, samples, policy, friction, max_torque)
-    columns = new_columns(len(poses))
     ground = pack_ground(terrain, rover.wheel.width)
-    with _one_sweep_at_a_time:
-        evaluate_poses(ground, linkage, samples, settings, poses, columns)
-    return _collect(poses, columns, settings, policy)
+
+    def evaluate(at: np.ndarray, held: np.ndarray | None = None) -> Columns:
+        results = new_columns(len(at))
+        with _one_sweep_at_a_time:
+            evaluate_poses(
+                ground,
+                linkage,
+                samples,
+                settings,
+                at,
+                NONE_HELD if held is None else held,
+                results,
+            )
+        return results
+
+    columns = evaluate(poses)
+    crossings = find_crossings(terrain, rover.wheel.radius, poses, columns, evaluate)
+    between = _collect(
+        crossings.poses,
+        crossings.columns,
+        settings,
+        policy,
+        wheel_drop=np.zeros((len(crossings.poses), 6)),
+        between=None,
+        waypoint=crossings.waypoint,
+    )
+    return _collect(
+        poses,
+        columns,
+        settings,
+        policy,
+        wheel_drop=find_drops(rover.wheel.radius, poses, columns, crossings),
+        between=between,
+        waypoint=np.arange(len(poses)),
+    )
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:
@@ -113,8 +147,8 @@ def _make_settings(rover, linkage, samples, policy, friction, max_torque) -> Set
     flat_angle, flat_measure = _tip_over_on_flat_ground(linkage, samples)
     if not flat_angle > 0.0:
         raise ModelError(
-            f"rover {rover.name!r} tips over on flat ground: its centre of mass with arm and payload "
-            "is outside its wheels"
+            f"rover {rover.name!r} tips over on flat ground: the centre of mass of rover, arm and "
+            "payload must be between its wheels"
         )
     top_speed = rover.wheel.max_speed * rover.wheel.radius
     return Settings(
@@ -138,9 +172,7 @@ def _tip_over_on_flat_ground(linkage: Linkage, samples) -> tuple[float, float]:
     return find_tip_over(linkage, work)
 
 
-def _collect(
-    poses: np.ndarray, columns: Columns, settings: Settings, policy: str
-) -> PathPrediction:
+def _collect(poses: np.ndarray, columns: Columns, settings: Settings, policy: str, **more):
     settled = columns.status == SETTLED
     position = np.column_stack([poses[:, :2], columns.q[:, 0]])
     position[~settled] = np.nan
@@ -177,7 +209,9 @@ def _collect(
         energy=_accumulate(work, settled),
         time=_accumulate(durations, settled),
         distance=np.concatenate([[0.0], np.cumsum(steps)]),
+        falling=find_falling(columns.contact_angle, columns.friction),
         policy=policy,
+        **more,
     )
 
 

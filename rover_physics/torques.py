@@ -1,20 +1,21 @@
-"""The torque set that needs least friction, within the five degrees that equilibrium leaves free (policy optimal).
+"""The torque set that needs least friction, in what equilibrium leaves free (policy optimal).
 
-Three questions in turn, each asked only as far as the next one needs: which set keeps all wheels on
-the ground, which of those keeps the torques within their limit, and which of those needs the least
-friction, sqrt(T^2 + S^2) <= u mu N at the smallest u. Each is the least level of a family of convex
-sets and is answered by the method of centres: go to the analytic centre of the set at a level by
-damped Newton steps on its self-concordant barrier, then lower the level towards what the centre needs.
+Three questions in turn, each asked only as far as the next one needs: which set keeps all wheels
+on the ground, which of those keeps the torques within their limit, and which of those needs the
+least friction, sqrt(T^2 + S^2) <= u mu N at the smallest u. Each is the least level of a family
+of convex sets and is answered by the method of centres: go to the analytic centre of the set at
+a level by damped Newton steps on its self-concordant barrier, then lower the level towards what
+the centre needs.
 
-Source: Boyd and El Ghaoui, "Method of centers for minimizing generalized eigenvalues", Linear Algebra
-and its Applications 188, 1993.
+Source: Boyd and El Ghaoui, "Method of centers for minimizing generalized eigenvalues", Linear
+Algebra and its Applications 188, 1993.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from rover_physics.equilibrium import FREE_TORQUES
+from rover_physics.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.kernels import allocating_kernel, kernel
 from rover_physics.linear import solve_in_place
 
@@ -34,7 +35,7 @@ class TorqueSearch(NamedTuple):
     """Work space of the search, in units of the rover's weight."""
 
     y: np.ndarray
-    """(5,) the free degrees: how much more wheels 0 to 4 pull than the common pull."""
+    """(9,) the free degrees, in the order of the columns of `Balance`."""
     N: np.ndarray
     """(6,) wheel loads at y."""
     T: np.ndarray
@@ -44,35 +45,35 @@ class TorqueSearch(NamedTuple):
     mu: np.ndarray
     """(6,) friction coefficients."""
     H: np.ndarray
-    """(5, 5) Hessian of the barrier."""
+    """(9, 9) Hessian of the barrier."""
     g: np.ndarray
-    """(5, 1) gradient of the barrier, then the Newton step."""
+    """(9, 1) gradient of the barrier, then the Newton step."""
     gradient: np.ndarray
-    """(5,) gradient, kept."""
+    """(9,) gradient, kept."""
 
 
 @allocating_kernel
 def new_torque_search():
     """Return empty work space."""
     return TorqueSearch(
-        np.zeros(FREE_TORQUES),
+        np.zeros(FREE_FORCES),
         np.empty(6),
         np.empty(6),
         np.empty(6),
         np.empty(6),
-        np.empty((FREE_TORQUES, FREE_TORQUES)),
-        np.empty((FREE_TORQUES, 1)),
-        np.empty(FREE_TORQUES),
+        np.empty((FREE_FORCES, FREE_FORCES)),
+        np.empty((FREE_FORCES, 1)),
+        np.empty(FREE_FORCES),
     )
 
 
 @kernel
-def apply_torques(balance, search):
-    """Write the wheel forces at y into the search."""
+def apply_torques(balance, free, search):
+    """Write the wheel forces at the first `free` degrees of y into the search."""
     y = search.y
     for i in range(6):
         N, T, S = balance.normal[i, 0], balance.tangential[i, 0], balance.lateral[i, 0]
-        for k in range(FREE_TORQUES):
+        for k in range(free):
             N += balance.normal[i, 1 + k] * y[k]
             T += balance.tangential[i, 1 + k] * y[k]
             S += balance.lateral[i, 1 + k] * y[k]
@@ -81,23 +82,32 @@ def apply_torques(balance, search):
 
 @kernel
 def minimise_friction(balance, max_traction, search):
-    """Find the torques, starting from equal ones, that need least friction; forces are left in `search`.
+    """Find the torques that need least friction, starting from equal ones; leave them in `search`.
 
-    `max_traction` is the largest torque over wheel radius and weight. Returns FOUND; LIFTS where no
-    torques keep all wheels on the ground, or SATURATES where none of those are within the limit:
-    then the set that comes nearest is left.
+    `max_traction` is the largest torque over wheel radius and weight. Returns FOUND; LIFTS where
+    no torques keep all wheels on the ground, or SATURATES where none of those are within the
+    limit: then the set that comes nearest is left. Lateral forces keep their equal shares where
+    that does; where it does not, friction passes them on to wheels that still hold.
     """
+    outcome = _search(balance, np.int64(FREE_TORQUES), max_traction, search)
+    if outcome != FOUND or _needed(search, FRICTION) > 1.0:
+        outcome = _search(balance, np.int64(FREE_FORCES), max_traction, search)
+    return outcome
+
+
+@kernel
+def _search(balance, free, max_traction, search):
     search.y[:] = 0.0
-    apply_torques(balance, search)
+    apply_torques(balance, free, search)
     if _needed(search, LOAD) > -LOAD_KEPT:
-        _lower(balance, LOAD, -LOAD_KEPT, np.inf, search)
+        _lower(balance, free, LOAD, -LOAD_KEPT, np.inf, search)
         if _needed(search, LOAD) > -LOAD_KEPT:
             return LIFTS
     if _needed(search, TORQUE) >= max_traction:
-        _lower(balance, TORQUE, 0.999 * max_traction, np.inf, search)
+        _lower(balance, free, TORQUE, 0.999 * max_traction, np.inf, search)
         if _needed(search, TORQUE) >= max_traction:
             return SATURATES
-    _lower(balance, FRICTION, 1e-6, max_traction, search)
+    _lower(balance, free, FRICTION, 1e-6, max_traction, search)
     return FOUND
 
 
@@ -118,17 +128,17 @@ def _needed(search, goal):
 
 
 @kernel
-def _lower(balance, goal, enough, max_traction, search):
+def _lower(balance, free, goal, enough, max_traction, search):
     """Lower the level of `goal` until it is `enough` or the smallest."""
     needed = _needed(search, goal)
     level = needed + 0.1 * abs(needed) + 1e-3
     stalled = 0
-    for lowering in range(LEVELS):
+    for _ in range(LEVELS):
         if needed <= enough or stalled == 3:
             return
-        for newton in range(NEWTON_STEPS):
-            _write_barrier(balance, goal, level, max_traction, search)
-            if not _take_newton_step(balance, search):
+        for _ in range(NEWTON_STEPS):
+            _write_barrier(balance, free, goal, level, max_traction, search)
+            if not _take_newton_step(balance, free, search):
                 break
         now = _needed(search, goal)
         stalled = stalled + 1 if level - now < PRECISION * max(abs(now), 1e-3) else 0
@@ -137,63 +147,63 @@ def _lower(balance, goal, enough, max_traction, search):
 
 
 @kernel
-def _take_newton_step(balance, search):
+def _take_newton_step(balance, free, search):
     """Take a damped Newton step on the barrier; False once at its minimum."""
-    for k in range(FREE_TORQUES):
+    for k in range(free):
         search.gradient[k] = search.g[k, 0]
-    if not solve_in_place(search.H, search.g, 1):
+    if not solve_in_place(search.H, search.g, free, 1):
         return False
     decrement = 0.0
-    for k in range(FREE_TORQUES):
+    for k in range(free):
         decrement += search.gradient[k] * search.g[k, 0]
     decrement = np.sqrt(max(decrement, 0.0))
     if not decrement > 1e-3:
         return False
-    for k in range(FREE_TORQUES):
+    for k in range(free):
         search.y[k] -= search.g[k, 0] / (1.0 + decrement)
-    apply_torques(balance, search)
+    apply_torques(balance, free, search)
     return True
 
 
 @kernel
-def _write_barrier(balance, goal, level, max_traction, search):
+def _write_barrier(balance, free, goal, level, max_traction, search):
     """Write gradient and Hessian of the barrier of the set at `level`."""
     search.H[:, :] = 0.0
     search.g[:, :] = 0.0
     traction = level if goal == TORQUE else max_traction
     for i in range(6):
         if goal == FRICTION:
-            _add_cone(balance, i, level * search.mu[i], search)
+            _add_cone(balance, free, i, level * search.mu[i], search)
         else:
             room = search.N[i] + (level if goal == LOAD else 0.0)
-            _add_log(balance.normal, i, 1.0 / room, 1.0 / (room * room), search)
+            _add_log(free, balance.normal, i, 1.0 / room, 1.0 / (room * room), search)
         if traction < np.inf:
             above, below = traction - search.T[i], traction + search.T[i]
             slope = 1.0 / below - 1.0 / above
             curvature = 1.0 / (below * below) + 1.0 / (above * above)
-            _add_log(balance.tangential, i, slope, curvature, search)
+            _add_log(free, balance.tangential, i, slope, curvature, search)
 
 
 @kernel
-def _add_log(rows, i, slope, curvature, search):
+def _add_log(free, rows, i, slope, curvature, search):
     """Add -log of a linear function's room: rows[i] is its gradient."""
-    for j in range(FREE_TORQUES):
+    for j in range(free):
         search.g[j, 0] -= slope * rows[i, 1 + j]
-        for k in range(FREE_TORQUES):
+        for k in range(free):
             search.H[j, k] += curvature * rows[i, 1 + j] * rows[i, 1 + k]
 
 
 @kernel
-def _add_cone(balance, i, mu, search):
+def _add_cone(balance, free, i, mu, search):
     """Add -log((mu N)^2 - T^2 - S^2) of wheel i."""
     n, t, s = balance.normal, balance.tangential, balance.lateral
     N, T, S = search.N[i], search.T[i], search.S[i]
     room = mu * mu * N * N - T * T - S * S
-    for j in range(FREE_TORQUES):
+    for j in range(free):
         nj, tj, sj = mu * mu * n[i, 1 + j], t[i, 1 + j], s[i, 1 + j]
         gj = 2.0 * (N * nj - T * tj - S * sj) / room
         search.g[j, 0] -= gj
-        for k in range(FREE_TORQUES):
+        for k in range(free):
             nk, tk, sk = n[i, 1 + k], t[i, 1 + k], s[i, 1 + k]
             gk = 2.0 * (mu * mu * N * nk - T * tk - S * sk) / room
             search.H[j, k] += gj * gk - 2.0 * (nj * nk - tj * tk - sj * sk) / room

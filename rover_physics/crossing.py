@@ -1,0 +1,168 @@
+"""Between waypoints: faces that wheels climb, edges they roll off, and how far they drop.
+
+Where the contact of a wheel jumps from one waypoint to the next, the poses in between decide
+whether the rover gets there. The path is halved around each jump until the jump is resolved or
+shorter than SHORTEST. What is left is a jump in height at one place: upwards the wheel is
+evaluated while it climbs the face, held at heights from foot to edge with the face as its
+contact; downwards it drops.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rover_physics.evaluation import Columns, new_columns
+from rover_physics.settling import NOT_SETTLED, SETTLED
+from rover_physics.terrain import Terrain
+
+ANGLE_JUMP = np.radians(12.0)
+"""Change of a contact angle that is looked into, where one of the two is steep."""
+STEEP = np.radians(25.0)
+HEIGHT_JUMP = 0.25
+"""Change of a wheel's height, in wheel radii, that is looked into."""
+SHORTEST = 1e-4
+"""Distance between poses [m] below which a jump counts as one place."""
+CLIMB_STAGES = np.linspace(0.0, 1.0, 6)[1:]
+"""Shares of the height of a face at which a climbing wheel is evaluated."""
+
+Evaluate = Callable[[np.ndarray, np.ndarray | None], Columns]
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Poses between waypoints, in the order of the path."""
+
+    place: np.ndarray
+    """(m,) place along the path, counted in waypoints."""
+    waypoint: np.ndarray
+    """(m,) index of the waypoint that follows."""
+    poses: np.ndarray
+    """(m, 3) x, y [m], yaw [rad]."""
+    columns: Columns
+    """Results, a row per pose."""
+
+
+def find_crossings(
+    terrain: Terrain, radius: float, poses: np.ndarray, columns: Columns, evaluate: Evaluate
+) -> Crossings:
+    """Evaluate the poses between waypoints where contacts jump.
+
+    Args:
+        terrain: The ground.
+        radius: Wheel radius [m].
+        poses: (n, 3) waypoints.
+        columns: Their results.
+        evaluate: Evaluates poses (k, 3), with heights and contact angles (k, 6, 2) of held
+            wheels or None.
+    """
+    found: list[tuple[float, np.ndarray, Columns, int]] = []
+    spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    near = np.flatnonzero((spacing <= radius) & (spacing > 0.0))
+    rows = _take(columns, np.arange(len(poses)))
+    open_ = [
+        (float(i), i + 1.0, poses[i], poses[i + 1], rows[i], rows[i + 1])
+        for i in near
+        if _jumps(rows[i], rows[i + 1], radius)
+    ]
+    while open_:
+        middles = np.array([_between(a, b) for _, _, a, b, _, _ in open_])
+        results = evaluate(middles, None)
+        halves: list[tuple] = []
+        places: list[tuple] = []
+        for k, (start, end, a, b, row_a, row_b) in enumerate(open_):
+            centre, row = 0.5 * (start + end), _take(results, [k])[0]
+            if row.status == NOT_SETTLED:
+                places.append(open_[k])
+                continue
+            found.append((centre, middles[k], row, int(np.floor(start)) + 1))
+            pieces = (
+                (start, centre, a, middles[k], row_a, row),
+                (centre, end, middles[k], b, row, row_b),
+            )
+            for piece in pieces:
+                if _jumps(piece[4], piece[5], radius):
+                    short = np.hypot(*(piece[3] - piece[2])[:2]) < SHORTEST
+                    (places if short else halves).append(piece)
+        found.extend(_climb(terrain, radius, places, evaluate))
+        open_ = halves
+    return _in_order(found)
+
+
+def _in_order(found) -> Crossings:
+    found = sorted(found, key=lambda item: item[0])
+    waypoint = np.array([item[3] for item in found], dtype=int)
+    poses = np.array([item[1] for item in found]).reshape(-1, 3)
+    place = np.array([item[0] for item in found])
+    return Crossings(place, waypoint, poses, _stack([item[2] for item in found]))
+
+
+def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    turn = (b[2] - a[2] + np.pi) % (2.0 * np.pi) - np.pi
+    return np.array([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), a[2] + 0.5 * turn])
+
+
+def _take(columns: Columns, rows) -> list[Columns]:
+    return [Columns(*(column[i] for column in columns)) for i in rows]
+
+
+def _stack(rows: list[Columns]) -> Columns:
+    if not rows:
+        return new_columns(0)
+    return Columns(*(np.stack(column) for column in zip(*rows, strict=True)))
+
+
+def _jumps(before: Columns, after: Columns, radius: float) -> bool:
+    if before.status != SETTLED or after.status != SETTLED:
+        return False
+    first, second = before.contact_angle, after.contact_angle
+    steep = np.maximum(np.abs(first), np.abs(second)) > STEEP
+    turned = steep & (np.abs(second - first) > ANGLE_JUMP)
+    lifted = np.abs(after.centres[:, 2] - before.centres[:, 2]) > HEIGHT_JUMP * radius
+    return bool((turned | lifted).any())
+
+
+def _climb(terrain: Terrain, radius: float, places, evaluate: Evaluate):
+    """Evaluate wheels held at stages between foot and edge where they jump up at one place."""
+    poses, held, keys = [], [], []
+    for start, end, a, _, row_a, row_b in places:
+        rise = row_b.centres[:, 2] - row_a.centres[:, 2]
+        climbing = rise > 0.05 * radius
+        if not climbing.any() or rise.max() <= HEIGHT_JUMP * radius:
+            continue
+        face = [_face_ahead(terrain, radius, row_a.centres[w], a[2]) for w in range(6)]
+        for stage in CLIMB_STAGES:
+            holds = np.full((6, 2), np.nan)
+            for wheel in np.flatnonzero(climbing):
+                height = row_a.centres[wheel, 2] + stage * rise[wheel]
+                holds[wheel] = height, _angle_on_face(radius, height, *face[wheel])
+            poses.append(a)
+            held.append(holds)
+            keys.append((start + stage * (end - start), int(np.floor(start)) + 1))
+    if not poses:
+        return []
+    results = evaluate(np.array(poses), np.array(held))
+    rows = _take(results, range(len(poses)))
+    return [
+        (place, pose, row, waypoint)
+        for (place, waypoint), pose, row in zip(keys, poses, rows, strict=True)
+    ]
+
+
+def _face_ahead(terrain: Terrain, radius: float, centre: np.ndarray, yaw: float):
+    """Return slope angle [rad] and edge height [m] of the ground just ahead of a wheel."""
+    step = 0.25 * terrain.resolution
+    ahead = np.arange(0.0, radius + 2.0 * terrain.resolution, step)
+    heights = terrain.elevation_at(
+        centre[0] + ahead * np.cos(yaw), centre[1] + ahead * np.sin(yaw)
+    )
+    slopes = np.diff(heights) / step
+    if not np.isfinite(slopes).any():
+        return 0.5 * np.pi, np.inf
+    return float(np.arctan(np.nanmax(slopes))), float(np.nanmax(heights))
+
+
+def _angle_on_face(radius: float, height: float, face: float, edge: float) -> float:
+    """Return the contact angle of a wheel with its centre at `height`: on the face or its edge."""
+    above = (height - edge) / radius
+    return face if above <= 0.0 else min(face, float(np.arccos(min(above, 1.0))))
