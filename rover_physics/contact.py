@@ -293,6 +293,9 @@ def _refine(ground, samples, placement, wheel, m, s, c, touch):
         turn = s * fall - c * rise
         length = np.sqrt(rise * rise + fall * fall)
         if not abs(turn) > TURN_TOLERANCE * length:
+            if gap == best_gap:
+                touch.circle_sine[wheel, m] = rise / length
+                touch.circle_cosine[wheel, m] = fall / length
             break
         if turn > 0.0:
             ahead_s, ahead_c = s, c

@@ -1,9 +1,12 @@
 """Wheels that roll off an edge: where they fall, and how far they drop.
 
-A wheel whose contact lies behind it, steeper than friction holds, rolls and slides down whatever
-the motors do. Until it lands there is no equilibrium and none is needed; how far it drops is a
-result.
+A wheel whose contact lies behind it, steeper than friction holds, rolls and slides down whatever the
+motors do. Where that is over within little more than a wheel's size it has rolled off an edge: until
+it lands there is no equilibrium and none is needed, and how far it drops is a result. Where it goes
+on for longer the wheel is on a slope too steep to stand on, and the slope is judged as such.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,43 +17,85 @@ LEAST_ANGLE = np.radians(15.0)
 """A wheel falls only from contacts at least this steep, however slippery they are."""
 MOST_FALLING = 2
 """One axle at a time may fall; more is a rover sliding down a slope."""
+LONGEST_FALL = 2.5
+"""Way of the rover, in wheel radii, from before the edge to after the landing."""
 
 
-def find_falling(contact_angle: np.ndarray, friction: np.ndarray) -> np.ndarray:
-    """Return (n, 6) True for wheels that roll off an edge.
+@dataclass(frozen=True, eq=False)
+class Falls:
+    """Where wheels fall along a path."""
 
-    Args:
-        contact_angle: (n, 6) contact angles, positive in front [rad], NaN where not settled.
-        friction: (n, 6) friction coefficients.
-    """
-    held_by_friction = np.arctan(np.nan_to_num(friction, nan=1.0))
-    falling = contact_angle < -np.maximum(held_by_friction, LEAST_ANGLE)
-    others = np.where(falling, np.nan, contact_angle)
-    count = np.maximum((~falling).sum(axis=1), 1)
-    downhill = np.nansum(others, axis=1) / count < -0.5 * held_by_friction.min(axis=1)
-    falling[downhill | (falling.sum(axis=1) > MOST_FALLING)] = False
-    return falling
+    at_waypoints: np.ndarray
+    """(n, 6) True for wheels that fall at a waypoint."""
+    between: np.ndarray
+    """(m, 6) the same between waypoints."""
+    drops: np.ndarray
+    """(n, 6) how far each wheel has dropped when it comes to a waypoint [m]."""
 
 
-def find_drops(
-    radius: float, poses: np.ndarray, columns: Columns, crossings: Crossings
-) -> np.ndarray:
-    """Return (n, 6) how far each wheel has dropped when it comes to a waypoint [m]."""
+def find_falls(radius: float, poses: np.ndarray, columns: Columns, crossings: Crossings) -> Falls:
+    """Find where wheels of `radius` [m] fall along a path with its crossings."""
     n = len(poses)
     order = np.argsort(np.concatenate([np.arange(n), crossings.place]), kind="stable")
-    between = crossings.columns
-    heights = np.concatenate([columns.centres[:, :, 2], between.centres[:, :, 2]])[order]
-    angles = np.concatenate([columns.contact_angle, between.contact_angle])[order]
-    mu = np.concatenate([columns.friction, between.friction])[order]
-    where = np.concatenate([poses, crossings.poses])[order, :2]
-    owner = np.concatenate([np.arange(n), crossings.waypoint])[order]
-    falling = find_falling(angles, mu)
-    steps = np.hypot(*np.diff(where, axis=0).T)
+
+    def in_order(at_waypoints: np.ndarray, between: np.ndarray) -> np.ndarray:
+        return np.concatenate([at_waypoints, between])[order]
+
+    extra = crossings.columns
+    steps = np.hypot(*np.diff(in_order(poses, crossings.poses)[:, :2], axis=0).T)
+    steep = _find_steep(
+        in_order(columns.contact_angle, extra.contact_angle),
+        in_order(columns.friction, extra.friction),
+    )
+    falling = _keep_short_runs(steep, np.concatenate([[0.0], np.cumsum(steps)]), radius)
+    heights = in_order(columns.centres, extra.centres)[:, :, 2]
+    owner = in_order(np.arange(n), crossings.waypoint)
+    drops = _measure_drops(radius, heights, steps, falling, owner, n)
+    unordered = np.empty_like(falling)
+    unordered[order] = falling
+    return Falls(unordered[:n], unordered[n:], drops)
+
+
+def _find_steep(contact_angle: np.ndarray, friction: np.ndarray) -> np.ndarray:
+    """Return (k, 6) True where contacts behind a wheel are steeper than friction holds.
+
+    Not where the rover as a whole goes downhill: then it slides, and no wheel falls by itself.
+    """
+    held_by_friction = np.arctan(np.nan_to_num(friction, nan=1.0))
+    steep = contact_angle < -np.maximum(held_by_friction, LEAST_ANGLE)
+    others = np.where(steep, np.nan, contact_angle)
+    count = np.maximum((~steep).sum(axis=1), 1)
+    downhill = np.nansum(others, axis=1) / count < -0.5 * held_by_friction.min(axis=1)
+    steep[downhill | (steep.sum(axis=1) > MOST_FALLING)] = False
+    return steep
+
+
+def _keep_short_runs(steep: np.ndarray, distance: np.ndarray, radius: float) -> np.ndarray:
+    """Return `steep` (k, 6) without runs that begin or end the path or are longer than a fall."""
+    kept = np.zeros_like(steep)
+    for wheel in range(6):
+        padded = np.concatenate([[False], steep[:, wheel], [False]]).astype(int)
+        starts, ends = np.flatnonzero(np.diff(padded) == 1), np.flatnonzero(np.diff(padded) == -1)
+        for start, end in zip(starts, ends, strict=True):
+            inside = start > 0 and end < len(steep)
+            if inside and distance[end] - distance[start - 1] <= LONGEST_FALL * radius:
+                kept[start:end, wheel] = True
+    return kept
+
+
+def _measure_drops(
+    radius: float,
+    heights: np.ndarray,
+    steps: np.ndarray,
+    falling: np.ndarray,
+    owner: np.ndarray,
+    n: int,
+) -> np.ndarray:
+    """Add up the descent of each wheel while it falls; a sudden descent at one place is a fall."""
     descents = np.nan_to_num(np.maximum(-np.diff(heights, axis=0), 0.0))
     sudden = (descents > HEIGHT_JUMP * radius) & (steps[:, None] <= 2.0 * SHORTEST)
     dropping = falling[:-1] | falling[1:] | sudden
-    drops = np.zeros((n, 6))
-    fallen = np.zeros(6)
+    drops, fallen = np.zeros((n, 6)), np.zeros(6)
     for k in range(len(descents)):
         fallen = np.where(dropping[k], fallen + descents[k], 0.0)
         drops[owner[k + 1]] = np.maximum(drops[owner[k + 1]], fallen)

@@ -50,14 +50,16 @@ def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
         return status
     _descend(linkage, placement, touch, q, 1.0, J, step)
     place(linkage, x, y, yaw, q, placement)
-    _touch_all(ground, samples, placement, QUICK, touch)
+    status, worst = _touch_all(ground, samples, placement, QUICK, touch)
+    if status != TOUCHING:
+        return status
     for _ in range(QUICK_ATTEMPTS):
         _newton(ground, linkage, samples, x, y, yaw, q, placement, NEAR, touch, J, step)
         status, worst = _touch_all(ground, samples, placement, FULL, touch)
         if worst <= GAP_TOLERANCE or np.isnan(worst):
             break
     for attempt in range(RECOVERIES):
-        if worst <= GAP_TOLERANCE or np.isnan(worst):
+        if worst <= GAP_TOLERANCE or np.isnan(worst) or status != TOUCHING:
             break
         _touch_all(ground, samples, placement, EXACT, touch)
         if attempt > 0:

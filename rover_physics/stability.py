@@ -3,7 +3,8 @@
 The support polygon of a rocker-bogie rover has four corners. A bogie turns freely, so the ground
 carries it along the line through its pivot: it supports the rover where that line meets the line
 between its two contacts. The other two corners are the contacts of the wheels on the rockers. A
-rover tips over an edge of this polygon exactly when the loads beyond the edge vanish.
+rover tips over an edge of this polygon when the loads beyond the edge vanish: exactly so sideways;
+up and down a slope the tractions shift it by a few degrees.
 
 Source: Papadopoulos and Rey, "A New Measure of Tipover Stability Margin for Mobile Manipulators",
 IEEE ICRA 1996: eqs for a_i, l_i, f_i*, theta_i, d_i and alpha = min theta_i |d_i| |f_i*|.

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.contact import sample_wheel
 from rover_physics.crossing import find_crossings
-from rover_physics.drops import find_drops, find_falling
+from rover_physics.drops import find_falls
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.evaluation import (
     EQUAL,
@@ -96,12 +96,14 @@ def sweep_path(
 
     columns = evaluate(poses)
     crossings = find_crossings(terrain, rover.wheel.radius, poses, columns, evaluate)
+    falls = find_falls(rover.wheel.radius, poses, columns, crossings)
     between = _collect(
         crossings.poses,
         crossings.columns,
         settings,
         policy,
         wheel_drop=np.zeros((len(crossings.poses), 6)),
+        falling=falls.between,
         between=None,
         waypoint=crossings.waypoint,
     )
@@ -110,7 +112,8 @@ def sweep_path(
         columns,
         settings,
         policy,
-        wheel_drop=find_drops(rover.wheel.radius, poses, columns, crossings),
+        wheel_drop=falls.drops,
+        falling=falls.at_waypoints,
         between=between,
         waypoint=np.arange(len(poses)),
     )
@@ -209,7 +212,6 @@ def _collect(poses: np.ndarray, columns: Columns, settings: Settings, policy: st
         energy=_accumulate(work, settled),
         time=_accumulate(durations, settled),
         distance=np.concatenate([[0.0], np.cumsum(steps)]),
-        falling=find_falling(columns.contact_angle, columns.friction),
         policy=policy,
         **more,
     )

@@ -23,10 +23,16 @@ START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)
 """Poses to ask for a plan between, x, y [m] and yaw [rad]."""
 
 RESULTS = {
-    "plan": Path, "predicted_joints": JointTrajectory, "wheel_loads": Float64MultiArray,
-    "slip_ratios": Float64MultiArray, "friction_utilisation": Float64MultiArray,
-    "torque_saturation": Float64MultiArray, "tip_over_margin": Float64MultiArray,
-    "verdict": DiagnosticArray, "markers": MarkerArray}
+    "plan": Path,
+    "predicted_joints": JointTrajectory,
+    "wheel_loads": Float64MultiArray,
+    "slip_ratios": Float64MultiArray,
+    "friction_utilisation": Float64MultiArray,
+    "torque_saturation": Float64MultiArray,
+    "tip_over_margin": Float64MultiArray,
+    "verdict": DiagnosticArray,
+    "markers": MarkerArray,
+}
 """Topics of the server's results and their types."""
 
 
@@ -39,7 +45,8 @@ class PlannerClient(Node):
         self.logs: list[str] = []
         for topic, kind in RESULTS.items():
             self.create_subscription(
-                kind, f"{SERVER}/{topic}", self.heard[topic].append, result_qos())
+                kind, f"{SERVER}/{topic}", self.heard[topic].append, result_qos()
+            )
         self.create_subscription(Log, "/rosout", lambda log: self.logs.append(log.msg), 100)
         self._plan = self.create_client(GetPlan, f"{SERVER}/can_traverse")
         self._check = self.create_client(Trigger, f"{SERVER}/check_path")
@@ -83,9 +90,13 @@ class PlannerClient(Node):
     def check_poses(self, server, poses) -> Trigger.Response:
         """Publish a path of poses (n, 3), wait until the server has it, ask about it."""
         self.send_path(poses_path(poses, "map"))
-        wait_until(lambda: server.service.path is not None
-                   and np.array_equal(server.service.path[:, :2], np.asarray(poses)[:, :2]),
-                   "the path to arrive")
+        wait_until(
+            lambda: (
+                server.service.path is not None
+                and np.array_equal(server.service.path[:, :2], np.asarray(poses)[:, :2])
+            ),
+            "the path to arrive",
+        )
         return self.check_path()
 
     def load_map(self, url: str) -> LoadMap.Response:

@@ -43,13 +43,18 @@ def cloud_of(points, names=("x", "y", "z"), kind="<f4", gap=0, height=1, row_pad
         for row in range(height):
             for column in range(width):
                 at = column * step + offset
-                raw[row, at:at + size] = values[row, column]
+                raw[row, at : at + size] = values[row, column]
     cloud = PointCloud2(height=height, width=width, point_step=step, row_step=raw.shape[1])
     cloud.is_bigendian = kind[0] == ">"
     cloud.fields = [
-        PointField(name=name, offset=gap + i * (size + gap), count=1,
-                   datatype=FLOAT32 if size == 4 else FLOAT64)
-        for i, name in enumerate(names)]
+        PointField(
+            name=name,
+            offset=gap + i * (size + gap),
+            count=1,
+            datatype=FLOAT32 if size == 4 else FLOAT64,
+        )
+        for i, name in enumerate(names)
+    ]
     cloud.data = array.array("B", raw.tobytes())
     return cloud
 
@@ -72,15 +77,18 @@ def assert_same(terrain, expected):
 @pytest.mark.parametrize("datatype", [FLOAT32, FLOAT64])
 def test_a_terrain_comes_back_as_it_was(datatype):
     terrain = rough_terrain()
-    assert_same(terrain_from_point_cloud(terrain_to_point_cloud(terrain, "map", None, datatype)),
-                terrain)
+    assert_same(
+        terrain_from_point_cloud(terrain_to_point_cloud(terrain, "map", None, datatype)), terrain
+    )
 
 
 @settings(max_examples=60, deadline=None)
 @given(
-    rows=st.integers(2, 40), columns=st.integers(2, 40),
-    millimetres=st.integers(5, 1000), corner=st.tuples(
-        st.integers(-90_000, 90_000), st.integers(-90_000, 90_000)))
+    rows=st.integers(2, 40),
+    columns=st.integers(2, 40),
+    millimetres=st.integers(5, 1000),
+    corner=st.tuples(st.integers(-90_000, 90_000), st.integers(-90_000, 90_000)),
+)
 def test_any_grid_in_millimetres_comes_back_as_it_was(rows, columns, millimetres, corner):
     origin = (corner[0] / 1000, corner[1] / 1000)
     elevation = np.arange(rows * columns, dtype=np.float64).reshape(rows, columns)
@@ -89,7 +97,8 @@ def test_any_grid_in_millimetres_comes_back_as_it_was(rows, columns, millimetres
 
 
 @pytest.mark.parametrize(
-    "name", ["erc_marsyard2021_9cm", "mer_spirit_sol1352_hazcam_3cm", "otira_tls_boulders_3cm"])
+    "name", ["erc_marsyard2021_9cm", "mer_spirit_sol1352_hazcam_3cm", "otira_tls_boulders_3cm"]
+)
 def test_a_real_map_comes_back_as_it_was(terrain_dir, name):
     terrain = load_terrain(terrain_dir / f"{name}.npz")
     back = terrain_from_point_cloud(terrain_to_point_cloud(terrain, "map"))
@@ -152,7 +161,8 @@ def test_a_turned_or_mirrored_cloud_gives_the_turned_or_mirrored_terrain():
     points = points_of(terrain)
     turned = np.column_stack([-points[:, 1], points[:, 0], points[:, 2]])
     np.testing.assert_array_equal(
-        terrain_from_point_cloud(cloud_of(turned)).elevation, terrain.elevation.T[:, ::-1])
+        terrain_from_point_cloud(cloud_of(turned)).elevation, terrain.elevation.T[:, ::-1]
+    )
     mirrored = points * [1.0, -1.0, 1.0]
     back = terrain_from_point_cloud(cloud_of(mirrored))
     np.testing.assert_array_equal(back.elevation, terrain.elevation[::-1])
@@ -175,16 +185,28 @@ def test_irregular_points_fall_on_multiples_of_the_resolution():
 
 @pytest.mark.parametrize(("cell_height", "expected"), [("max", 4.0), ("mean", 2.0)])
 def test_several_points_in_a_cell_give_their_highest_or_their_mean(cell_height, expected):
-    points = [[0.0, 0.0, 1.0], [0.01, 0.02, 4.0], [-0.02, 0.01, 1.0],
-              [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.1, 0.1, 0.0]]
+    points = [
+        [0.0, 0.0, 1.0],
+        [0.01, 0.02, 4.0],
+        [-0.02, 0.01, 1.0],
+        [0.1, 0.0, 0.0],
+        [0.0, 0.1, 0.0],
+        [0.1, 0.1, 0.0],
+    ]
     terrain = terrain_from_point_cloud(cloud_of(points), 0.1, cell_height)
     assert terrain.elevation[0, 0] == expected
     assert terrain.elevation[1, 1] == 0.0
 
 
 def test_the_lowest_friction_of_a_cell_counts():
-    points = [[0.0, 0.0, 1.0, 0.9], [0.01, 0.0, 2.0, 0.4], [0.02, 0.0, 1.5, np.nan],
-              [0.1, 0.0, 1.0, 0.8], [0.0, 0.1, 1.0, np.inf], [0.1, 0.1, 1.0, 0.7]]
+    points = [
+        [0.0, 0.0, 1.0, 0.9],
+        [0.01, 0.0, 2.0, 0.4],
+        [0.02, 0.0, 1.5, np.nan],
+        [0.1, 0.0, 1.0, 0.8],
+        [0.0, 0.1, 1.0, np.inf],
+        [0.1, 0.1, 1.0, 0.7],
+    ]
     terrain = terrain_from_point_cloud(cloud_of(points, ("x", "y", "z", "friction")), 0.1)
     np.testing.assert_allclose(terrain.friction, [[0.4, 0.8], [np.nan, 0.7]], rtol=1e-6)
 
@@ -211,9 +233,15 @@ def test_a_missing_field_is_named(missing):
         terrain_from_point_cloud(cloud_of(points_of(rough_terrain()), names))
 
 
-@pytest.mark.parametrize(("datatype", "name"), [
-    (PointField.INT16, "INT16"), (PointField.UINT8, "UINT8"), (PointField.INT32, "INT32"),
-    (99, "99")])
+@pytest.mark.parametrize(
+    ("datatype", "name"),
+    [
+        (PointField.INT16, "INT16"),
+        (PointField.UINT8, "UINT8"),
+        (PointField.INT32, "INT32"),
+        (99, "99"),
+    ],
+)
 def test_other_datatypes_are_named(datatype, name):
     cloud = cloud_of(points_of(rough_terrain()))
     cloud.fields[2].datatype = datatype
@@ -235,15 +263,18 @@ def test_a_line_of_points_is_no_terrain():
         terrain_from_point_cloud(cloud_of(line))
 
 
-@pytest.mark.parametrize(("change", "text"), [
-    ({"point_step": 0}, "point_step 0"),
-    ({"point_step": 8, "row_step": 8 * 77, "data": bytes(8 * 77)}, "field z at offset 8"),
-    ({"row_step": 100}, "row_step 100; 77 points of 12 bytes need at least 924"),
-    ({"data": bytes(923)}, "923 bytes of data; height 1 x row_step 924 needs 924"),
-    ({"data": bytes(925)}, "925 bytes of data"),
-    ({"height": 2}, "924 bytes of data; height 2 x row_step 924 needs 1848"),
-    ({"width": 2**31, "height": 2**31}, "row_step 924"),
-])
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"point_step": 0}, "point_step 0"),
+        ({"point_step": 8, "row_step": 8 * 77, "data": bytes(8 * 77)}, "field z at offset 8"),
+        ({"row_step": 100}, "row_step 100; 77 points of 12 bytes need at least 924"),
+        ({"data": bytes(923)}, "923 bytes of data; height 1 x row_step 924 needs 924"),
+        ({"data": bytes(925)}, "925 bytes of data"),
+        ({"height": 2}, "924 bytes of data; height 2 x row_step 924 needs 1848"),
+        ({"width": 2**31, "height": 2**31}, "row_step 924"),
+    ],
+)
 def test_lengths_that_disagree_are_named(change, text):
     cloud = cloud_of(points_of(rough_terrain()))
     for name, value in change.items():

@@ -258,8 +258,8 @@ def load_changes(rover: Rover, torques: list[float]) -> np.ndarray:
     assert balance_forces(linkage, work.placement, work.touch, 6, work.balance)
     pulls = np.array(torques * 2) / rover.wheel.radius
     relative = pulls[:5] - pulls[5]
-    assert work.balance.tangential[:, 1:] @ relative == pytest.approx(pulls, abs=1e-9)
-    return work.balance.normal[:, 1:] @ relative
+    assert work.balance.tangential[:, 1:6] @ relative == pytest.approx(pulls, abs=1e-9)
+    return work.balance.normal[:, 1:6] @ relative
 
 
 @pytest.mark.parametrize(
@@ -280,4 +280,3 @@ def test_in_figure_4_opposite_torques_change_loads_oppositely():
     there, back = load_changes(LSR1, [-0.2, 0.2, 0.0]), load_changes(LSR1, [0.2, -0.2, 0.0])
     assert there == pytest.approx(-back)
     assert np.abs(there).max() > 1.0
-

@@ -16,10 +16,15 @@ def test_positions_are_found_by_name_in_any_order():
     assert joint_positions(state, WANTED) == {"rocker_left": 0.1, "bogie_left": 0.2}
 
 
-@pytest.mark.parametrize("state", [
-    JointState(), JointState(name=["rocker_left"]),
-    JointState(name=["rocker_left"], velocity=[1.0], effort=[2.0]),
-    JointState(name=["camera"], position=[1.0])])
+@pytest.mark.parametrize(
+    "state",
+    [
+        JointState(),
+        JointState(name=["rocker_left"]),
+        JointState(name=["rocker_left"], velocity=[1.0], effort=[2.0]),
+        JointState(name=["camera"], position=[1.0]),
+    ],
+)
 def test_a_message_without_wanted_positions_says_nothing(state):
     assert joint_positions(state, WANTED) == {}
 
@@ -36,10 +41,14 @@ def test_other_joints_are_not_looked_at():
     assert joint_positions(state, WANTED) == {"rocker_left": 0.1}
 
 
-@pytest.mark.parametrize(("names", "positions", "text"), [
-    (["rocker_left", "bogie_left"], [0.1], "1 positions for 2 names"),
-    ([], [0.1], "1 positions for 0 names"),
-    (["rocker_left", "rocker_left"], [0.1, 0.2], "names rocker_left twice")])
+@pytest.mark.parametrize(
+    ("names", "positions", "text"),
+    [
+        (["rocker_left", "bogie_left"], [0.1], "1 positions for 2 names"),
+        ([], [0.1], "1 positions for 0 names"),
+        (["rocker_left", "rocker_left"], [0.1, 0.2], "names rocker_left twice"),
+    ],
+)
 def test_lengths_and_names_that_disagree_are_refused(names, positions, text):
     with pytest.raises(MessageError, match=text):
         joint_positions(JointState(name=names, position=positions), WANTED)

@@ -130,9 +130,7 @@ def test_arm_and_payload_are_as_a_body_with_their_mass_and_centre():
     mass, com = body_mass_and_com(LSR1, pose_of(yaw=0.5, shoulder=-0.3), payload=0.6)
     body = Part(mass, tuple(com))
     alike = replace(LSR1, manipulator=None, masses=replace(LSR1.masses, body=body))
-    arm = sweep_path(
-        LSR1, ground, POSE, joint_angles=pose_of(yaw=0.5, shoulder=-0.3), payload=0.6
-    )
+    arm = sweep_path(LSR1, ground, POSE, joint_angles=pose_of(yaw=0.5, shoulder=-0.3), payload=0.6)
     lump = sweep_path(alike, ground, POSE)
     assert arm.wheel_loads == pytest.approx(lump.wheel_loads, abs=1e-9)
     assert arm.tip_over_force_angle == pytest.approx(lump.tip_over_force_angle, abs=1e-9)

@@ -29,10 +29,13 @@ def rotation(roll, pitch, yaw):
 
 
 def rotation_of_quaternion(x, y, z, w):
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 @pytest.mark.parametrize("yaw", [-3.0, -math.pi / 2, 0.0, 0.3, 2.5])
@@ -49,7 +52,8 @@ def test_a_path_survives_a_message():
 def test_quaternions_are_the_rotations_of_the_conventions():
     for angles in np.random.default_rng(2).uniform(-1.5, 1.5, (20, 3)):
         np.testing.assert_allclose(
-            rotation_of_quaternion(*quaternions(*angles)), rotation(*angles), atol=1e-14)
+            rotation_of_quaternion(*quaternions(*angles)), rotation(*angles), atol=1e-14
+        )
 
 
 def test_the_heading_of_a_tilted_body_is_its_yaw():
@@ -58,14 +62,17 @@ def test_the_heading_of_a_tilted_body_is_its_yaw():
         assert yaw_from_quaternion(Quaternion(x=x, y=y, z=z, w=w)) == pytest.approx(yaw)
 
 
-@pytest.mark.parametrize(("quaternion", "text"), [
-    ((0.0, 0.0, 0.0, 0.0), "has length 0; it must be a quaternion of length 1"),
-    ((0.0, 0.0, 1.0, 1.0), "has length 1.41"),
-    ((0.0, 0.0, 0.0, 0.9), "has length 0.9"),
-    ((0.0, math.nan, 0.0, 1.0), "is not finite"),
-    ((0.0, 0.0, math.inf, 1.0), "is not finite"),
-    ((0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5)), "it has no heading"),
-])
+@pytest.mark.parametrize(
+    ("quaternion", "text"),
+    [
+        ((0.0, 0.0, 0.0, 0.0), "has length 0; it must be a quaternion of length 1"),
+        ((0.0, 0.0, 1.0, 1.0), "has length 1.41"),
+        ((0.0, 0.0, 0.0, 0.9), "has length 0.9"),
+        ((0.0, math.nan, 0.0, 1.0), "is not finite"),
+        ((0.0, 0.0, math.inf, 1.0), "is not finite"),
+        ((0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5)), "it has no heading"),
+    ],
+)
 def test_a_bad_quaternion_is_refused(quaternion, text):
     x, y, z, w = quaternion
     with pytest.raises(MessageError, match=text):
@@ -84,9 +91,13 @@ def test_a_position_that_is_not_finite_is_refused(x, y):
         stamped_pose_to_array(pose, "map", "goal")
 
 
-@pytest.mark.parametrize(("frame", "text"), [
-    ("odom", "goal is in frame 'odom'; it must be in 'map'"),
-    ("", "goal is without a frame_id; it must be in 'map'")])
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        ("odom", "goal is in frame 'odom'; it must be in 'map'"),
+        ("", "goal is without a frame_id; it must be in 'map'"),
+    ],
+)
 def test_another_frame_is_refused(frame, text):
     with pytest.raises(MessageError, match=text):
         stamped_pose_to_array(stamped_pose((0.0, 0.0, 0.0), frame), "map", "goal")

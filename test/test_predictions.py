@@ -51,7 +51,9 @@ def test_an_array_has_labelled_dimensions_and_its_values():
     values = np.arange(12.0).reshape(2, 6)
     message = waypoint_array(values)
     assert [(dim.label, dim.size, dim.stride) for dim in message.layout.dim] == [
-        ("waypoint", 2, 12), ("wheel", 6, 6)]
+        ("waypoint", 2, 12),
+        ("wheel", 6, 6),
+    ]
     assert isinstance(message.data, array.array) and message.data.typecode == "d"
     np.testing.assert_array_equal(array_values(message), values)
 
@@ -76,11 +78,13 @@ def test_tip_over_margins_are_the_measures_by_column(prediction):
     assert [dim.label for dim in message.layout.dim] == ["waypoint", "measure"]
     for column, measure in enumerate(MEASURES):
         np.testing.assert_array_equal(
-            array_values(message)[:, column], getattr(prediction, measure))
+            array_values(message)[:, column], getattr(prediction, measure)
+        )
 
 
 def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
-    prediction, rover,
+    prediction,
+    rover,
 ):
     message = joint_trajectory(prediction, rover.wheel.radius, "map", STAMP)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
@@ -89,7 +93,8 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
     for i in (0, 20, 49):
         point = message.points[i]
         np.testing.assert_array_equal(
-            point.positions[:4], [*prediction.rocker_angle[i], *prediction.bogie_angle[i]])
+            point.positions[:4], [*prediction.rocker_angle[i], *prediction.bogie_angle[i]]
+        )
         np.testing.assert_array_equal(point.effort[:4], 0.0)
         np.testing.assert_array_equal(point.effort[4:], prediction.torque[i])
         seconds = point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
@@ -110,8 +115,10 @@ def test_a_settled_path_has_height_and_full_orientation(prediction):
         place = pose.pose.position
         np.testing.assert_array_equal((place.x, place.y, place.z), prediction.position[i])
         turn = pose.pose.orientation
-        np.testing.assert_array_equal((turn.x, turn.y, turn.z, turn.w), quaternions(
-            prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]))
+        np.testing.assert_array_equal(
+            (turn.x, turn.y, turn.z, turn.w),
+            quaternions(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]),
+        )
         assert abs(turn.x) > 1e-3 and abs(turn.y) > 1e-3
         assert pose.header == path.header and path.header.stamp == STAMP
 
@@ -130,7 +137,8 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
     contacts = by_namespace["contact_points"].points
     assert len(contacts) == 8 * 6
     np.testing.assert_array_equal(
-        [[p.x, p.y, p.z] for p in contacts[:6]], prediction.contact_points[0])
+        [[p.x, p.y, p.z] for p in contacts[:6]], prediction.contact_points[0]
+    )
     assert all(marker.header.stamp == STAMP for marker in markers)
 
 

@@ -17,15 +17,14 @@ LSR1 = load_rover("lsr1")
 LEVEL = plane(0.0, 0.0)
 POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
-ALONG_THE_PATH = {"energy", "time", "distance"}
+GROWING = {"energy", "time", "distance"}
+ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint"}
 few = settings(max_examples=20, deadline=None)
 
 
 def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndarray:
     """Return a straight path along x."""
-    return np.column_stack(
-        [np.linspace(start, end, count), np.zeros(count), np.full(count, yaw)]
-    )
+    return np.column_stack([np.linspace(start, end, count), np.zeros(count), np.full(count, yaw)])
 
 
 def columns(prediction):
@@ -98,7 +97,7 @@ def test_a_prediction_has_a_row_per_waypoint():
     prediction = sweep_path(LSR1, LEVEL, line(-0.2, 0.2, 7))
     for name, values in columns(prediction).items():
         assert len(values) == 7, name
-    for name in ALONG_THE_PATH:
+    for name in GROWING:
         assert getattr(prediction, name).shape == (7,), name
     for name in ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation"):
         assert getattr(prediction, name).shape == (7, 6), name
@@ -215,7 +214,7 @@ def test_energy_time_and_distance_never_fall(seed, yaw):
     steps = np.linspace(-1.5, 1.5, 60)[:, None]
     poses = np.hstack([steps * [np.cos(yaw), np.sin(yaw)], np.full((60, 1), yaw)])
     prediction = sweep_path(LSR1, rocky(seed), poses)
-    for name in ALONG_THE_PATH:
+    for name in GROWING:
         values = getattr(prediction, name)
         values = values[~np.isnan(values)]
         assert values.size >= 50

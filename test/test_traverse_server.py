@@ -61,7 +61,8 @@ def test_the_results_are_those_of_the_model(mapped, client):
     expected = service.answer(np.array(START), np.array(GOAL)).candidate
     for topic, field in WHEEL_TOPICS.items():
         np.testing.assert_array_equal(
-            array_values(results[topic]), getattr(expected.prediction, field))
+            array_values(results[topic]), getattr(expected.prediction, field)
+        )
     assert float(verdict["energy"]) == pytest.approx(expected.prediction.energy[-1])
     weight = service.settings.rover.weight
     loads = array_values(results["wheel_loads"]).sum(axis=1)
@@ -88,8 +89,9 @@ def test_leaving_the_map_and_entering_unknown_ground_are_told_apart(server, clie
 
 
 def test_small_gaps_are_interpolated_on_demand(server, client):
-    client.send_terrain(make_terrain(
-        lambda x, y: np.where(np.hypot(x, y) < 0.12, np.nan, waves(x, y))))
+    client.send_terrain(
+        make_terrain(lambda x, y: np.where(np.hypot(x, y) < 0.12, np.nan, waves(x, y)))
+    )
     goal = (2.0, 0.0, 0.0)
     assert client.set_parameter("candidate_count", 1) == (True, "")
     _, verdict, _ = ask(client, start=(-2.0, 0.31, 0.0), goal=(2.0, 0.31, 0.0))
@@ -100,26 +102,37 @@ def test_small_gaps_are_interpolated_on_demand(server, client):
     assert verdict["traversable"] == "true"
 
 
-
 def test_a_padded_big_endian_cloud_in_doubles_gives_the_same_answer(mapped, client):
     expected, _, _ = ask(client)
     terrain = make_terrain(waves)
     rows, columns = terrain.elevation.shape
-    point = np.dtype({
-        "names": ["z", "x", "y"], "formats": [">f8", ">f4", ">f8"], "offsets": [2, 13, 20],
-        "itemsize": 31})
+    point = np.dtype(
+        {
+            "names": ["z", "x", "y"],
+            "formats": [">f8", ">f4", ">f8"],
+            "offsets": [2, 13, 20],
+            "itemsize": 31,
+        }
+    )
     points = np.zeros((rows, columns), point)
     points["x"], points["y"] = np.meshgrid(
-        -4.0 + 0.05 * np.arange(columns), -4.0 + 0.05 * np.arange(rows))
+        -4.0 + 0.05 * np.arange(columns), -4.0 + 0.05 * np.arange(rows)
+    )
     points["z"] = terrain.elevation
     raw = np.pad(points.view(np.uint8).reshape(rows, -1), ((0, 0), (0, 7)))
-    cloud = PointCloud2(height=rows, width=columns, point_step=31, row_step=31 * columns + 7,
-                        is_bigendian=True)
+    cloud = PointCloud2(
+        height=rows, width=columns, point_step=31, row_step=31 * columns + 7, is_bigendian=True
+    )
     cloud.header.frame_id = "map"
     cloud.fields = [
-        PointField(name=name, offset=point.fields[name][1], count=1,
-                   datatype=PointField.FLOAT32 if name == "x" else PointField.FLOAT64)
-        for name in ("z", "x", "y")]
+        PointField(
+            name=name,
+            offset=point.fields[name][1],
+            count=1,
+            datatype=PointField.FLOAT32 if name == "x" else PointField.FLOAT64,
+        )
+        for name in ("z", "x", "y")
+    ]
     cloud.data = array.array("B", raw.tobytes())
     client.logs.clear()
     client.send_cloud(cloud)
@@ -138,7 +151,8 @@ def test_a_map_published_before_the_server_came_is_heard(ros, client, start_serv
 
 def test_a_map_from_a_volatile_publisher_is_heard_once(server, client):
     publisher = client.create_publisher(
-        PointCloud2, "elevation_cloud", map_qos(DurabilityPolicy.VOLATILE))
+        PointCloud2, "elevation_cloud", map_qos(DurabilityPolicy.VOLATILE)
+    )
     wait_until(lambda: publisher.get_subscription_count() > 0, "the subscription")
     publisher.publish(terrain_to_point_cloud(make_terrain(waves), "map"))
     client.wait_for_log("map from elevation_cloud")
@@ -181,7 +195,6 @@ def test_check_path_says_why_not(mapped, client):
     assert 3.0 <= verdict["failure_pose"][0] < 4.0
 
 
-
 @pytest.mark.parametrize("form", ["{}", "file://{}", "file://localhost{}"])
 def test_a_terrain_file_is_loaded_by_path_or_url(server, client, tmp_path, form):
     terrain = make_terrain(gap)
@@ -194,7 +207,6 @@ def test_a_terrain_file_is_loaded_by_path_or_url(server, client, tmp_path, form)
     unknown = np.array(response.map.data).reshape(terrain.elevation.shape) == -1
     np.testing.assert_array_equal(unknown, np.isnan(terrain.elevation))
     np.testing.assert_array_equal(server.service.terrain.elevation, terrain.elevation)
-
 
 
 def test_the_server_starts_with_a_terrain_file(start_server, client, tmp_path):
@@ -215,7 +227,9 @@ def test_the_measured_suspension_raises_a_warning_where_it_disagrees(mapped, cli
 
 
 def test_a_real_map_is_answered_for_over_dds_as_from_its_file(
-    server, client, terrain_dir,
+    server,
+    client,
+    terrain_dir,
 ):
     terrain = load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz")
     client.send_terrain(terrain)

@@ -27,8 +27,12 @@ def assert_refused(client, code, text, question):
 
 
 def test_a_query_before_any_map_is_refused_and_answered_after_it(server, client, ros):
-    assert_refused(client, "no_map", "elevation_cloud or call ~/load_map",
-                   lambda: client.can_traverse(START, GOAL))
+    assert_refused(
+        client,
+        "no_map",
+        "elevation_cloud or call ~/load_map",
+        lambda: client.can_traverse(START, GOAL),
+    )
     client.send_terrain(make_terrain(waves))
     assert len(client.can_traverse(START, GOAL).poses) > 2
     assert ros.is_alive(server)
@@ -61,8 +65,9 @@ def bad_requests():
 
 def test_bad_requests_are_refused_and_the_node_lives_on(mapped, client, ros):
     for (start, goal, tolerance), text in bad_requests():
-        assert_refused(client, "bad_request", text,
-                       lambda s=start, g=goal, t=tolerance: client.plan(s, g, t))
+        assert_refused(
+            client, "bad_request", text, lambda s=start, g=goal, t=tolerance: client.plan(s, g, t)
+        )
         assert ros.is_alive(mapped)
     assert len(client.can_traverse(START, GOAL).poses) > 2
 
@@ -84,12 +89,18 @@ def bad_clouds():
     unknown.data = array.array("B", np.full(len(unknown.data) // 4, np.nan, "<f4").tobytes())
     scattered = changed(height=1, width=200, row_step=0)
     scattered.data = array.array(
-        "B", np.random.default_rng(1).uniform(-2, 2, (200, 3)).astype("<f4").tobytes())
+        "B", np.random.default_rng(1).uniform(-2, 2, (200, 3)).astype("<f4").tobytes()
+    )
     return {
-        "no field z": unnamed, "datatype INT32": integers, "it must be in 'map'": other_frame,
+        "no field z": unnamed,
+        "datatype INT32": integers,
+        "it must be in 'map'": other_frame,
         "cloud has no points": PointCloud2(header=changed().header),
-        "bytes of data": changed(height=99), "need at least": changed(row_step=8),
-        "has finite x, y and z": unknown, "set map_resolution": scattered}
+        "bytes of data": changed(height=99),
+        "need at least": changed(row_step=8),
+        "has finite x, y and z": unknown,
+        "set map_resolution": scattered,
+    }
 
 
 def test_bad_clouds_are_refused_and_the_last_good_map_stays(mapped, client, ros):
@@ -114,10 +125,11 @@ def test_a_bad_path_is_refused_and_not_answered_for_by_the_one_before(mapped, cl
     twisted = poses_path(np.zeros((3, 3)), "map")
     twisted.poses[1].pose.orientation.w = 0.0
     for path, text in [
-            (poses_path(np.zeros((2, 3)), "odom"), "path is in frame 'odom'"),
-            (poses_path([], "map"), "path has no poses"),
-            (poses_path([[math.nan, 0.0, 0.0]], "map"), "path pose 0 has position x nan"),
-            (twisted, "path pose 1 orientation")]:
+        (poses_path(np.zeros((2, 3)), "odom"), "path is in frame 'odom'"),
+        (poses_path([], "map"), "path has no poses"),
+        (poses_path([[math.nan, 0.0, 0.0]], "map"), "path pose 0 has position x nan"),
+        (twisted, "path pose 1 orientation"),
+    ]:
         client.send_path(path)
         client.wait_for_log(text)
         verdict = json.loads(client.check_path().message)
@@ -140,11 +152,14 @@ def test_a_terrain_that_cannot_be_loaded_is_refused_by_result(mapped, client, tm
     flat = tmp_path / "flat.npz"
     np.savez(flat, elevation=np.zeros((3, 3)), resolution=0.0, origin=(0.0, 0.0))
     for url, result in [
-            (tmp_path / "none.npz", "RESULT_MAP_DOES_NOT_EXIST"),
-            (tmp_path, "RESULT_MAP_DOES_NOT_EXIST"), ("", "RESULT_MAP_DOES_NOT_EXIST"),
-            ("https://example.org/map.npz", "RESULT_MAP_DOES_NOT_EXIST"),
-            (broken, "RESULT_INVALID_MAP_DATA"), (empty, "RESULT_INVALID_MAP_DATA"),
-            (flat, "RESULT_INVALID_MAP_DATA")]:
+        (tmp_path / "none.npz", "RESULT_MAP_DOES_NOT_EXIST"),
+        (tmp_path, "RESULT_MAP_DOES_NOT_EXIST"),
+        ("", "RESULT_MAP_DOES_NOT_EXIST"),
+        ("https://example.org/map.npz", "RESULT_MAP_DOES_NOT_EXIST"),
+        (broken, "RESULT_INVALID_MAP_DATA"),
+        (empty, "RESULT_INVALID_MAP_DATA"),
+        (flat, "RESULT_INVALID_MAP_DATA"),
+    ]:
         response = client.load_map(url)
         assert response.result == getattr(response, result), url
         assert mapped.service.terrain is before and ros.is_alive(mapped)
@@ -164,10 +179,15 @@ def test_bad_joint_states_leave_the_angles_known_before(mapped, client, ros):
 
 def test_parameters_take_effect_and_bad_ones_are_refused_with_reasons(mapped, client, ros):
     for name, value, text in [
-            ("friction", math.nan, "nan"), ("friction", -1.0, "friction"),
-            ("friction", "rough", "Wrong parameter type"), ("policy", "fair", "one of equal"),
-            ("rover", "lsr9", "lsr9"), ("map_frame", "odom", "read-only"),
-            ("no_such", 1.0, "undeclared"), ("", 1.0, "has no name")]:
+        ("friction", math.nan, "nan"),
+        ("friction", -1.0, "friction"),
+        ("friction", "rough", "Wrong parameter type"),
+        ("policy", "fair", "one of equal"),
+        ("rover", "lsr9", "lsr9"),
+        ("map_frame", "odom", "read-only"),
+        ("no_such", 1.0, "undeclared"),
+        ("", 1.0, "has no name"),
+    ]:
         accepted, reason = client.set_parameter(name, value)
         assert not accepted and reason and text in reason, (name, value, reason)
         assert ros.is_alive(mapped)
@@ -186,7 +206,11 @@ def test_a_fault_of_the_program_is_a_refusal_and_not_the_end(mapped, client, ros
         raise ZeroDivisionError("a fault")
 
     monkeypatch.setattr(mapped.service, "answer", fail)
-    assert_refused(client, "internal_error", "ZeroDivisionError: a fault",
-                   lambda: client.can_traverse(START, GOAL))
+    assert_refused(
+        client,
+        "internal_error",
+        "ZeroDivisionError: a fault",
+        lambda: client.can_traverse(START, GOAL),
+    )
     monkeypatch.undo()
     assert client.can_traverse(START, GOAL).poses and ros.is_alive(mapped)

@@ -22,7 +22,10 @@ def start_process():
         process = subprocess.Popen(
             [sys.executable, "-m", "rover_planner.traverse_server", "--ros-args", *arguments],
             env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "PYTHONUNBUFFERED": "1"},
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
         processes.append(process)
         return process
 
@@ -60,15 +63,22 @@ def test_another_process_gets_an_answer(start_process, tmp_path):
         process = start_process(f"terrain_file:={tmp_path / 'flat.npz'}")
         read_until(process, "ready for rover lsr1")
         plan, results = client.next_results(
-            lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+            lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+        )
         assert len(plan.poses) == 11 and len(results["plan"].poses) == 11
     finally:
         run.close()
 
 
-@pytest.mark.parametrize(("parameter", "text"), [
-    ("friction:=.nan", "friction"), ("rover:=lsr9", "lsr9"), ("policy:=fair", "fair"),
-    ("candidate_count:=9.5", "candidate_count")])
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        ("friction:=.nan", "friction"),
+        ("rover:=lsr9", "lsr9"),
+        ("policy:=fair", "fair"),
+        ("candidate_count:=9.5", "candidate_count"),
+    ],
+)
 def test_a_wrong_parameter_ends_it_with_one_line(start_process, parameter, text):
     process = start_process(parameter)
     output, _ = process.communicate(timeout=180.0)

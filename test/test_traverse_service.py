@@ -84,10 +84,16 @@ def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
 
 def test_the_nearest_ring_that_can_be_reached_is_taken():
     wall = make_terrain(wall_at(2.0))
-    offset = make_service(wall).answer(
-        (-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=0.6).verdict["goal_offset"]
-    wide = make_service(wall).answer(
-        (-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=3.0).verdict["goal_offset"]
+    offset = (
+        make_service(wall)
+        .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=0.6)
+        .verdict["goal_offset"]
+    )
+    wide = (
+        make_service(wall)
+        .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=3.0)
+        .verdict["goal_offset"]
+    )
     assert 0.3 < offset <= 0.6 and offset <= wide <= 1.0
 
 
@@ -127,9 +133,13 @@ def test_the_measured_suspension_is_compared_with_the_predicted_one():
     free = service.check_last_path()
     assert "suspension_mismatch" not in free.verdict
     prediction = free.candidate.prediction
-    predicted = dict(zip(
-        SUSPENSION_JOINTS, [*prediction.rocker_angle[0], *prediction.bogie_angle[0]],
-        strict=True))
+    predicted = dict(
+        zip(
+            SUSPENSION_JOINTS,
+            [*prediction.rocker_angle[0], *prediction.bogie_angle[0]],
+            strict=True,
+        )
+    )
     assert abs(predicted["rocker_left"]) > 0.001
     service.take_joints(predicted)
     verdict = service.check_last_path().verdict
@@ -150,7 +160,8 @@ def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     first = manipulator.joints[0]
     service.take_joints({first: stretched[first]})
     np.testing.assert_array_equal(
-        service.check_last_path().candidate.prediction.wheel_loads, stowed)
+        service.check_last_path().candidate.prediction.wheel_loads, stowed
+    )
     service.take_joints(stretched)
     moved = service.check_last_path().candidate.prediction.wheel_loads
     assert np.abs(moved - stowed).max() > 0.05
@@ -175,8 +186,10 @@ def test_terrain_and_request_turned_together_give_the_same_answer():
     for name in ("energy", "min_tip_over_ratio", "max_friction_utilisation"):
         assert sideways.verdict[name] == pytest.approx(straight.verdict[name], abs=1e-6)
     np.testing.assert_allclose(
-        sideways.candidate.prediction.wheel_loads, straight.candidate.prediction.wheel_loads,
-        atol=1e-5)
+        sideways.candidate.prediction.wheel_loads,
+        straight.candidate.prediction.wheel_loads,
+        atol=1e-5,
+    )
 
 
 def test_mirrored_terrain_and_request_swap_right_and_left():
@@ -190,8 +203,10 @@ def test_mirrored_terrain_and_request_swap_right_and_left():
         return service.check_last_path().candidate.prediction.wheel_loads
 
     np.testing.assert_allclose(
-        loads(mirrored, poses * [1, -1, -1])[:, [3, 4, 5, 0, 1, 2]], loads(terrain, poses),
-        atol=1e-5)
+        loads(mirrored, poses * [1, -1, -1])[:, [3, 4, 5, 0, 1, 2]],
+        loads(terrain, poses),
+        atol=1e-5,
+    )
 
 
 def test_densify_keeps_the_given_poses_and_the_spacing():
@@ -210,19 +225,36 @@ def test_densify_refuses_an_endless_path():
         densify(np.array([[0.0, 0.0, 0.0], [1e300, 0.0, 0.0]]), 0.02)
 
 
-PHYSICAL = {"tilt", "tip_over", "wheel_lift", "friction", "torque", "belly", "suspension",
-            "wheel_drop", "not_settled", "no_equilibrium"}
+PHYSICAL = {
+    "tilt",
+    "tip_over",
+    "wheel_lift",
+    "friction",
+    "torque",
+    "belly",
+    "suspension",
+    "wheel_drop",
+    "not_settled",
+    "no_equilibrium",
+}
 
 
-@pytest.mark.parametrize(("start", "goal", "codes"), [
-    ((-4.0, 0.0, 0.0), (6.0, 1.0, 0.0), {""}),
-    ((-4.0, 8.0, 0.0), (2.0, 8.0, 0.0), {""}),
-    ((-3.5, -7.0, 0.0), (3.0, -7.0, 0.0), PHYSICAL),
-    ((4.0, 4.0, 0.8), (15.0, 12.0, 0.8), PHYSICAL),
-    ((18.0, 0.0, 0.0), (24.0, 0.0, 0.0), {"off_map"})],
-    ids=["plain", "another plain", "crater rim", "hill", "off the map"])
+@pytest.mark.parametrize(
+    ("start", "goal", "codes"),
+    [
+        ((-4.0, 0.0, 0.0), (6.0, 1.0, 0.0), {""}),
+        ((-4.0, 8.0, 0.0), (2.0, 8.0, 0.0), {""}),
+        ((-3.5, -7.0, 0.0), (3.0, -7.0, 0.0), PHYSICAL),
+        ((4.0, 4.0, 0.8), (15.0, 12.0, 0.8), PHYSICAL),
+        ((18.0, 0.0, 0.0), (24.0, 0.0, 0.0), {"off_map"}),
+    ],
+    ids=["plain", "another plain", "crater rim", "hill", "off the map"],
+)
 def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
-    terrain_dir, start, goal, codes,
+    terrain_dir,
+    start,
+    goal,
+    codes,
 ):
     service = make_service(load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz"))
     verdict = service.answer(start, goal).verdict
