@@ -1,9 +1,9 @@
 """Wheels that roll off an edge: where they fall, and how far they drop.
 
-A wheel whose contact lies behind it, steeper than friction holds, rolls and slides down whatever the
-motors do. Where that is over within little more than a wheel's size it has rolled off an edge: until
-it lands there is no equilibrium and none is needed, and how far it drops is a result. Where it goes
-on for longer the wheel is on a slope too steep to stand on, and the slope is judged as such.
+A wheel whose contact lies behind it, steeper than friction holds, rolls and slides down whatever
+the motors do. Where that is over within little more than a wheel's size it has rolled off an edge:
+until it lands there is no equilibrium and none is needed, and how far it drops is a result. Where
+it goes on for longer the wheel is on a slope too steep to stand on, and the slope is judged.
 """
 
 from dataclasses import dataclass
