@@ -78,7 +78,7 @@ def sweep_path(
     linkage = pack_linkage(rover, mass, com)
     samples = sample_wheel(rover, terrain.resolution)
     settings = _make_settings(rover, linkage, samples, policy, friction, max_torque)
-    ground = pack_ground(terrain, rover.wheel.width)
+    ground = pack_ground(terrain, rover.wheel.radius, rover.wheel.width)
 
     def evaluate(at: np.ndarray, held: np.ndarray | None = None) -> Columns:
         results = new_columns(len(at))
