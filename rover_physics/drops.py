@@ -35,8 +35,17 @@ class Falls:
     """(n, 6) how far each wheel has dropped when it comes to a waypoint [m]."""
 
 
-def find_falls(radius: float, poses: np.ndarray, columns: Columns, crossings: Crossings) -> Falls:
-    """Find where wheels of `radius` [m] fall along a path with its crossings."""
+def find_falls(
+    radius: float,
+    poses: np.ndarray,
+    columns: Columns,
+    crossings: Crossings,
+    direction: float = 1.0,
+) -> Falls:
+    """Find where wheels of `radius` [m] fall along a path with its crossings.
+
+    `direction` is 1 where the rover drives forwards along the path, -1 backwards.
+    """
     n = len(poses)
     order = np.argsort(np.concatenate([np.arange(n), crossings.place]), kind="stable")
 
@@ -46,7 +55,7 @@ def find_falls(radius: float, poses: np.ndarray, columns: Columns, crossings: Cr
     extra = crossings.columns
     steps = np.hypot(*np.diff(in_order(poses, crossings.poses)[:, :2], axis=0).T)
     distance = np.concatenate([[0.0], np.cumsum(steps)])
-    angle = in_order(columns.contact_angle, extra.contact_angle)
+    angle = direction * in_order(columns.contact_angle, extra.contact_angle)
     steep = _find_steep(angle, in_order(columns.friction, extra.friction))
     falling = _keep_short_runs(steep, distance, radius)
     rolling_over = _extend_to_edges(falling, angle, distance, radius)
