@@ -20,12 +20,13 @@ CODES = (
     "tilt",
     "tip_over",
     "wheel_lift",
+    "sinkage",
     "friction",
     "torque",
     "wheel_drop",
     "belly",
 )
-UNNEEDED_IN_A_FALL = ("wheel_lift", "friction", "torque")
+UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Limits that do not count while a wheel rolls off an edge."""
 _PLACELESS = {
     OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),

@@ -1,8 +1,9 @@
-"""Kinematics of the paper's three-joint arm: what it does to the centre of mass of the body."""
+"""The paper's three-joint arm: its kinematics, and what it and its tool do to the body."""
 
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rover_physics.errors import ModelError
 from rover_physics.rover import Manipulator, Rover
@@ -60,6 +61,47 @@ def body_mass_and_com(
     for k, link_mass in enumerate(arm.link_masses):
         moment = moment + link_mass * (now[k] + now[k + 1] - stowed[k] - stowed[k + 1]) / 2.0
     return mass + load, (moment + load * now[3]) / (mass + load)
+
+
+def pack_tool(
+    rover: Rover,
+    joint_angles: Mapping[str, float] | None = None,
+    force: ArrayLike | None = None,
+    moment: ArrayLike | None = None,
+) -> np.ndarray:
+    """Return where the arm's tip is and what acts on it: (3, 3), rows tip, force and moment.
+
+    Args:
+        rover: The rover.
+        joint_angles: Arm angles [rad] by joint name, as in `body_mass_and_com`.
+        force: (3,) force [N] that the surroundings exert on the tool, body frame.
+        moment: (3,) moment [N m] that they exert on it about the tip, body frame.
+
+    Raises:
+        ModelError: Force or moment of wrong shape, not finite, or without an arm.
+    """
+    tool = np.zeros((3, 3))
+    for row, (name, given) in enumerate((("tool_force", force), ("tool_moment", moment)), start=1):
+        if given is not None:
+            tool[row] = _as_vector(name, given)
+            if rover.manipulator is None:
+                raise ModelError(
+                    f"{name} {tool[row].tolist()}, but rover {rover.name!r} has no manipulator"
+                )
+    if rover.manipulator is not None:
+        angles = arm_angles(rover.manipulator, joint_angles)
+        tool[0] = link_points(rover.manipulator, angles)[3]
+    return tool
+
+
+def _as_vector(name: str, given: ArrayLike) -> np.ndarray:
+    try:
+        vector = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"{name} is {given!r}; it must be three numbers x, y, z") from error
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ModelError(f"{name} is {given!r}; it must be three finite numbers x, y, z")
+    return vector
 
 
 def arm_angles(arm: Manipulator, joint_angles: Mapping[str, float] | None) -> np.ndarray:

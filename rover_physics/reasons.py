@@ -8,6 +8,7 @@ import numpy as np
 from rover_physics.names import SIDES, WHEELS
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover
+from rover_physics.soil import MODERATE_SINKAGE
 
 TOLERANCE = 1e-9
 
@@ -43,6 +44,7 @@ def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
         _check_tilt(rover, prediction),
         _check_tip_over(rover, prediction),
         _check_wheel_lift(prediction),
+        _check_sinkage(rover, prediction),
         _check_friction(rover, prediction),
         _check_torque(rover, prediction),
         _check_wheel_drop(rover, prediction),
@@ -95,6 +97,12 @@ def _check_wheel_lift(prediction: PathPrediction) -> Check:
         )
 
     return Check("wheel_lift", np.any(loads < 0.0, axis=1), describe)
+
+
+def _check_sinkage(rover: Rover, prediction: PathPrediction) -> Check:
+    limit = MODERATE_SINKAGE * 2.0 * rover.wheel.radius
+    words = "wheel sinks deeper than the soil model holds: sinkage"
+    return _check_wheels("sinkage", prediction.sinkage, limit, words, 3, " m")
 
 
 def _check_friction(rover: Rover, prediction: PathPrediction) -> Check:
