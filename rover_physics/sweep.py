@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 NONE_HELD = np.empty((0, 6, 2))
-_one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
+one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
 
 
 def sweep_path(
@@ -90,7 +90,7 @@ def sweep_path(
 
     def evaluate(at: np.ndarray, held: np.ndarray | None = None) -> Columns:
         results = new_columns(len(at))
-        with _one_sweep_at_a_time:
+        with one_sweep_at_a_time:
             evaluate_poses(*setup, at, NONE_HELD if held is None else held, results)
         return results
 
