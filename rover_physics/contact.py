@@ -19,9 +19,11 @@ TOUCHING, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
 COARSE, QUICK, NEAR, FULL, EXACT = np.arange(5)
 """Scopes of `find_touch`. Not plain integers, or each value would be compiled apart."""
 REFINEMENTS = 9
+GAP_PRECISION = 1e-5
+"""How far the gap of a circle may be from its smallest, in wheel radii."""
 TURN_TOLERANCE = 1e-4
 """Error of the contact angle [rad] at which the search along the circle stops."""
-CIRCLE_REACH = 2e-2
+CIRCLE_REACH = 1.5e-2
 """How far above the nearest circle, in wheel radii, another one is looked at more closely."""
 EXACT_REACH = 0.5
 """The same for samples of an exact search: beside a face much can lie between two samples."""
@@ -171,16 +173,22 @@ def _hold(placement, wheel, touch):
 def _refine_circles(ground, samples, placement, wheel, all_circles, touch):
     """Look closer at the nearest sample of the nearest circle, or of all that may be nearest."""
     best = touch.nearest[wheel]
+    s, c = touch.circle_sine[wheel, best], touch.circle_cosine[wheel, best]
+    _refine(ground, samples, placement, wheel, best, s, c, touch)
+    if not all_circles:
+        return
+    best_s, best_c = touch.circle_sine[wheel, best], touch.circle_cosine[wheel, best]
     reach = touch.circle_gap[wheel, best] + CIRCLE_REACH * samples.radius
     for m in range(samples.laterals.size):
-        if m == best or (all_circles and touch.circle_gap[wheel, m] <= reach):
+        if m != best and touch.circle_gap[wheel, m] <= reach:
             s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+            if abs(s * best_c - c * best_s) < samples.spacing_sine:
+                s, c = best_s, best_c
             _refine(ground, samples, placement, wheel, m, s, c, touch)
-            if all_circles and touch.second_gap[m] <= reach:
-                k = touch.second_row[m]
-                s, c = samples.sines[k], samples.cosines[k]
-                _refine(ground, samples, placement, wheel, m, s, c, touch)
-    for m in range(samples.laterals.size):
+        if touch.second_gap[m] <= reach:
+            k = touch.second_row[m]
+            s, c = samples.sines[k], samples.cosines[k]
+            _refine(ground, samples, placement, wheel, m, s, c, touch)
         if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
             touch.nearest[wheel] = m
 
@@ -190,7 +198,8 @@ def _scan(ground, samples, placement, wheel, scope, touch):
     """Write the nearest sample of each circle into `touch`; return the status of the worst sample.
 
     Rows of samples at one angle are passed over where even the highest ground around stays farther
-    below them than the nearest sample by PRUNING_MARGIN.
+    below them than the nearest sample by PRUNING_MARGIN; all higher rows are where that holds for
+    the highest ground around the wheel.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     elevation, ceiling, scale = ground.elevation, ground.ceiling, ground.inverse_resolution
@@ -215,13 +224,18 @@ def _scan(ground, samples, placement, wheel, scope, touch):
         circle_gap[wheel, m] = np.inf
         second_gap[m] = np.inf
         first_row[m] = -2
+    roof = np.inf
+    if is_cell_on_map(elevation, centre_x, centre_y):
+        roof = ground.wheel_ceiling[int(centre_y + 0.5), int(centre_x + 0.5)]
     best, best_m, status = np.inf, first_m, TOUCHING
     rows = (sines.size - 1) // stride + 1
     for visit in range(rows):
         k = stride * (rows // 2 + ((visit + 1) // 2) * (1 - 2 * (visit % 2)))
+        row_z = centre_z - radius * cosines[k] * up[2]
+        if row_z - rim - roof > best + margin:
+            break
         row_x = centre_x + scale * radius * (sines[k] * forward[0] - cosines[k] * up[0])
         row_y = centre_y + scale * radius * (sines[k] * forward[1] - cosines[k] * up[1])
-        row_z = centre_z - radius * cosines[k] * up[2]
         if is_cell_on_map(elevation, row_x, row_y):
             highest = ceiling[int(row_y + 0.5), int(row_x + 0.5)]
             if row_z - rim - highest > best + margin:
@@ -257,9 +271,10 @@ def _scan(ground, samples, placement, wheel, scope, touch):
 def _refine(ground, samples, placement, wheel, m, s, c, touch):
     """Find the angle on circle m, near (s, c), where the gap is smallest; write it into `touch`.
 
-    On a plane the circle touches in the direction of the plane's normal, so each trial looks in
-    the direction of the normal found last; where that leaves the bracket, as on an edge, it is
-    halved. What `touch` holds for the circle is kept where it is lower, unless it is the start
+    On a plane the circle touches in the direction of the plane's normal, so the first trials look
+    in the direction of the normal found last. On an edge that leads to and fro: then the next
+    trial is where the tangents of the gap from both sides meet, which is also where the gap can't
+    be smaller. What `touch` holds for the circle is kept where it is lower, unless it is the start
     (s, c) itself.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
@@ -277,6 +292,7 @@ def _refine(ground, samples, placement, wheel, m, s, c, touch):
         back_s, back_c = -1.0, 0.0
     if ahead_c < 0.0:
         ahead_s, ahead_c = 1.0, 0.0
+    back_gap, ahead_gap, back_rate, ahead_rate = np.nan, np.nan, np.nan, np.nan
     for trial in range(REFINEMENTS):
         height, slope_x, slope_y = look_up(
             ground,
@@ -298,12 +314,20 @@ def _refine(ground, samples, placement, wheel, m, s, c, touch):
                 touch.circle_cosine[wheel, m] = fall / length
             break
         if turn > 0.0:
-            ahead_s, ahead_c = s, c
+            ahead_s, ahead_c, ahead_gap, ahead_rate = s, c, gap, radius * turn
         else:
-            back_s, back_c = s, c
+            back_s, back_c, back_gap, back_rate = s, c, gap, radius * turn
+        between = ahead_s * back_c - ahead_c * back_s
+        share = (ahead_gap - back_gap - ahead_rate * between) / (
+            (back_rate - ahead_rate) * between
+        )
+        if best_gap - (back_gap + back_rate * share * between) < GAP_PRECISION * radius:
+            break
         s, c = rise / length, fall / length
-        if not (s * back_c > c * back_s and s * ahead_c < c * ahead_s) or trial > 2:
-            s, c = back_s + ahead_s, back_c + ahead_c
+        inside = s * back_c > c * back_s and s * ahead_c < c * ahead_s
+        if trial > 1 or not inside:
+            share = min(max(share, 0.05), 0.95) if share == share else 0.5
+            s, c = back_s + share * (ahead_s - back_s), back_c + share * (ahead_c - back_c)
             length = np.sqrt(s * s + c * c)
             s, c = s / length, c / length
 

@@ -58,12 +58,11 @@ def find_crossings(
     """
     found: list[tuple[float, np.ndarray, Columns, int]] = []
     spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    near = np.flatnonzero((spacing <= radius) & (spacing > 0.0))
-    rows = _take(columns, np.arange(len(poses)))
+    on_a_path = (spacing <= radius) & (spacing > 0.0)
+    jumps = _find_jumps(columns.status, columns.contact_angle, columns.centres[:, :, 2], radius)
     open_ = [
-        (float(i), i + 1.0, poses[i], poses[i + 1], rows[i], rows[i + 1])
-        for i in near
-        if _jumps(rows[i], rows[i + 1], radius)
+        (float(i), i + 1.0, poses[i], poses[i + 1], *_take(columns, [i, i + 1]))
+        for i in np.flatnonzero(on_a_path & jumps)
     ]
     while open_:
         middles = np.array([_between(a, b) for _, _, a, b, _, _ in open_])
@@ -112,14 +111,22 @@ def _stack(rows: list[Columns]) -> Columns:
     return Columns(*(np.stack(column) for column in zip(*rows, strict=True)))
 
 
+def _find_jumps(
+    status: np.ndarray, angle: np.ndarray, height: np.ndarray, radius: float
+) -> np.ndarray:
+    """Return (k - 1,) True between rows where a contact jumps; angle, height (k, 6) [rad], [m]."""
+    settled = status == SETTLED
+    steep = np.maximum(np.abs(angle[1:]), np.abs(angle[:-1])) > STEEP
+    turned = steep & (np.abs(np.diff(angle, axis=0)) > ANGLE_JUMP)
+    lifted = np.abs(np.diff(height, axis=0)) > HEIGHT_JUMP * radius
+    return settled[1:] & settled[:-1] & np.any(turned | lifted, axis=1)
+
+
 def _jumps(before: Columns, after: Columns, radius: float) -> bool:
-    if before.status != SETTLED or after.status != SETTLED:
-        return False
-    first, second = before.contact_angle, after.contact_angle
-    steep = np.maximum(np.abs(first), np.abs(second)) > STEEP
-    turned = steep & (np.abs(second - first) > ANGLE_JUMP)
-    lifted = np.abs(after.centres[:, 2] - before.centres[:, 2]) > HEIGHT_JUMP * radius
-    return bool((turned | lifted).any())
+    status = np.array([before.status, after.status])
+    angle = np.array([before.contact_angle, after.contact_angle])
+    height = np.array([before.centres[:, 2], after.centres[:, 2]])
+    return bool(_find_jumps(status, angle, height, radius)[0])
 
 
 def _climb(terrain: Terrain, radius: float, places, evaluate: Evaluate):

@@ -10,6 +10,9 @@ from scipy.ndimage import maximum_filter
 from rover_physics.kernels import kernel
 from rover_physics.terrain import Terrain
 
+BLOCK = 4
+"""Cells along the side of a block."""
+
 
 class Ground(NamedTuple):
     """A terrain as the kernels read it."""
@@ -19,6 +22,10 @@ class Ground(NamedTuple):
     ceiling: np.ndarray
     """(ny, nx) highest elevation around each cell, as far as half a wheel and its cells reach
     [m]; infinite beside unknown cells and the map's edge."""
+    wheel_ceiling: np.ndarray
+    """(ny, nx) the same as far as a wheel reaches in any heading [m]."""
+    block_ceiling: np.ndarray
+    """Highest elevation of each block of BLOCK x BLOCK cells [m], -inf where none is known."""
     friction: np.ndarray
     """(ny, nx) friction coefficient, NaN where the rover's own holds; (0, 0) without a layer."""
     soil: np.ndarray
@@ -32,26 +39,37 @@ class Ground(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def pack_ground(terrain: Terrain, wheel_width: float) -> Ground:
-    """Return `terrain` in the form the kernels read for wheels of `wheel_width` [m]."""
+def pack_ground(terrain: Terrain, wheel_radius: float, wheel_width: float) -> Ground:
+    """Return `terrain` in the form the kernels read for wheels of a radius and width [m]."""
     elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
     friction = np.empty((0, 0)) if terrain.friction is None else terrain.friction
-    reach = int(np.ceil(0.5 * wheel_width / terrain.resolution + 1.5))
-    ceiling = maximum_filter(
-        np.where(np.isnan(elevation), np.inf, elevation),
-        size=2 * reach + 1,
-        mode="constant",
-        cval=np.inf,
-    )
+    half_width = 0.5 * wheel_width
     return Ground(
         elevation,
-        ceiling,
+        _find_ceiling(terrain, half_width),
+        _find_ceiling(terrain, float(np.hypot(wheel_radius, half_width))),
+        _find_block_ceiling(elevation),
         np.ascontiguousarray(friction, dtype=np.float64),
         np.empty((0, 0), np.int32) if terrain.soil is None else terrain.soil + np.int32(1),
         float(terrain.origin[0]),
         float(terrain.origin[1]),
         1.0 / float(terrain.resolution),
     )
+
+
+def _find_ceiling(terrain: Terrain, reach: float) -> np.ndarray:
+    """Return the highest elevation that cells within `reach` [m] of each cell touch."""
+    cells = int(np.ceil(reach / terrain.resolution + 1.5))
+    unknown_is_high = np.where(np.isnan(terrain.elevation), np.inf, terrain.elevation)
+    return maximum_filter(unknown_is_high, size=2 * cells + 1, mode="constant", cval=np.inf)
+
+
+def _find_block_ceiling(elevation: np.ndarray) -> np.ndarray:
+    ny, nx = elevation.shape
+    rows, columns = -(-ny // BLOCK), -(-nx // BLOCK)
+    padded = np.full((rows * BLOCK, columns * BLOCK), -np.inf)
+    padded[:ny, :nx] = np.where(np.isnan(elevation), -np.inf, elevation)
+    return padded.reshape(rows, BLOCK, columns, BLOCK).max(axis=(1, 3))
 
 
 @kernel

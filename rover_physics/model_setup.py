@@ -76,7 +76,7 @@ def set_up(
         flat_angle=flat_angle,
         flat_measure=flat_measure,
     )
-    ground = pack_ground(terrain, rover.wheel.width)
+    ground = pack_ground(terrain, rover.wheel.radius, rover.wheel.width)
     return Setup(ground, pack_linkage(rover, mass, com, tool), samples, settings)
 
 

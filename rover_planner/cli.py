@@ -1,4 +1,4 @@
-"""The command `rover_planner`: predict a path, make a terrain, run the demo."""
+"""The command `rover_planner`: predict a path, make a terrain, run the demo, draw Figure 4."""
 
 import sys
 from collections.abc import Sequence
@@ -116,6 +116,24 @@ def demo(
     from rover_planner.demo import run_demo
 
     run_demo(map_file, out, rover, seed)
+
+
+@app.command()
+def figure4(
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="Picture to write, .png; is overwritten.")
+    ] = Path("figure4.png"),
+    rover: Annotated[str, typer.Option(help="Preset name or rover file.")] = "lsr1",
+) -> None:
+    """Draw Figure 4 of the paper: how the torque of one wheel changes the loads of all."""
+    from rover_physics.rover import load_rover
+    from rover_planner.figure4 import draw_figure4
+    from rover_planner.progress import show_progress
+
+    model = load_rover(rover)
+    with show_progress() as progress:
+        progress(f"draw {out.name} (the first run compiles the model)")
+        draw_figure4(out, model)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

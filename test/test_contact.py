@@ -38,7 +38,7 @@ class WheelOn:
         q = np.array([0.0, roll, pitch, 0.0, 0.0, 0.0])
         place(LINKAGE, 0.0, 0.0, yaw, q, self.placement)
         self.placement.centres[0] = centre
-        packed = pack_ground(ground, WIDTH)
+        packed = pack_ground(ground, RADIUS, WIDTH)
         self.status = find_touch(packed, self.samples, self.placement, 0, scope, self.touch)
 
     @property
@@ -154,7 +154,7 @@ def test_the_exact_gap_is_the_smallest_on_the_circles_looked_at(make, seed, roll
     full = WheelOn(ground, centre, FULL, roll, pitch, yaw)
     dense = dense_gap(ground, centre, roll, pitch, yaw, exact.samples.laterals)
     assert exact.gap == pytest.approx(dense, abs=2e-4)
-    assert exact.gap <= full.gap + 1e-9
+    assert exact.gap <= full.gap + 2e-6
     assert full.gap == pytest.approx(dense, abs=1.5e-3)
 
 

@@ -120,53 +120,7 @@ def test_contact_points_lie_on_the_wheels_and_on_the_ground():
         assert points[:, 2] == pytest.approx(heights, abs=0.01)
 
 
-# The closure of the paper
-
-
-def closure_of_the_paper(rover, prediction, i) -> np.ndarray:
-    """Return what is left of eqs (1) and (3) to (7) of the paper in waypoint i [rad, m].
-
-    Mended: (6) lacks a bracket, (7) has + l4 sin for - l4 sin. Without small angles, the paper's
-    roll is the camber of the wheels, and its link angles are elevations within their plane.
-    """
-    suspension = rover.suspension
-
-    def link(start, end):
-        along, up = end[0] - start[0], end[2] - start[2]
-        return np.hypot(along, up), np.arctan2(up, along)
-
-    wheels = suspension.wheels
-    l1, rear = link(suspension.rocker_pivot, wheels["rear"])
-    l2, bogie = link(suspension.rocker_pivot, suspension.bogie_pivot)
-    l3, middle = link(suspension.bogie_pivot, wheels["middle"])
-    l4, front = link(suspension.bogie_pivot, wheels["front"])
-    alpha, beta, gamma = bogie - rear, front - middle, rear
-    w = 2.0 * suspension.rocker_pivot[1]
-    R = attitude_of(prediction, i)
-    nose_up = np.arctan2(R[2, 0], R[2, 2])
-    roll = -np.arcsin(R[2, 1])
-    rockers = nose_up - prediction.rocker_angle[i]
-    theta1, theta3 = rear + rockers
-    theta2, theta4 = middle + rockers - prediction.bogie_angle[i]
-    z1r, z2r, z3r, z1l, z2l, z3l = prediction.wheel_centres[i, :, 2]
-    c, s = np.cos(roll), np.sin
-    to_pivot = l3 * s(theta2) + l2 * s(theta1 + alpha)
-    return np.array(
-        [
-            (theta1 + theta3) / 2.0 - gamma - nose_up,
-            z2r - z3r - c * (l3 * s(theta2) - l4 * s(theta2 + beta)),
-            z2r - z1r - c * (to_pivot - l1 * s(theta1)),
-            z2r - z1l - c * (to_pivot - l1 * s(theta3)) - w * s(roll),
-            z2r - z2l - c * (to_pivot - l2 * s(theta3 + alpha) - l3 * s(theta4)) - w * s(roll),
-            z2r - z3l
-            - c * (to_pivot - l2 * s(theta3 + alpha) - l4 * s(theta4 + beta)) - w * s(roll),
-        ]
-    )  # fmt: skip
-
-
-def test_the_closure_equations_of_the_paper_hold():
-    left = np.array([closure_of_the_paper(LSR1, p, i) for _, p, i in every_waypoint()])
-    assert np.abs(left).max() <= 1e-12
+# Kinematics
 
 
 @pytest.mark.parametrize("preset", ["lsr1", "m2020"])
