@@ -96,6 +96,19 @@ class ConfigSection:
             raise self.error(name, f"[lowest, highest] in {unit}, the first below the second")
         return (low, high)
 
+    def intervals(self, name: str, count: int, unit: str) -> tuple[tuple[float, float], ...]:
+        """Return a list of ``count`` intervals [lowest, highest], each first below its second."""
+        must = f"a list of {count} intervals [lowest, highest] in {unit}"
+        found = []
+        for item in self._items(name, count, must):
+            if not isinstance(item, Sequence) or isinstance(item, str) or len(item) != 2:
+                raise self.error(name, must)
+            low, high = (self._finite(name, end, must) for end in item)
+            if not low < high:
+                raise self.error(name, must)
+            found.append((low, high))
+        return tuple(found)
+
     def text(self, name: str) -> str:
         """Return a text that is not empty."""
         value = self._data[name]

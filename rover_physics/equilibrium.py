@@ -159,6 +159,8 @@ def _write_equations(linkage, placement, touch, columns, balance):
                     B, own, -1.0, fx, fy, fz, mx, my, mz, side, about_bogie, sign * about_rocker
                 )
     _add_weights(linkage, placement, B)
+    if linkage.has_tool_load:
+        _add_tool_load(linkage, placement, B)
 
 
 @kernel
@@ -205,6 +207,28 @@ def _add_weights(linkage, placement, B):
         on_bogie = linkage.on_bogie[wheel]
         mass = linkage.wheel_mass
         _add_weight(linkage, placement, B, centres, wheel, mass, wheel // 3, wheel >= 0, on_bogie)
+
+
+@kernel
+def _add_tool_load(linkage, placement, B):
+    """Add what the tool's force and moment ask of the ground; they act on the body alone."""
+    weight = linkage.mass * linkage.gravity
+    for i in range(3):
+        force, moment = tool_load(placement.R, linkage.tool, i)
+        B[i, 0] -= force / weight
+        B[3 + i, 0] -= moment / (weight * linkage.length)
+
+
+@kernel
+def tool_load(R, tool, i):
+    """Return force [N] and moment about the body origin [N m] of the tool, along map axis i."""
+    x, y, z = tool[0, 0], tool[0, 1], tool[0, 2]
+    fx, fy, fz = tool[1, 0], tool[1, 1], tool[1, 2]
+    mx = tool[2, 0] + y * fz - z * fy
+    my = tool[2, 1] + z * fx - x * fz
+    mz = tool[2, 2] + x * fy - y * fx
+    force = R[i, 0] * fx + R[i, 1] * fy + R[i, 2] * fz
+    return force, R[i, 0] * mx + R[i, 1] * my + R[i, 2] * mz
 
 
 @kernel

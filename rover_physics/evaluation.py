@@ -7,21 +7,29 @@ from numba import prange
 
 from rover_physics.clearance import belly_clearance
 from rover_physics.contact import Touch, new_touch
-from rover_physics.equilibrium import FREE_FORCES, Balance, balance_forces, new_balance
+from rover_physics.equilibrium import (
+    FREE_FORCES,
+    Balance,
+    balance_forces,
+    new_balance,
+    tool_load,
+)
 from rover_physics.ground import friction_at
 from rover_physics.kernels import allocating_kernel, kernel, sweep_kernel
 from rover_physics.linkage import Placement, new_placement, place_masses
 from rover_physics.settling import SETTLED, settle
-from rover_physics.soil import coulomb_slip
+from rover_physics.soil import coulomb_slip, effective_friction, solve_wheel
+from rover_physics.soil_sharing import share_forces_on_soil
 from rover_physics.stability import CORNERS, find_support, tip_over_angles
 from rover_physics.torques import (
+    EQUAL,
     TorqueSearch,
     minimise_friction,
     new_torque_search,
+    take_equal_torques,
 )
 
 NO_EQUILIBRIUM = 4
-EQUAL, OPTIMAL = 0, 1
 CHUNK = 16
 """Poses that share one work space; small enough to keep all cores busy."""
 
@@ -35,6 +43,12 @@ class Settings(NamedTuple):
     """Friction coefficient where the terrain gives none."""
     max_torque: float
     """Largest wheel torque [N m]."""
+    allowed_torque: float
+    """Largest wheel torque within the safety limit [N m]."""
+    on_soil: bool
+    """Whether anything but the ground's own Coulomb friction may hold."""
+    soils: np.ndarray
+    """(1 + k, 8) table of `pack_soils`: the default soil, then those of the terrain's layer."""
     speed: float
     """Speed of the wheels over the ground [m/s]."""
     max_wheel_speed: float
@@ -65,6 +79,8 @@ class Columns(NamedTuple):
     force_angle: np.ndarray
     clearance: np.ndarray
     power: np.ndarray
+    sinkage: np.ndarray
+    resistance: np.ndarray
 
 
 def new_columns(n: int) -> Columns:
@@ -75,7 +91,10 @@ def new_columns(n: int) -> Columns:
 
     per_wheel = [blank(6) for _ in range(9)]
     per_pose = [blank() for _ in range(4)]
-    return Columns(np.zeros(n, np.int8), blank(6), blank(6, 3), blank(6, 3), *per_wheel, *per_pose)
+    last = [blank(6) for _ in range(2)]
+    return Columns(
+        np.zeros(n, np.int8), blank(6), blank(6, 3), blank(6, 3), *per_wheel, *per_pose, *last
+    )
 
 
 class Work(NamedTuple):
@@ -89,6 +108,8 @@ class Work(NamedTuple):
     step: np.ndarray
     corners: np.ndarray
     vectors: np.ndarray
+    soil_rows: np.ndarray
+    best: np.ndarray
 
 
 @allocating_kernel
@@ -103,6 +124,8 @@ def new_work(samples):
         np.empty((6, 1)),
         np.empty((CORNERS, 3)),
         np.empty((3, 3)),
+        np.zeros(6, np.int64),
+        np.empty((3, 6)),
     )
 
 
@@ -163,20 +186,28 @@ def _write_forces(ground, linkage, settings, work, i, columns):
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         search.mu[wheel] = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
-    if settings.policy == EQUAL:
-        for wheel in range(6):
-            search.N[wheel] = work.balance.normal[wheel, 0]
-            search.T[wheel] = work.balance.tangential[wheel, 0]
-            search.S[wheel] = work.balance.lateral[wheel, 0]
+    if settings.on_soil:
+        share_forces_on_soil(ground, linkage, settings, work)
+    elif settings.policy == EQUAL:
+        take_equal_torques(work.balance, search)
     else:
-        minimise_friction(work.balance, settings.max_torque / (linkage.radius * weight), search)
+        largest = settings.allowed_torque / (linkage.radius * weight)
+        minimise_friction(work.balance, largest, search)
     power = 0.0
     for wheel in range(6):
         N, T, S = weight * search.N[wheel], weight * search.T[wheel], weight * search.S[wheel]
         mu = search.mu[wheel]
-        torque = linkage.radius * T
-        utilisation = np.sqrt(T * T + S * S) / (mu * N) if N > 0.0 else np.inf
-        slip = coulomb_slip(utilisation)
+        sinkage, resistance = 0.0, 0.0
+        if settings.on_soil:
+            soil = settings.soils[work.soil_rows[wheel]]
+            slip, sinkage, resistance, pull, torque, utilisation = solve_wheel(
+                soil, mu, linkage.radius, linkage.width, N, T, S
+            )
+            mu = effective_friction(soil, mu, linkage.radius, linkage.width, N)
+        else:
+            torque = linkage.radius * T
+            utilisation = np.sqrt(T * T + S * S) / (mu * N) if N > 0.0 else np.inf
+            slip = coulomb_slip(utilisation)
         columns.N[i, wheel] = N
         columns.T[i, wheel] = T
         columns.S[i, wheel] = S
@@ -185,6 +216,8 @@ def _write_forces(ground, linkage, settings, work, i, columns):
         columns.utilisation[i, wheel] = utilisation
         columns.slip[i, wheel] = slip
         columns.saturation[i, wheel] = abs(torque) / settings.max_torque
+        columns.sinkage[i, wheel] = sinkage
+        columns.resistance[i, wheel] = resistance
         power += max(torque, 0.0) * _wheel_speed(linkage.radius, slip, settings)
     columns.power[i] = power
 
@@ -203,8 +236,26 @@ def find_tip_over(linkage, work):
     _write_centre_of_mass(linkage, work.placement, centre)
     force[0], force[1], force[2] = 0.0, 0.0, -linkage.mass * linkage.gravity
     moment[:] = 0.0
+    if linkage.has_tool_load:
+        _add_tool_load(linkage, work.placement, centre, force, moment)
     find_support(linkage, work.placement, work.touch, work.corners)
     return tip_over_angles(work.corners, centre, force, moment)
+
+
+@kernel
+def _add_tool_load(linkage, placement, centre, force, moment):
+    """Add the tool's force and its moment about `centre`."""
+    origin, tool = placement.origin, linkage.tool
+    fx, moment_x = tool_load(placement.R, tool, np.int64(0))
+    fy, moment_y = tool_load(placement.R, tool, np.int64(1))
+    fz, moment_z = tool_load(placement.R, tool, np.int64(2))
+    rx, ry, rz = origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2]
+    force[0] += fx
+    force[1] += fy
+    force[2] += fz
+    moment[0] += moment_x + ry * fz - rz * fy
+    moment[1] += moment_y + rz * fx - rx * fz
+    moment[2] += moment_z + rx * fy - ry * fx
 
 
 @kernel

@@ -28,6 +28,8 @@ class Ground(NamedTuple):
     """Highest elevation of each block of BLOCK x BLOCK cells [m], -inf where none is known."""
     friction: np.ndarray
     """(ny, nx) friction coefficient, NaN where the rover's own holds; (0, 0) without a layer."""
+    soil: np.ndarray
+    """(ny, nx) rows of the table of soils, 0 for the default; (0, 0) without a layer."""
     x0: float
     """x of the centre of cell [0, 0] [m]."""
     y0: float
@@ -48,6 +50,7 @@ def pack_ground(terrain: Terrain, wheel_radius: float, wheel_width: float) -> Gr
         _find_ceiling(terrain, float(np.hypot(wheel_radius, half_width))),
         _find_block_ceiling(elevation),
         np.ascontiguousarray(friction, dtype=np.float64),
+        np.empty((0, 0), np.int32) if terrain.soil is None else terrain.soil + np.int32(1),
         float(terrain.origin[0]),
         float(terrain.origin[1]),
         1.0 / float(terrain.resolution),
@@ -116,7 +119,23 @@ def friction_at(ground, x, y, default):
     ny, nx = ground.friction.shape
     if ny == 0:
         return default
-    j = min(max(int((x - ground.x0) * ground.inverse_resolution + 0.5), 0), nx - 1)
-    i = min(max(int((y - ground.y0) * ground.inverse_resolution + 0.5), 0), ny - 1)
+    i, j = _nearest_cell(ground, ny, nx, x, y)
     mu = ground.friction[i, j]
     return mu if mu > 0.0 else default
+
+
+@kernel
+def soil_row_at(ground, x, y):
+    """Return the row of the table of soils that holds in the cell nearest to (x, y) [m]."""
+    ny, nx = ground.soil.shape
+    if ny == 0:
+        return 0
+    i, j = _nearest_cell(ground, ny, nx, x, y)
+    return int(ground.soil[i, j])
+
+
+@kernel
+def _nearest_cell(ground, ny, nx, x, y):
+    j = min(max(int((x - ground.x0) * ground.inverse_resolution + 0.5), 0), nx - 1)
+    i = min(max(int((y - ground.y0) * ground.inverse_resolution + 0.5), 0), ny - 1)
+    return i, j

@@ -20,12 +20,13 @@ CODES = (
     "tilt",
     "tip_over",
     "wheel_lift",
+    "sinkage",
     "friction",
     "torque",
     "wheel_drop",
     "belly",
 )
-UNNEEDED_IN_A_FALL = ("wheel_lift", "friction", "torque")
+UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Limits that do not count while a wheel rolls off an edge."""
 _PLACELESS = {
     OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
@@ -86,12 +87,12 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
     The first limit broken, in the order of CODES, is the reason of a waypoint; a limit broken on
     the way to a waypoint counts there, unless the waypoint has a reason of its own.
     """
-    codes, reasons = _find_reasons(rover, prediction)
+    codes, reasons = find_reasons(rover, prediction)
     parts = [prediction]
     if prediction.between is not None and len(prediction.between.poses):
         parts.append(prediction.between)
         owners = prediction.between.waypoint.tolist()
-        on_the_way = zip(*_find_reasons(rover, prediction.between), strict=True)
+        on_the_way = zip(*find_reasons(rover, prediction.between), strict=True)
         for i, (code, reason) in zip(owners, on_the_way, strict=True):
             if code and not codes[i]:
                 codes[i], reasons[i] = code, f"on the way here: {reason}"
@@ -129,7 +130,8 @@ def _needed_torque(prediction: PathPrediction) -> np.ndarray:
     return np.where(falls[:, None], np.nan, prediction.torque_saturation)
 
 
-def _find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
+def find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
+    """Return code and reason of each row of a prediction, empty where passable."""
     n = len(prediction.poses)
     codes, reasons = [""] * n, [""] * n
     for i, status in enumerate(prediction.status.tolist()):

@@ -45,15 +45,26 @@ class Linkage(NamedTuple):
     """Reference length that makes moments comparable with forces: rear to front axle [m]."""
     belly: np.ndarray
     """(5,) underside: z, smallest and largest x, smallest and largest y [m]."""
+    has_tool_load: bool
+    """True where the arm's tool is pushed or turned by what is around it."""
+    tool: np.ndarray
+    """(3, 3) tip of the arm [m], force [N] and moment [N m] on the tool, body frame."""
 
 
-def pack_linkage(rover: Rover, body_mass: float, body_com: np.ndarray) -> Linkage:
+NO_TOOL = np.zeros((3, 3))
+"""A tool that nothing acts on."""
+
+
+def pack_linkage(
+    rover: Rover, body_mass: float, body_com: np.ndarray, tool: np.ndarray = NO_TOOL
+) -> Linkage:
     """Return the constants of `rover` as the kernels read them.
 
     Args:
         rover: The rover.
         body_mass: Mass of the body with its arm and payload [kg].
         body_com: (3,) centre of mass of the same [m], body frame.
+        tool: (3, 3) tip of the arm [m], force [N] and moment [N m] on the tool, body frame.
     """
     suspension, masses, belly = rover.suspension, rover.masses, rover.belly
     names = ("rear", "middle", "front")
@@ -79,6 +90,8 @@ def pack_linkage(rover: Rover, body_mass: float, body_com: np.ndarray) -> Linkag
         ),
         length=float(suspension.wheels["front"][0] - suspension.wheels["rear"][0]),
         belly=np.array([belly.z, *belly.x, *belly.y], dtype=float),
+        has_tool_load=bool(np.any(tool[1:])),
+        tool=np.ascontiguousarray(tool, dtype=float),
     )
 
 

@@ -43,13 +43,19 @@ class PathPrediction:
     torque: Floats
     """(n, 6) motor torques [N m], positive forward."""
     friction: Floats
-    """(n, 6) friction coefficient mu at the contact."""
+    """(n, 6) friction coefficient mu at the contact; on yielding soil the largest drawbar pull
+    over the wheel load."""
     friction_utilisation: Floats
-    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that lifts off."""
+    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that lifts off; on
+    yielding soil (T, S) relative to the largest forces in their direction."""
     slip_ratio: Floats
     """(n, 6) i = 1 - v / (r omega) from the soil model."""
     torque_saturation: Floats
     """(n, 6) |torque| / largest torque."""
+    sinkage: Floats
+    """(n, 6) how deep the wheels sink into yielding soil [m]."""
+    motion_resistance: Floats
+    """(n, 6) resistance of the soil that the torque overcomes beside the traction [N]."""
     tip_over_ratio: Floats
     """(n,) smallest tip-over angle now / on flat ground (the paper's stability margin)."""
     tip_over_force_angle: Floats

@@ -8,6 +8,7 @@ import numpy as np
 from rover_physics.names import SIDES, WHEELS
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover
+from rover_physics.soil import MODERATE_SINKAGE
 
 TOLERANCE = 1e-9
 
@@ -19,6 +20,10 @@ class Check(NamedTuple):
     """Its code in a verdict."""
     broken: np.ndarray
     """(n,) True where the limit is broken."""
+    margin: np.ndarray
+    """(n,) share of the limit that is left, negative where it is broken."""
+    wheel: np.ndarray
+    """(n,) index of the wheel that it is about, -1 for none."""
     describe: Callable[[int], str]
     """Says of a waypoint by how much."""
 
@@ -36,6 +41,15 @@ def compare(value: float, limit: float, digits: int, unit: str = "") -> str:
     return f"{value:.{digits}f}{unit}, limit {limit:.{digits}f}{unit}"
 
 
+def _share_left(values: np.ndarray, limit: float) -> np.ndarray:
+    """Return the share of an upper limit that is left; the amount where the limit is 0."""
+    return 1.0 - values / limit if limit > 0.0 else limit - values
+
+
+def _no_wheel(values: np.ndarray) -> np.ndarray:
+    return np.full(len(values), -1)
+
+
 def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
     """Return the checks of a prediction, the most telling reason first."""
     return [
@@ -43,6 +57,7 @@ def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
         _check_tilt(rover, prediction),
         _check_tip_over(rover, prediction),
         _check_wheel_lift(prediction),
+        _check_sinkage(rover, prediction),
         _check_friction(rover, prediction),
         _check_torque(rover, prediction),
         _check_wheel_drop(rover, prediction),
@@ -56,6 +71,7 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
     low = np.repeat([suspension.rocker_limits[0], suspension.bogie_limits[0]], 2)
     high = np.repeat([suspension.rocker_limits[1], suspension.bogie_limits[1]], 2)
     beyond = (joints < low - TOLERANCE) | (joints > high + TOLERANCE)
+    margin = (np.minimum(joints - low, high - joints) / (high - low)).min(axis=1)
 
     def describe(i: int) -> str:
         joint = int(np.argmax(beyond[i]))
@@ -63,7 +79,7 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
         limit = low[joint] if joints[i, joint] < low[joint] else high[joint]
         return f"{name} angle {compare(joints[i, joint], limit, 2, ' rad')}"
 
-    return Check("suspension", np.any(beyond, axis=1), describe)
+    return Check("suspension", np.any(beyond, axis=1), margin, _no_wheel(margin), describe)
 
 
 def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
@@ -72,7 +88,8 @@ def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"tilt {compare(tilt[i], limit, 1, ' deg')}"
 
-    return Check("tilt", tilt > limit + TOLERANCE, describe)
+    broken, margin = tilt > limit + TOLERANCE, _share_left(tilt, limit)
+    return Check("tilt", broken, margin, _no_wheel(margin), describe)
 
 
 def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
@@ -81,7 +98,8 @@ def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"tip-over ratio {compare(ratio[i], limit, 2)}"
 
-    return Check("tip_over", ratio < limit - TOLERANCE, describe)
+    broken, margin = ratio < limit - TOLERANCE, -_share_left(ratio, limit)
+    return Check("tip_over", broken, margin, _no_wheel(margin), describe)
 
 
 def _check_wheel_lift(prediction: PathPrediction) -> Check:
@@ -94,7 +112,15 @@ def _check_wheel_lift(prediction: PathPrediction) -> Check:
             f"under {prediction.policy} torques"
         )
 
-    return Check("wheel_lift", np.any(loads < 0.0, axis=1), describe)
+    margin = loads.min(axis=1) / np.maximum(loads.sum(axis=1) / 6.0, TOLERANCE)
+    lightest = np.argmin(loads, axis=1)
+    return Check("wheel_lift", np.any(loads < 0.0, axis=1), margin, lightest, describe)
+
+
+def _check_sinkage(rover: Rover, prediction: PathPrediction) -> Check:
+    limit = MODERATE_SINKAGE * 2.0 * rover.wheel.radius
+    words = "wheel sinks deeper than the soil model holds: sinkage"
+    return _check_wheels("sinkage", prediction.sinkage, limit, words, 3, " m")
 
 
 def _check_friction(rover: Rover, prediction: PathPrediction) -> Check:
@@ -122,7 +148,9 @@ def _check_wheels(
         wheel = int(np.argmax(values[i]))
         return f"{WHEELS[wheel]} {words} {compare(values[i, wheel], limit, digits, unit)}"
 
-    return Check(code, np.any(values > limit + TOLERANCE, axis=1), describe)
+    margin = _share_left(np.max(values, axis=1), limit)
+    broken, worst = np.any(values > limit + TOLERANCE, axis=1), np.argmax(values, axis=1)
+    return Check(code, broken, margin, worst, describe)
 
 
 def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
@@ -131,4 +159,5 @@ def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"belly clearance {compare(clearance[i], limit, 3, ' m')}"
 
-    return Check("belly", clearance < limit - TOLERANCE, describe)
+    broken, margin = clearance < limit - TOLERANCE, -_share_left(clearance, limit)
+    return Check("belly", broken, margin, _no_wheel(margin), describe)

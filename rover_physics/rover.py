@@ -125,6 +125,8 @@ class Manipulator:
     """Joint angles of the stowed pose in [rad], the one that the body's mass centre is for."""
     payload: float = 0.0
     """Mass at the tip in [kg]."""
+    joint_limits: tuple[Interval, ...] | None = None
+    """Lowest and highest angle of each joint in [rad]; None: the joints turn without end."""
 
 
 @dataclass(frozen=True)
@@ -305,7 +307,7 @@ def _read_limits(top: ConfigSection) -> Limits:
 
 def _read_manipulator(top: ConfigSection) -> Manipulator:
     keys = ("base", "joints", "link_lengths", "link_masses", "stowed")
-    arm = top.section("manipulator", keys, ("payload",))
+    arm = top.section("manipulator", keys, ("payload", "joint_limits"))
     yaw, shoulder, elbow = arm.texts("joints", 3)
     column, upper_arm, forearm = arm.numbers("link_lengths", 3, "m")
     masses = arm.numbers("link_masses", 3, "kg")
@@ -321,4 +323,5 @@ def _read_manipulator(top: ConfigSection) -> Manipulator:
         link_masses=(masses[0], masses[1], masses[2]),
         stowed=(stowed[0], stowed[1], stowed[2]),
         payload=arm.number("payload", "kg", least=0.0) if arm.has("payload") else 0.0,
+        joint_limits=arm.intervals("joint_limits", 3, "rad") if arm.has("joint_limits") else None,
     )

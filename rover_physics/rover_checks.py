@@ -161,6 +161,15 @@ def _check_manipulator(rover: Rover) -> None:
             arm.link_masses,
             f"together below masses.body.mass, {rover.masses.body.mass:g} kg, which includes them",
         )
+    for name, angle, (low, high) in zip(
+        arm.joints, arm.stowed, arm.joint_limits or (), strict=arm.joint_limits is not None
+    ):
+        if not low <= angle <= high:
+            raise _refuse(
+                "manipulator.stowed",
+                arm.stowed,
+                f"within manipulator.joint_limits, for {name} from {low:g} to {high:g} rad",
+            )
     taken = set(arm.joints) & {*SUSPENSION_JOINTS, *WHEEL_JOINTS}
     if taken:
         raise _refuse(

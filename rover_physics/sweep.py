@@ -7,24 +7,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.contact import sample_wheel
 from rover_physics.crossing import find_crossings
 from rover_physics.drops import find_falls
-from rover_physics.errors import ModelError, PoseError
+from rover_physics.errors import PoseError
 from rover_physics.evaluation import (
-    EQUAL,
     NO_EQUILIBRIUM,
-    OPTIMAL,
     Columns,
     Settings,
     evaluate_poses,
-    find_tip_over,
     new_columns,
-    new_work,
 )
-from rover_physics.ground import pack_ground
-from rover_physics.linkage import Linkage, pack_linkage, place, place_masses
-from rover_physics.manipulator import body_mass_and_com
+from rover_physics.model_setup import POLICIES, set_up
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover, load_rover
 from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
@@ -41,9 +34,8 @@ __all__ = [
     "warm_up",
 ]
 
-POLICIES = {"equal": EQUAL, "optimal": OPTIMAL}
 NONE_HELD = np.empty((0, 6, 2))
-_one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
+one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
 
 
 def sweep_path(
@@ -56,42 +48,50 @@ def sweep_path(
     policy: str = "equal",
     joint_angles: Mapping[str, float] | None = None,
     payload: float | None = None,
+    tool_force: ArrayLike | None = None,
+    tool_moment: ArrayLike | None = None,
+    soil: str | None = None,
 ) -> PathPrediction:
     """Predict the rover at each pose of a path.
 
     Args:
         rover: The rover.
-        terrain: The ground; its friction layer holds where it has one.
+        terrain: The ground; its layers of friction and soil hold where it has them.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
         friction: Friction coefficient instead of the rover's own.
         max_torque: Largest wheel torque [N m] instead of the rover's own.
         policy: "equal": all wheels pull alike; "optimal": the torques that need least friction.
         joint_angles: Arm angles [rad] by joint name; stowed where not given.
         payload: Mass at the arm's tip [kg] instead of the rover's own.
+        tool_force: (3,) force [N] that the surroundings exert on the arm's tip, body frame.
+        tool_moment: (3,) moment [N m] that they exert on it, body frame.
+        soil: Preset soil where the terrain's soil layer has none or there is no layer; None:
+            Coulomb friction. docs/soil.md has the presets.
 
     Raises:
         PoseError: poses of wrong shape, or not finite.
         ModelError: an argument that makes no sense.
+        SoilError: a soil of the terrain, or `soil`, that is not among the presets.
     """
     poses = check_poses(poses)
-    mass, com = body_mass_and_com(rover, joint_angles, payload)
-    linkage = pack_linkage(rover, mass, com)
-    samples = sample_wheel(rover, terrain.resolution)
-    settings = _make_settings(rover, linkage, samples, policy, friction, max_torque)
-    ground = pack_ground(terrain, rover.wheel.radius, rover.wheel.width)
+    setup = set_up(
+        rover,
+        terrain,
+        friction=friction,
+        max_torque=max_torque,
+        policy=policy,
+        joint_angles=joint_angles,
+        payload=payload,
+        tool_force=tool_force,
+        tool_moment=tool_moment,
+        soil=soil,
+    )
+    settings = setup.settings
 
     def evaluate(at: np.ndarray, held: np.ndarray | None = None) -> Columns:
         results = new_columns(len(at))
-        with _one_sweep_at_a_time:
-            evaluate_poses(
-                ground,
-                linkage,
-                samples,
-                settings,
-                at,
-                NONE_HELD if held is None else held,
-                results,
-            )
+        with one_sweep_at_a_time:
+            evaluate_poses(*setup, at, NONE_HELD if held is None else held, results)
         return results
 
     columns = evaluate(poses)
@@ -139,42 +139,6 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     return array
 
 
-def _make_settings(rover, linkage, samples, policy, friction, max_torque) -> Settings:
-    if policy not in POLICIES:
-        raise ModelError(f"no torque policy {policy!r}; policies are {', '.join(POLICIES)}")
-    mu = rover.friction if friction is None else friction
-    torque = rover.wheel.max_torque if max_torque is None else max_torque
-    for name, value in (("friction", mu), ("max_torque", torque)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise ModelError(f"{name} is {value}; it must be above 0")
-    flat_angle, flat_measure = _tip_over_on_flat_ground(linkage, samples)
-    if not flat_angle > 0.0:
-        raise ModelError(
-            f"rover {rover.name!r} tips over on flat ground: the centre of mass of rover, arm and "
-            "payload must be between its wheels"
-        )
-    top_speed = rover.wheel.max_speed * rover.wheel.radius
-    return Settings(
-        policy=POLICIES[policy],
-        friction=float(mu),
-        max_torque=float(torque),
-        speed=float(min(rover.nominal_speed, top_speed)),
-        max_wheel_speed=float(rover.wheel.max_speed),
-        flat_angle=flat_angle,
-        flat_measure=flat_measure,
-    )
-
-
-def _tip_over_on_flat_ground(linkage: Linkage, samples) -> tuple[float, float]:
-    work = new_work(samples)
-    q = np.zeros(6)
-    place(linkage, 0.0, 0.0, 0.0, q, work.placement)
-    place_masses(linkage, q, work.placement)
-    work.touch.point[:] = work.placement.centres
-    work.touch.point[:, 2] -= linkage.radius
-    return find_tip_over(linkage, work)
-
-
 def _collect(poses: np.ndarray, columns: Columns, settings: Settings, policy: str, **more):
     settled = columns.status == SETTLED
     position = np.column_stack([poses[:, :2], columns.q[:, 0]])
@@ -208,6 +172,8 @@ def _collect(poses: np.ndarray, columns: Columns, settings: Settings, policy: st
         tip_over_ratio=columns.tip_over_ratio,
         tip_over_force_angle=columns.force_angle,
         belly_clearance=columns.clearance,
+        sinkage=columns.sinkage,
+        motion_resistance=columns.resistance,
         power=columns.power,
         energy=_accumulate(work, settled),
         time=_accumulate(durations, settled),

@@ -19,6 +19,8 @@ from rover_physics.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.kernels import allocating_kernel, kernel
 from rover_physics.linear import solve_in_place
 
+EQUAL, OPTIMAL = 0, 1
+"""Torque policies."""
 LOAD, TORQUE, FRICTION = np.arange(3)
 FOUND, LIFTS, SATURATES = np.arange(3)
 LEVELS = 60
@@ -44,6 +46,8 @@ class TorqueSearch(NamedTuple):
     """(6,) lateral forces at y."""
     mu: np.ndarray
     """(6,) friction coefficients."""
+    resistance: np.ndarray
+    """(6,) motion resistances, which torque overcomes before it pulls; 0 on firm ground."""
     H: np.ndarray
     """(9, 9) Hessian of the barrier."""
     g: np.ndarray
@@ -61,6 +65,7 @@ def new_torque_search():
         np.empty(6),
         np.empty(6),
         np.empty(6),
+        np.zeros(6),
         np.empty((FREE_FORCES, FREE_FORCES)),
         np.empty((FREE_FORCES, 1)),
         np.empty(FREE_FORCES),
@@ -81,10 +86,20 @@ def apply_torques(balance, free, search):
 
 
 @kernel
+def take_equal_torques(balance, search):
+    """Write the wheel forces of equal torques into the search."""
+    for wheel in range(6):
+        search.N[wheel] = balance.normal[wheel, 0]
+        search.T[wheel] = balance.tangential[wheel, 0]
+        search.S[wheel] = balance.lateral[wheel, 0]
+
+
+@kernel
 def minimise_friction(balance, max_traction, search):
     """Find the torques that need least friction, starting from equal ones; leave them in `search`.
 
-    `max_traction` is the largest torque over wheel radius and weight. Returns FOUND; LIFTS where
+    `max_traction` is the largest torque over wheel radius and weight; torque also overcomes the
+    motion resistances in `search`. Returns FOUND; LIFTS where
     no torques keep all wheels on the ground, or SATURATES where none of those are within the
     limit: then the set that comes nearest is left. Lateral forces keep their equal shares where
     that does; where it does not, friction passes them on to wheels that still hold.
@@ -119,7 +134,7 @@ def _needed(search, goal):
         if goal == LOAD:
             level = -search.N[i]
         elif goal == TORQUE:
-            level = abs(search.T[i])
+            level = abs(search.T[i] + search.resistance[i])
         else:
             across = np.sqrt(search.T[i] * search.T[i] + search.S[i] * search.S[i])
             level = across / (search.mu[i] * search.N[i])
@@ -178,7 +193,8 @@ def _write_barrier(balance, free, goal, level, max_traction, search):
             room = search.N[i] + (level if goal == LOAD else 0.0)
             _add_log(free, balance.normal, i, 1.0 / room, 1.0 / (room * room), search)
         if traction < np.inf:
-            above, below = traction - search.T[i], traction + search.T[i]
+            thrust = search.T[i] + search.resistance[i]
+            above, below = traction - thrust, traction + thrust
             slope = 1.0 / below - 1.0 / above
             curvature = 1.0 / (below * below) + 1.0 / (above * above)
             _add_log(free, balance.tangential, i, slope, curvature, search)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from rough_grounds import plane
 
 from rover_physics.errors import ModelError
+from rover_physics.limits import judge
 from rover_physics.manipulator import arm_angles, body_mass_and_com, link_points
 from rover_physics.rover import Part, load_rover
 from rover_physics.sweep import sweep_path
@@ -103,9 +104,16 @@ def test_a_payload_without_an_arm_is_refused():
         body_mass_and_com(M2020, payload=1.0)
 
 
-def test_a_payload_that_tips_the_rover_on_flat_ground_is_refused():
+def test_a_payload_too_heavy_for_the_rover_tips_it_on_flat_ground():
+    prediction = sweep_path(LSR1, LEVEL, POSE, joint_angles=pose_of(), payload=20.0)
+    assert prediction.tip_over_ratio[0] < 0.0
+    assert judge(LSR1, prediction).code == "tip_over"
+
+
+def test_a_rover_that_tips_over_on_flat_ground_by_itself_is_refused():
+    heavy = replace(LSR1, manipulator=replace(ARM, stowed=(0.0, 0.0, 0.0), payload=20.0))
     with pytest.raises(ModelError, match="tips over on flat ground"):
-        sweep_path(LSR1, LEVEL, POSE, joint_angles=pose_of(), payload=20.0)
+        sweep_path(heavy, LEVEL, POSE)
 
 
 def test_an_arm_stretched_ahead_loads_the_front_wheels():
@@ -130,7 +138,10 @@ def test_arm_and_payload_are_as_a_body_with_their_mass_and_centre():
     mass, com = body_mass_and_com(LSR1, pose_of(yaw=0.5, shoulder=-0.3), payload=0.6)
     body = Part(mass, tuple(com))
     alike = replace(LSR1, manipulator=None, masses=replace(LSR1.masses, body=body))
-    arm = sweep_path(LSR1, ground, POSE, joint_angles=pose_of(yaw=0.5, shoulder=-0.3), payload=0.6)
-    lump = sweep_path(alike, ground, POSE)
+    held = {"joint_angles": pose_of(yaw=0.5, shoulder=-0.3), "payload": 0.6}
+    arm, lump = sweep_path(LSR1, ground, POSE, **held), sweep_path(alike, ground, POSE)
     assert arm.wheel_loads == pytest.approx(lump.wheel_loads, abs=1e-9)
-    assert arm.tip_over_force_angle == pytest.approx(lump.tip_over_force_angle, abs=1e-9)
+    level = sweep_path(LSR1, LEVEL, POSE, **held)  # the lump's margins are relative to this
+    for name in ("tip_over_ratio", "tip_over_force_angle"):
+        relative = getattr(arm, name) / getattr(level, name)
+        assert relative == pytest.approx(getattr(lump, name), abs=1e-5), name

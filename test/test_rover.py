@@ -84,6 +84,27 @@ def test_a_rover_file_is_loaded_by_its_path(tmp_path):
     assert load_rover(str(path)) == load_rover(path)
 
 
+def test_the_joints_of_the_arm_may_have_limits():
+    limits = [[-3.2, 3.2], [-1.0, 1.5], [0.0, 2.5]]
+    arm = rover_from_dict(changed("manipulator.joint_limits", limits), "test").manipulator
+    assert arm.joint_limits == ((-3.2, 3.2), (-1.0, 1.5), (0.0, 2.5))
+    assert load_rover("lsr1").manipulator.joint_limits is None
+
+
+@pytest.mark.parametrize(
+    ("limits", "must"),
+    [
+        ([[-1.0, 1.0]], "a list of 3 intervals"),
+        ([[-1.0, 1.0], [1.0, -1.0], [0.0, 1.0]], "a list of 3 intervals"),
+        ([[-1.0, 1.0], "wide", [0.0, 1.0]], "a list of 3 intervals"),
+        ([[-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]], "within manipulator.joint_limits, for arm_yaw"),
+    ],
+)
+def test_impossible_joint_limits_are_refused(limits, must):
+    with pytest.raises(RoverFileError, match=must):
+        rover_from_dict(changed("manipulator.joint_limits", limits), "test")
+
+
 def test_the_manipulator_may_be_left_out():
     assert rover_from_dict(without("manipulator"), "test").manipulator is None
     assert rover_from_dict(changed("manipulator", None), "test").manipulator is None

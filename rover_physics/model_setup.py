@@ -1,0 +1,102 @@
+"""What a sweep needs in the form that the kernels read, from checked arguments."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.contact import WheelSamples, sample_wheel
+from rover_physics.errors import ModelError
+from rover_physics.evaluation import Settings, find_tip_over, new_work
+from rover_physics.ground import Ground, pack_ground
+from rover_physics.linkage import Linkage, pack_linkage, place, place_masses
+from rover_physics.manipulator import body_mass_and_com, pack_tool
+from rover_physics.rover import Rover
+from rover_physics.soil import pack_soils
+from rover_physics.terrain import Terrain
+from rover_physics.torques import EQUAL, OPTIMAL
+
+POLICIES = {"equal": EQUAL, "optimal": OPTIMAL}
+
+
+class Setup(NamedTuple):
+    """The arguments that all kernels of a sweep share."""
+
+    ground: Ground
+    """The terrain."""
+    linkage: Linkage
+    """The rover with its arm, payload and tool load."""
+    samples: WheelSamples
+    """Points of a wheel's rim, see `sample_wheel`."""
+    settings: Settings
+    """What is asked for."""
+
+
+def set_up(
+    rover: Rover,
+    terrain: Terrain,
+    *,
+    friction: float | None = None,
+    max_torque: float | None = None,
+    policy: str = "equal",
+    joint_angles: Mapping[str, float] | None = None,
+    payload: float | None = None,
+    tool_force: ArrayLike | None = None,
+    tool_moment: ArrayLike | None = None,
+    soil: str | None = None,
+) -> Setup:
+    """Check the arguments of a sweep and pack them; `sweep_path` says what they are.
+
+    Raises:
+        ModelError: An argument that makes no sense.
+        SoilError: A soil of the terrain, or `soil`, that is not among the presets.
+    """
+    if policy not in POLICIES:
+        raise ModelError(f"no torque policy {policy!r}; policies are {', '.join(POLICIES)}")
+    mu = rover.friction if friction is None else friction
+    torque = rover.wheel.max_torque if max_torque is None else max_torque
+    for name, value in (("friction", mu), ("max_torque", torque)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise ModelError(f"{name} is {value}; it must be above 0")
+    mass, com = body_mass_and_com(rover, joint_angles, payload)
+    tool = pack_tool(rover, joint_angles, tool_force, tool_moment)
+    samples = sample_wheel(rover, terrain.resolution)
+    flat_angle, flat_measure = _tip_over_on_flat_ground(rover, samples)
+    settings = Settings(
+        policy=POLICIES[policy],
+        friction=float(mu),
+        max_torque=float(torque),
+        allowed_torque=float(torque * rover.limits.torque_saturation),
+        on_soil=bool(terrain.soil_names or soil is not None),
+        soils=_pack_soils(terrain.soil_names, soil),
+        speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),
+        max_wheel_speed=float(rover.wheel.max_speed),
+        flat_angle=flat_angle,
+        flat_measure=flat_measure,
+    )
+    ground = pack_ground(terrain, rover.wheel.radius, rover.wheel.width)
+    return Setup(ground, pack_linkage(rover, mass, com, tool), samples, settings)
+
+
+@lru_cache(maxsize=16)
+def _pack_soils(names: tuple[str, ...], default: str | None) -> np.ndarray:
+    return pack_soils(names, default=default)
+
+
+def _tip_over_on_flat_ground(rover: Rover, samples) -> tuple[float, float]:
+    """Return the tip-over measures of the rover as its file has it: arm stowed, at rest."""
+    linkage = pack_linkage(rover, *body_mass_and_com(rover))
+    work, q = new_work(samples), np.zeros(6)
+    place(linkage, 0.0, 0.0, 0.0, q, work.placement)
+    place_masses(linkage, q, work.placement)
+    work.touch.point[:] = work.placement.centres
+    work.touch.point[:, 2] -= linkage.radius
+    angle, measure = find_tip_over(linkage, work)
+    if not angle > 0.0:
+        raise ModelError(
+            f"rover {rover.name!r} tips over on flat ground: the centre of mass of rover, stowed "
+            "arm and payload must be between its wheels"
+        )
+    return angle, measure
