@@ -63,16 +63,25 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     if missing:
         has = ", ".join(fields) or "none"
         raise MessageError(
-            f"cloud has no field {', '.join(missing)}; it needs x, y and z, and has {has}")
+            f"cloud has no field {', '.join(missing)}; it needs x, y and z, and has {has}"
+        )
     if "friction" in fields:
         names.append("friction")
     formats = [_field_format(fields[name], cloud) for name in names]
-    point = np.dtype({
-        "names": names, "formats": formats, "offsets": [fields[name].offset for name in names],
-        "itemsize": cloud.point_step})
+    point = np.dtype(
+        {
+            "names": names,
+            "formats": formats,
+            "offsets": [fields[name].offset for name in names],
+            "itemsize": cloud.point_step,
+        }
+    )
     points = np.ndarray(
-        (cloud.height, cloud.width), point, buffer=np.frombuffer(cloud.data, np.uint8),
-        strides=(row_step, cloud.point_step))
+        (cloud.height, cloud.width),
+        point,
+        buffer=np.frombuffer(cloud.data, np.uint8),
+        strides=(row_step, cloud.point_step),
+    )
     columns = {name: points[name].astype(np.float64).ravel() for name in names}
     single = any(point[name].itemsize == 4 for name in ("x", "y"))
     xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
@@ -82,7 +91,9 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
 
 
 def terrain_from_point_cloud(
-    cloud: PointCloud2, resolution: float = 0.0, cell_height: str = "max",
+    cloud: PointCloud2,
+    resolution: float = 0.0,
+    cell_height: str = "max",
 ) -> Terrain:
     """Grid a cloud onto square cells; a cell without a point is unknown (NaN).
 
@@ -119,7 +130,8 @@ def terrain_from_point_cloud(
     if grid is None:
         raise MessageError(
             "the cloud's points form no regular grid along x and y, so the cell size must be "
-            f"given: set map_resolution, for these points about {_typical_spacing(xy):.2g} m")
+            f"given: set map_resolution, for these points about {_typical_spacing(xy):.2g} m"
+        )
     columns, rows = grid.cells(points.xyz[known, :2])
     cells = rows * grid.columns + columns
     elevation = _combine(cells, points.xyz[known, 2], grid, cell_height)
@@ -132,7 +144,10 @@ def terrain_from_point_cloud(
 
 
 def terrain_to_point_cloud(
-    terrain: Terrain, frame_id: str, stamp=None, datatype: int = PointField.FLOAT32,
+    terrain: Terrain,
+    frame_id: str,
+    stamp=None,
+    datatype: int = PointField.FLOAT32,
 ) -> PointCloud2:
     """Write a terrain as an organised cloud, one point per cell, row 0 first.
 
@@ -157,7 +172,8 @@ def terrain_to_point_cloud(
         cloud.header.stamp = stamp
     cloud.fields = [
         PointField(name=name, offset=i * kind.itemsize, datatype=datatype, count=1)
-        for i, name in enumerate(names)]
+        for i, name in enumerate(names)
+    ]
     cloud.point_step = len(names) * kind.itemsize
     cloud.row_step = columns * cloud.point_step
     cloud.data = array.array("B")
@@ -202,8 +218,7 @@ class _Grid:
 def _check_layout(cloud: PointCloud2) -> int:
     """Check that sizes and steps agree with the data; return the row step in bytes."""
     if cloud.height * cloud.width == 0:
-        raise MessageError(
-            f"cloud has no points: height {cloud.height}, width {cloud.width}")
+        raise MessageError(f"cloud has no points: height {cloud.height}, width {cloud.width}")
     if cloud.point_step == 0:
         raise MessageError("cloud has point_step 0; it must be the size of a point in bytes")
     row_bytes = cloud.width * cloud.point_step
@@ -213,11 +228,13 @@ def _check_layout(cloud: PointCloud2) -> int:
     if row_step < row_bytes:
         raise MessageError(
             f"cloud has row_step {row_step}; {cloud.width} points of {cloud.point_step} bytes "
-            f"need at least {row_bytes}")
+            f"need at least {row_bytes}"
+        )
     if len(cloud.data) != cloud.height * row_step:
         raise MessageError(
             f"cloud has {len(cloud.data)} bytes of data; height {cloud.height} x row_step "
-            f"{row_step} needs {cloud.height * row_step}")
+            f"{row_step} needs {cloud.height * row_step}"
+        )
     return row_step
 
 
@@ -227,14 +244,16 @@ def _field_format(field: PointField, cloud: PointCloud2) -> str:
         datatype = _DATATYPE_NAMES.get(field.datatype, str(field.datatype))
         raise MessageError(
             f"cloud field {field.name} has datatype {datatype}; "
-            "it must be FLOAT32 or FLOAT64, in metres")
+            "it must be FLOAT32 or FLOAT64, in metres"
+        )
     if field.count > 1:
         raise MessageError(f"cloud field {field.name} has count {field.count}; it must be 1")
     kind = _FLOATS[field.datatype]
     if field.offset + int(kind[1]) > cloud.point_step:
         raise MessageError(
             f"cloud field {field.name} at offset {field.offset} does not fit into "
-            f"point_step {cloud.point_step}")
+            f"point_step {cloud.point_step}"
+        )
     return (">" if cloud.is_bigendian else "<") + kind
 
 
@@ -292,7 +311,8 @@ def _regular_cells(xy: NDArray[np.float64], resolution: float) -> _Grid:
         raise MessageError(
             f"cloud spans {span[0]:.4g} m x {span[1]:.4g} m, which at {resolution:g} m are "
             f"{counts.prod():.3g} cells; a map may have {MAX_CELLS}: remove stray points or set "
-            "a coarser map_resolution")
+            "a coarser map_resolution"
+        )
     origin = first * resolution
     return _Grid(resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1]))
 

@@ -23,7 +23,8 @@ def joint_positions(state: JointState, wanted: Collection[str]) -> dict[str, flo
     if len(state.position) != len(state.name):
         raise MessageError(
             f"joint_states has {len(state.position)} positions for {len(state.name)} names; "
-            "there must be one for each, or none at all")
+            "there must be one for each, or none at all"
+        )
     positions: dict[str, float] = {}
     for name, position in zip(state.name, state.position, strict=True):
         if name not in wanted:
@@ -31,7 +32,8 @@ def joint_positions(state: JointState, wanted: Collection[str]) -> dict[str, flo
         if name in positions:
             raise MessageError(f"joint_states names {name} twice")
         if not math.isfinite(position):
-            raise MessageError(f"joint_states has position {position} of {name}; "
-                               "it must be a finite angle in rad")
+            raise MessageError(
+                f"joint_states has position {position} of {name}; it must be a finite angle in rad"
+            )
         positions[name] = float(position)
     return positions

@@ -22,7 +22,10 @@ _TEXT_ABOVE = 0.6
 
 
 def path_markers(
-    prediction: PathPrediction, reasons: Sequence[str], rows: NDArray[np.intp], frame_id: str,
+    prediction: PathPrediction,
+    reasons: Sequence[str],
+    rows: NDArray[np.intp],
+    frame_id: str,
     stamp,
 ) -> MarkerArray:
     """Draw a judged path; the first marker clears what was drawn before.

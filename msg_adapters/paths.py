@@ -33,7 +33,8 @@ def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> fl
     if abs(norm - 1.0) > _NORM_TOLERANCE:
         raise MessageError(
             f"{text} has length {math.sqrt(norm):.3g}; it must be a quaternion of length 1, "
-            "for no rotation w = 1")
+            "for no rotation w = 1"
+        )
     forward_x = w * w + x * x - y * y - z * z
     forward_y = 2.0 * (x * y + w * z)
     if math.hypot(forward_x, forward_y) < _LEAST_LEVEL:
@@ -54,7 +55,9 @@ def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:
 
 
 def stamped_pose_to_array(
-    stamped: PoseStamped, map_frame: str, what: str = "pose",
+    stamped: PoseStamped,
+    map_frame: str,
+    what: str = "pose",
 ) -> NDArray[np.float64]:
     """Return (3,) x, y [m] and yaw [rad] of a pose in the map frame.
 
@@ -80,19 +83,24 @@ def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
     for i, stamped in enumerate(path.poses):
         if stamped.header.frame_id:
             check_frame(stamped.header.frame_id, map_frame, f"path pose {i}")
-    return np.array([
-        pose_to_array(stamped.pose, f"path pose {i}") for i, stamped in enumerate(path.poses)])
+    return np.array(
+        [pose_to_array(stamped.pose, f"path pose {i}") for i, stamped in enumerate(path.poses)]
+    )
 
 
 def quaternions(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> NDArray[np.float64]:
     """Return (n, 4) x, y, z, w of the rotations Rz(yaw) Ry(pitch) Rx(roll), angles (n,) [rad]."""
     halves = [np.asarray(angle, dtype=np.float64) / 2.0 for angle in (roll, pitch, yaw)]
     (cr, cp, cy), (sr, sp, sy) = np.cos(halves), np.sin(halves)
-    return np.stack([
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy], axis=-1)
+    return np.stack(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ],
+        axis=-1,
+    )
 
 
 def decimate(poses: ArrayLike, spacing: float) -> NDArray[np.intp]:
@@ -116,7 +124,10 @@ def decimate(poses: ArrayLike, spacing: float) -> NDArray[np.intp]:
 
 
 def settled_path(
-    prediction: PathPrediction, rows: Sequence[int] | NDArray[np.intp], frame_id: str, stamp,
+    prediction: PathPrediction,
+    rows: Sequence[int] | NDArray[np.intp],
+    frame_id: str,
+    stamp,
 ) -> Path:
     """Write settled waypoints of a prediction as a path with the body's full orientation.
 
@@ -130,7 +141,8 @@ def settled_path(
     rows = np.asarray(rows, dtype=np.intp)
     position = prediction.position[rows].tolist()
     rotation = quaternions(
-        prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]).tolist()
+        prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]
+    ).tolist()
     for (x, y, z), (qx, qy, qz, qw) in zip(position, rotation, strict=True):
         stamped = PoseStamped()
         stamped.header = path.header

@@ -29,7 +29,8 @@ def waypoint_array(values: ArrayLike, column_label: str = "wheel") -> Float64Mul
     message = Float64MultiArray()
     message.layout.dim = [
         MultiArrayDimension(label="waypoint", size=rows, stride=rows * columns),
-        MultiArrayDimension(label=column_label, size=columns, stride=columns)]
+        MultiArrayDimension(label=column_label, size=columns, stride=columns),
+    ]
     message.data = _doubles(values)
     return message
 
@@ -41,11 +42,12 @@ def array_values(message: Float64MultiArray) -> NDArray[np.float64]:
         MessageError: other than two dimensions, padding, or a length that disagrees.
     """
     sizes = [dim.size for dim in message.layout.dim]
-    values = np.frombuffer(message.data, np.float64)[message.layout.data_offset:]
+    values = np.frombuffer(message.data, np.float64)[message.layout.data_offset :]
     if len(sizes) != 2 or len(values) != sizes[0] * sizes[1]:
         raise MessageError(
             f"array has dimensions {sizes} and {len(values)} values; "
-            "it must have two dimensions and a value for each of their cells")
+            "it must have two dimensions and a value for each of their cells"
+        )
     return values.reshape(sizes)
 
 
@@ -56,7 +58,10 @@ def tip_over_array(prediction: PathPrediction) -> Float64MultiArray:
 
 
 def joint_trajectory(
-    prediction: PathPrediction, wheel_radius: float, frame_id: str, stamp,
+    prediction: PathPrediction,
+    wheel_radius: float,
+    frame_id: str,
+    stamp,
 ) -> JointTrajectory:
     """Write the joints along a path, up to the first waypoint that did not settle.
 
@@ -74,14 +79,18 @@ def joint_trajectory(
     if not prediction.settled.all():
         count = int(np.argmin(prediction.settled))
     trajectory = empty_trajectory(frame_id, stamp)
-    positions = np.hstack([
-        suspension_angles(prediction)[:count], _rolled_angles(prediction, wheel_radius, count)])
-    efforts = np.hstack([
-        np.zeros((count, len(SUSPENSION_JOINTS))), prediction.torque[:count]])
+    positions = np.hstack(
+        [suspension_angles(prediction)[:count], _rolled_angles(prediction, wheel_radius, count)]
+    )
+    efforts = np.hstack([np.zeros((count, len(SUSPENSION_JOINTS))), prediction.torque[:count]])
     for i in range(count):
-        trajectory.points.append(JointTrajectoryPoint(
-            positions=_doubles(positions[i]), effort=_doubles(efforts[i]),
-            time_from_start=_duration(float(prediction.time[i]))))
+        trajectory.points.append(
+            JointTrajectoryPoint(
+                positions=_doubles(positions[i]),
+                effort=_doubles(efforts[i]),
+                time_from_start=_duration(float(prediction.time[i])),
+            )
+        )
     return trajectory
 
 
@@ -99,7 +108,9 @@ def suspension_angles(prediction: PathPrediction) -> NDArray[np.float64]:
 
 
 def _rolled_angles(
-    prediction: PathPrediction, wheel_radius: float, count: int,
+    prediction: PathPrediction,
+    wheel_radius: float,
+    count: int,
 ) -> NDArray[np.float64]:
     """Return (count, 6) angles [rad] that the wheels have rolled, negative backwards."""
     steps = np.diff(prediction.wheel_centres[:count], axis=0)

@@ -19,7 +19,11 @@ def verdict_to_json(verdict: Mapping[str, Any]) -> str:
 
 
 def verdict_to_diagnostics(
-    verdict: Mapping[str, Any], hardware_id: str, frame_id: str, stamp, warn: bool = False,
+    verdict: Mapping[str, Any],
+    hardware_id: str,
+    frame_id: str,
+    stamp,
+    warn: bool = False,
 ) -> DiagnosticArray:
     """Write a verdict as one diagnostic status.
 
@@ -37,10 +41,15 @@ def verdict_to_diagnostics(
     level = DiagnosticStatus.WARN if warn else DiagnosticStatus.OK
     status = DiagnosticStatus(
         level=level if verdict["traversable"] else DiagnosticStatus.ERROR,
-        name=STATUS_NAME, message=verdict["reason"] or "traversable", hardware_id=hardware_id)
+        name=STATUS_NAME,
+        message=verdict["reason"] or "traversable",
+        hardware_id=hardware_id,
+    )
     status.values = [
         KeyValue(key=key, value=value if isinstance(value, str) else json.dumps(value))
-        for key, value in _plain(verdict).items() if key not in PER_WAYPOINT]
+        for key, value in _plain(verdict).items()
+        if key not in PER_WAYPOINT
+    ]
     message = DiagnosticArray(status=[status])
     message.header.frame_id = frame_id
     message.header.stamp = stamp

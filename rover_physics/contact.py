@@ -173,12 +173,12 @@ def _hold(placement, wheel, touch):
 def _refine_circles(ground, samples, placement, wheel, all_circles, touch):
     """Look closer at the nearest sample of the nearest circle, or of all that may be nearest."""
     best = touch.nearest[wheel]
+    reach = touch.circle_gap[wheel, best] + CIRCLE_REACH * samples.radius
     s, c = touch.circle_sine[wheel, best], touch.circle_cosine[wheel, best]
     _refine(ground, samples, placement, wheel, best, s, c, touch)
     if not all_circles:
         return
     best_s, best_c = touch.circle_sine[wheel, best], touch.circle_cosine[wheel, best]
-    reach = touch.circle_gap[wheel, best] + CIRCLE_REACH * samples.radius
     for m in range(samples.laterals.size):
         if m != best and touch.circle_gap[wheel, m] <= reach:
             s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]

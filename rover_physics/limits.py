@@ -25,6 +25,7 @@ CODES = (
     "torque",
     "wheel_drop",
     "belly",
+    "trapped",
 )
 UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Limits that do not count while a wheel rolls off an edge."""

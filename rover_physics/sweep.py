@@ -51,6 +51,7 @@ def sweep_path(
     tool_force: ArrayLike | None = None,
     tool_moment: ArrayLike | None = None,
     soil: str | None = None,
+    backward: bool = False,
 ) -> PathPrediction:
     """Predict the rover at each pose of a path.
 
@@ -67,6 +68,7 @@ def sweep_path(
         tool_moment: (3,) moment [N m] that they exert on it, body frame.
         soil: Preset soil where the terrain's soil layer has none or there is no layer; None:
             Coulomb friction. docs/soil.md has the presets.
+        backward: The rover drives backwards along the poses.
 
     Raises:
         PoseError: poses of wrong shape, or not finite.
@@ -95,8 +97,9 @@ def sweep_path(
         return results
 
     columns = evaluate(poses)
-    crossings = find_crossings(terrain, rover.wheel.radius, poses, columns, evaluate)
-    falls = find_falls(rover.wheel.radius, poses, columns, crossings)
+    radius, direction = rover.wheel.radius, -1.0 if backward else 1.0
+    crossings = find_crossings(terrain, radius, poses, columns, evaluate, direction)
+    falls = find_falls(radius, poses, columns, crossings, direction)
     between = _collect(
         crossings.poses,
         crossings.columns,

@@ -48,10 +48,9 @@ def predict(
 
     Exit code 0 when it ran, whatever the verdict; 2 for bad input.
     """
-    from rover_physics.limits import judge
     from rover_physics.rover import load_rover
-    from rover_physics.sweep import sweep_path
     from rover_physics.terrain import load_terrain
+    from rover_physics.trap import judge_path
     from rover_planner.prediction_files import read_poses, write_prediction
     from rover_planner.progress import show_progress
 
@@ -60,10 +59,9 @@ def predict(
     path = read_poses(poses)
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
-        prediction = sweep_path(
+        prediction, verdict = judge_path(
             model, ground, path, friction=friction, max_torque=max_torque, policy=policy
         )
-        verdict = judge(model, prediction)
     write_prediction(out, prediction, verdict)
 
 

@@ -59,71 +59,120 @@ class ParameterSpec:
             ParameterError: names the parameter, the value and what would be right.
         """
         if type(value) is not type(self.default):
-            raise ParameterError(f"parameter {self.name} is {value!r}; it must be of "
-                                 f"type {self.type_name}, such as {self.default!r}")
+            raise ParameterError(
+                f"parameter {self.name} is {value!r}; it must be of "
+                f"type {self.type_name}, such as {self.default!r}"
+            )
         if value == "" != self.default:
             raise ParameterError(
-                f"parameter {self.name} is empty; it must be a text such as {self.default!r}")
+                f"parameter {self.name} is empty; it must be a text such as {self.default!r}"
+            )
         if isinstance(value, float) and not math.isfinite(value):
             raise ParameterError(f"parameter {self.name} is {value}; it must be a finite number")
         if self.bounds is not None and not self.bounds[0] <= value <= self.bounds[1]:
-            raise ParameterError(f"parameter {self.name} is {value}; it must be in "
-                                 f"{self.bounds[0]:g} to {self.bounds[1]:g} {self.unit}".rstrip())
+            raise ParameterError(
+                f"parameter {self.name} is {value}; it must be in "
+                f"{self.bounds[0]:g} to {self.bounds[1]:g} {self.unit}".rstrip()
+            )
         if self.choices and value not in self.choices:
             raise ParameterError(
-                f"parameter {self.name} is {value!r}; it must be one of {', '.join(self.choices)}")
+                f"parameter {self.name} is {value!r}; it must be one of {', '.join(self.choices)}"
+            )
 
 
 TRAVERSE_SERVER = (
     ParameterSpec("rover", "lsr1", "Rover to ask about: a preset's name or a rover file."),
     ParameterSpec(
-        "friction", 0.0, "Coulomb friction where the map has none; 0 takes the rover file's.",
-        bounds=(0.0, 10.0)),
+        "friction",
+        0.0,
+        "Coulomb friction where the map has none; 0 takes the rover file's.",
+        bounds=(0.0, 10.0),
+    ),
     ParameterSpec(
-        "max_torque", 0.0, "Largest torque of a wheel; 0 takes the rover file's.", "N m",
-        bounds=(0.0, 1e6)),
+        "max_torque",
+        0.0,
+        "Largest torque of a wheel; 0 takes the rover file's.",
+        "N m",
+        bounds=(0.0, 1e6),
+    ),
     ParameterSpec(
-        "policy", "equal",
+        "policy",
+        "equal",
         "How the wheels share the traction: equal torques, or optimal with traction control.",
-        choices=("equal", "optimal")),
+        choices=("equal", "optimal"),
+    ),
     ParameterSpec(
-        "candidate_count", 9, "Largest number of candidate paths between start and goal.",
-        bounds=(1, 99)),
+        "candidate_count",
+        9,
+        "Largest number of candidate paths between start and goal.",
+        bounds=(1, 99),
+    ),
     ParameterSpec(
-        "candidate_spacing", 0.3, "Distance between neighbouring candidates half-way.", "m",
-        bounds=(0.01, 10.0)),
+        "candidate_spacing",
+        0.3,
+        "Distance between neighbouring candidates half-way.",
+        "m",
+        bounds=(0.01, 10.0),
+    ),
     ParameterSpec(
-        "waypoint_spacing", 0.02, "Largest distance between judged waypoints.", "m",
-        bounds=(0.001, 1.0)),
+        "waypoint_spacing",
+        0.02,
+        "Largest distance between judged waypoints.",
+        "m",
+        bounds=(0.001, 1.0),
+    ),
     ParameterSpec(
-        "plan_spacing", 0.2, "Distance between poses of a plan; 0 returns every waypoint.", "m",
-        bounds=(0.0, 100.0)),
+        "plan_spacing",
+        0.2,
+        "Distance between poses of a plan; 0 returns every waypoint.",
+        "m",
+        bounds=(0.0, 100.0),
+    ),
     ParameterSpec(
-        "map_frame", "map", "Frame of the map; requests in another frame are refused.",
-        read_only=True),
+        "map_frame",
+        "map",
+        "Frame of the map; requests in another frame are refused.",
+        read_only=True,
+    ),
     ParameterSpec(
-        "map_resolution", 0.0,
-        "Cell size for clouds; 0 takes their spacing where they are a regular grid.", "m",
-        bounds=(0.0, 10.0)),
+        "map_resolution",
+        0.0,
+        "Cell size for clouds; 0 takes their spacing where they are a regular grid.",
+        "m",
+        bounds=(0.0, 10.0),
+    ),
     ParameterSpec(
-        "cell_height", "max",
+        "cell_height",
+        "max",
         "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
-        choices=CELL_HEIGHTS),
+        choices=CELL_HEIGHTS,
+    ),
     ParameterSpec(
-        "map_durability", "either", "Publishers of the map that are heard, by their durability.",
-        choices=MAP_DURABILITIES, read_only=True),
+        "map_durability",
+        "either",
+        "Publishers of the map that are heard, by their durability.",
+        choices=MAP_DURABILITIES,
+        read_only=True,
+    ),
     ParameterSpec(
-        "unknown_cells", "refuse",
+        "unknown_cells",
+        "refuse",
         "What becomes of unknown cells: refuse paths over them, or interpolate small gaps.",
-        choices=("refuse", "interpolate")),
+        choices=("refuse", "interpolate"),
+    ),
     ParameterSpec(
-        "max_gap", 0.2, "Widest unknown region that is interpolated.", "m", bounds=(0.0, 100.0)),
+        "max_gap", 0.2, "Widest unknown region that is interpolated.", "m", bounds=(0.0, 100.0)
+    ),
     ParameterSpec(
-        "terrain_file", "", "Terrain file to start with; empty waits for a map.", read_only=True),
+        "terrain_file", "", "Terrain file to start with; empty waits for a map.", read_only=True
+    ),
     ParameterSpec(
-        "suspension_tolerance", 0.1,
-        "Difference of measured and predicted suspension angles that raises a warning.", "rad",
-        bounds=(0.0, 3.2)),
+        "suspension_tolerance",
+        0.1,
+        "Difference of measured and predicted suspension angles that raises a warning.",
+        "rad",
+        bounds=(0.0, 3.2),
+    ),
 )
 """Parameters of `/traverse_server`."""
 
@@ -146,7 +195,8 @@ def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> dict[str, 
 
 
 def check_changes(
-    specs: Iterable[ParameterSpec], values: Mapping[str, Any],
+    specs: Iterable[ParameterSpec],
+    values: Mapping[str, Any],
     accept: Callable[[dict[str, Any]], Any],
 ) -> Callable[[list[Parameter]], SetParametersResult]:
     """Make an on-set callback that refuses bad values with the reason in the result.
@@ -160,8 +210,10 @@ def check_changes(
 
     def check(parameters: list[Parameter]) -> SetParametersResult:
         changes = {
-            parameter.name: parameter.value for parameter in parameters
-            if parameter.name in by_name}
+            parameter.name: parameter.value
+            for parameter in parameters
+            if parameter.name in by_name
+        }
         try:
             if any(not parameter.name for parameter in parameters):
                 raise ParameterError("a parameter has no name; name one of " + ", ".join(by_name))
@@ -178,21 +230,24 @@ def check_changes(
 
 def parameters_document() -> str:
     """Return the text of docs/parameters.md."""
-    return "\n".join([
-        "# Parameters",
-        "",
-        "Made from the tables in `rover_planner/parameters.py` by",
-        "`python -m rover_planner.parameters > docs/parameters.md`; a test holds them together.",
-        "",
-        "## /traverse_server",
-        "",
-        *_table(TRAVERSE_SERVER),
-        "",
-        "Read-only parameters are set at start, the others at any time "
-        "(`ros2 param set /traverse_server friction 0.6`).",
-        "A value of the wrong type, NaN, out of bounds or not among the choices is refused with "
-        "the reason.",
-        ""])
+    return "\n".join(
+        [
+            "# Parameters",
+            "",
+            "Made from the tables in `rover_planner/parameters.py` by",
+            "`python -m rover_planner.parameters > docs/parameters.md`; a test holds them together.",
+            "",
+            "## /traverse_server",
+            "",
+            *_table(TRAVERSE_SERVER),
+            "",
+            "Read-only parameters are set at start, the others at any time "
+            "(`ros2 param set /traverse_server friction 0.6`).",
+            "A value of the wrong type, NaN, out of bounds or not among the choices is refused with "
+            "the reason.",
+            "",
+        ]
+    )
 
 
 def _table(specs: Iterable[ParameterSpec]) -> list[str]:
@@ -201,8 +256,7 @@ def _table(specs: Iterable[ParameterSpec]) -> list[str]:
     for spec in specs:
         default = f"`{spec.default}`" if spec.default != "" else "empty"
         name = f"`{spec.name}`" + (" (read-only)" if spec.read_only else "")
-        lines.append(
-            f"| {name} | {spec.type_name} | {default} | {_allowed(spec)} | {spec.doc} |")
+        lines.append(f"| {name} | {spec.type_name} | {default} | {_allowed(spec)} | {spec.doc} |")
     return lines
 
 
@@ -217,15 +271,18 @@ def _descriptor(spec: ParameterSpec) -> ParameterDescriptor:
     """Return the descriptor that tools show."""
     unit = f" [{spec.unit}]" if spec.unit else ""
     descriptor = ParameterDescriptor(
-        name=spec.name, description=spec.doc + unit, read_only=spec.read_only)
+        name=spec.name, description=spec.doc + unit, read_only=spec.read_only
+    )
     if spec.choices:
         descriptor.additional_constraints = "one of " + ", ".join(spec.choices)
     if spec.bounds is not None and isinstance(spec.default, float):
         descriptor.floating_point_range = [
-            FloatingPointRange(from_value=spec.bounds[0], to_value=spec.bounds[1])]
+            FloatingPointRange(from_value=spec.bounds[0], to_value=spec.bounds[1])
+        ]
     elif spec.bounds is not None:
         descriptor.integer_range = [
-            IntegerRange(from_value=int(spec.bounds[0]), to_value=int(spec.bounds[1]))]
+            IntegerRange(from_value=int(spec.bounds[0]), to_value=int(spec.bounds[1]))
+        ]
     return descriptor
 
 

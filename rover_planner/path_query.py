@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits import Verdict, judge
+from rover_physics.limits import Verdict
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover
-from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain
+from rover_physics.trap import judge_path
 from rover_planner.candidates import generate_candidates, path_length
 
 RISK_STEP = 0.05
@@ -156,7 +156,7 @@ def check_path(
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
     options = options or PathQueryOptions()
-    prediction = sweep_path(
+    prediction, verdict = judge_path(
         rover,
         terrain,
         poses,
@@ -165,7 +165,6 @@ def check_path(
         policy=options.policy,
         joint_angles=joint_angles,
     )
-    verdict = judge(rover, prediction)
     return Candidate(prediction.poses, prediction, verdict, path_cost(rover, prediction, verdict))
 
 

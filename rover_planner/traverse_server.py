@@ -59,8 +59,11 @@ from rover_planner.traverse_service import (
 
 NODE_NAME = "traverse_server"
 WHEEL_TOPICS = {
-    "wheel_loads": "wheel_loads", "slip_ratios": "slip_ratio",
-    "friction_utilisation": "friction_utilisation", "torque_saturation": "torque_saturation"}
+    "wheel_loads": "wheel_loads",
+    "slip_ratios": "slip_ratio",
+    "friction_utilisation": "friction_utilisation",
+    "torque_saturation": "torque_saturation",
+}
 """Topics of one value per waypoint and wheel, and the field of the prediction each carries."""
 
 _BAD_INPUT = (MessageError, PlanningError, RoverError)
@@ -82,7 +85,8 @@ class TraverseServer(Node):
         self.create_service(Trigger, "~/check_path", self._check_path)
         self.create_service(LoadMap, "~/load_map", self._load_map)
         self.add_on_set_parameters_callback(
-            check_changes(TRAVERSE_SERVER, self._values, settings_from_parameters))
+            check_changes(TRAVERSE_SERVER, self._values, settings_from_parameters)
+        )
         self.add_post_set_parameters_callback(self._apply_parameters)
         self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
 
@@ -97,7 +101,8 @@ class TraverseServer(Node):
         self._joints = self.create_publisher(JointTrajectory, "~/predicted_joints", qos)
         self._wheels = {
             topic: self.create_publisher(Float64MultiArray, f"~/{topic}", qos)
-            for topic in WHEEL_TOPICS}
+            for topic in WHEEL_TOPICS
+        }
         self._tip_over = self.create_publisher(Float64MultiArray, "~/tip_over_margin", qos)
         self._verdict = self.create_publisher(DiagnosticArray, "~/verdict", qos)
         self._markers = self.create_publisher(MarkerArray, "~/markers", qos)
@@ -108,7 +113,8 @@ class TraverseServer(Node):
             # With several profiles a mismatch of one is no news.
             events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
             self.create_subscription(
-                PointCloud2, "elevation_cloud", self._take_cloud, qos, event_callbacks=events)
+                PointCloud2, "elevation_cloud", self._take_cloud, qos, event_callbacks=events
+            )
         self.create_subscription(JointState, "joint_states", self._take_joints, sensor_qos())
         self.create_subscription(Path, "~/path", self._take_path, topic_qos())
 
@@ -122,9 +128,13 @@ class TraverseServer(Node):
             self.get_logger().error(f"terrain_file not loaded: {error}")
 
     def _apply_parameters(self, parameters) -> None:
-        self._values.update({
-            parameter.name: parameter.value for parameter in parameters
-            if parameter.name in self._values})
+        self._values.update(
+            {
+                parameter.name: parameter.value
+                for parameter in parameters
+                if parameter.name in self._values
+            }
+        )
         self._service.settings = settings_from_parameters(self._values)
 
     def _take_cloud(self, cloud: PointCloud2, info) -> None:
@@ -133,7 +143,8 @@ class TraverseServer(Node):
         try:
             check_frame(cloud.header.frame_id, self._map_frame, "elevation_cloud")
             terrain = terrain_from_point_cloud(
-                cloud, self._values["map_resolution"], self._values["cell_height"])
+                cloud, self._values["map_resolution"], self._values["cell_height"]
+            )
             self._take_terrain(terrain, "elevation_cloud")
         except _BAD_INPUT as error:
             there = self._service.terrain is not None
@@ -158,14 +169,16 @@ class TraverseServer(Node):
         known = 100.0 * np.isfinite(taken.elevation).mean()
         self.get_logger().info(
             f"map from {source}: {columns} x {rows} cells of {taken.resolution:g} m, "
-            f"{known:.1f} % known")
+            f"{known:.1f} % known"
+        )
 
     def _take_joints(self, state: JointState) -> None:
         try:
             self._service.take_joints(joint_positions(state, self._service.joint_names))
         except MessageError as error:
             self.get_logger().warning(
-                f"{error}; the angles known before stay", throttle_duration_sec=5.0)
+                f"{error}; the angles known before stay", throttle_duration_sec=5.0
+            )
 
     def _take_path(self, path: Path) -> None:
         try:
@@ -175,7 +188,9 @@ class TraverseServer(Node):
             self.get_logger().error(f"~/path refused: {error}")
 
     def _can_traverse(
-        self, request: GetPlan.Request, response: GetPlan.Response,
+        self,
+        request: GetPlan.Request,
+        response: GetPlan.Response,
     ) -> GetPlan.Response:
         def answer() -> Judgement:
             start = stamped_pose_to_array(request.start, self._map_frame, "start")
@@ -186,7 +201,9 @@ class TraverseServer(Node):
         return response
 
     def _check_path(
-        self, _request: Trigger.Request, response: Trigger.Response,
+        self,
+        _request: Trigger.Request,
+        response: Trigger.Response,
     ) -> Trigger.Response:
         judgement = self._judge("check_path", self._service.check_last_path)
         self._publish(judgement)
@@ -199,7 +216,8 @@ class TraverseServer(Node):
         if file is None or not file.is_file():
             self.get_logger().error(
                 f"load_map: no file {request.map_url!r}; it must be the path or file:// URL of a "
-                "terrain file on this machine")
+                "terrain file on this machine"
+            )
             response.result = LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
             return response
         try:
@@ -210,7 +228,8 @@ class TraverseServer(Node):
             response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
             return response
         response.map = terrain_to_occupancy_grid(
-            terrain, self._map_frame, self.get_clock().now().to_msg())
+            terrain, self._map_frame, self.get_clock().now().to_msg()
+        )
         response.result = LoadMap.Response.RESULT_SUCCESS
         return response
 
@@ -228,10 +247,12 @@ class TraverseServer(Node):
         if judgement.traversable:
             self.get_logger().info(
                 f"{request}: traversable, {verdict['length']:.2f} m, {verdict['time']:.0f} s, "
-                f"{verdict['energy']:.1f} J")
+                f"{verdict['energy']:.1f} J"
+            )
         else:
             self.get_logger().warning(
-                f"{request}: refused ({verdict['code']}): {verdict['reason']}")
+                f"{request}: refused ({verdict['code']}): {verdict['reason']}"
+            )
         return judgement
 
     def _publish(self, judgement: Judgement) -> Path:
@@ -240,11 +261,19 @@ class TraverseServer(Node):
         plan = self._publish_path(judgement, frame, stamp)
         for topic, field in WHEEL_TOPICS.items():
             self._wheels[topic].publish(
-                waypoint_array(np.empty((0, len(WHEELS)))) if judgement.candidate is None
-                else waypoint_array(getattr(judgement.candidate.prediction, field)))
-        self._verdict.publish(verdict_to_diagnostics(
-            judgement.verdict, self._service.settings.rover.name, frame, stamp,
-            warn=not judgement.verdict.get("suspension_agrees", True)))
+                waypoint_array(np.empty((0, len(WHEELS))))
+                if judgement.candidate is None
+                else waypoint_array(getattr(judgement.candidate.prediction, field))
+            )
+        self._verdict.publish(
+            verdict_to_diagnostics(
+                judgement.verdict,
+                self._service.settings.rover.name,
+                frame,
+                stamp,
+                warn=not judgement.verdict.get("suspension_agrees", True),
+            )
+        )
         return plan
 
     def _publish_path(self, judgement: Judgement, frame: str, stamp) -> Path:

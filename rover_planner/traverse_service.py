@@ -71,12 +71,17 @@ def settings_from_parameters(values: Mapping[str, Any]) -> ServiceSettings:
     return ServiceSettings(
         rover=load_rover(values["rover"]),
         query=PathQueryOptions(
-            count=values["candidate_count"], spacing=values["candidate_spacing"],
-            waypoint_spacing=values["waypoint_spacing"], policy=values["policy"],
-            friction=values["friction"] or None, max_torque=values["max_torque"] or None),
+            count=values["candidate_count"],
+            spacing=values["candidate_spacing"],
+            waypoint_spacing=values["waypoint_spacing"],
+            policy=values["policy"],
+            friction=values["friction"] or None,
+            max_torque=values["max_torque"] or None,
+        ),
         interpolate=values["unknown_cells"] == "interpolate",
         max_gap=values["max_gap"],
-        suspension_tolerance=values["suspension_tolerance"])
+        suspension_tolerance=values["suspension_tolerance"],
+    )
 
 
 class TraverseService:
@@ -124,7 +129,8 @@ class TraverseService:
     def take_terrain(self, terrain: Terrain) -> None:
         """Keep a map until the next one."""
         self._terrain = (
-            terrain.fill_gaps(self._settings.max_gap) if self._settings.interpolate else terrain)
+            terrain.fill_gaps(self._settings.max_gap) if self._settings.interpolate else terrain
+        )
         self._received = terrain
 
     def take_path(self, poses: NDArray[np.float64]) -> None:
@@ -181,16 +187,25 @@ class TraverseService:
             return self._refuse_for_want_of_a_map()
         poses = densify(self._path, self._settings.query.waypoint_spacing)
         candidate = check_path(
-            self._settings.rover, self._terrain, poses, self._settings.query,
-            self._manipulator_angles())
+            self._settings.rover,
+            self._terrain,
+            poses,
+            self._settings.query,
+            self._manipulator_angles(),
+        )
         return Judgement(self._describe(candidate), candidate)
 
     def _query(self, start, goal) -> PathAnswer:
         """Ask for the candidates between two poses on the map."""
         assert self._terrain is not None
         return answer_path_query(
-            self._settings.rover, self._terrain, start, goal, self._settings.query,
-            self._manipulator_angles())
+            self._settings.rover,
+            self._terrain,
+            start,
+            goal,
+            self._settings.query,
+            self._manipulator_angles(),
+        )
 
     def _goals_to_stand_on(self, start, goal, tolerance: float) -> Iterator[NDArray[np.float64]]:
         """Yield other goals at which the rover can stand, the nearest first, a few of each ring.
@@ -206,18 +221,26 @@ class TraverseService:
         """Tell whether the rover can stand at a pose (3,), without asking how it gets there."""
         assert self._terrain is not None
         return check_path(
-            self._settings.rover, self._terrain, pose[None, :], self._settings.query,
-            self._manipulator_angles()).verdict.traversable
+            self._settings.rover,
+            self._terrain,
+            pose[None, :],
+            self._settings.query,
+            self._manipulator_angles(),
+        ).verdict.traversable
 
     def _judge_answer(
-        self, answer: PathAnswer, goal: NDArray[np.float64], reached: NDArray[np.float64],
+        self,
+        answer: PathAnswer,
+        goal: NDArray[np.float64],
+        reached: NDArray[np.float64],
         tried: int,
     ) -> Judgement:
         """Describe the answer to a query, and which goal it is for."""
         verdict = self._describe(answer.chosen)
         verdict["candidates"] = len(answer.candidates)
         verdict["traversable_candidates"] = sum(
-            candidate.verdict.traversable for candidate in answer.candidates)
+            candidate.verdict.traversable for candidate in answer.candidates
+        )
         verdict["chosen_candidate"] = answer.nearest
         verdict["goal"] = reached.tolist()
         verdict["goal_offset"] = float(np.hypot(*(reached - goal)[:2]))
@@ -244,18 +267,25 @@ class TraverseService:
         prediction = candidate.prediction
         if not prediction.settled[0]:
             return {}
-        predicted = dict(zip(
-            SUSPENSION_JOINTS, (*prediction.rocker_angle[0], *prediction.bogie_angle[0]),
-            strict=True))
+        predicted = dict(
+            zip(
+                SUSPENSION_JOINTS,
+                (*prediction.rocker_angle[0], *prediction.bogie_angle[0]),
+                strict=True,
+            )
+        )
         mismatch = {
             name: self._joints[name] - float(angle)
-            for name, angle in predicted.items() if name in self._joints}
+            for name, angle in predicted.items()
+            if name in self._joints
+        }
         if not mismatch:
             return {}
         largest = max(abs(difference) for difference in mismatch.values())
         return {
             "suspension_mismatch": mismatch,
-            "suspension_agrees": largest <= self._settings.suspension_tolerance}
+            "suspension_agrees": largest <= self._settings.suspension_tolerance,
+        }
 
     def _manipulator_joints(self) -> tuple[str, ...]:
         """Return the names of the manipulator's joints, none where the rover has none."""
@@ -273,7 +303,8 @@ class TraverseService:
     def _refuse_for_want_of_a_map() -> Judgement:
         """Refuse a question that came before any map."""
         return refusal(
-            "no_map", "no map was received yet; publish one on elevation_cloud or call ~/load_map")
+            "no_map", "no map was received yet; publish one on elevation_cloud or call ~/load_map"
+        )
 
 
 def refusal(code: str, reason: str) -> Judgement:
@@ -301,7 +332,8 @@ def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
     if pieces.sum() >= MAX_WAYPOINTS:
         raise PlanningError(
             f"path is {lengths.sum():.4g} m long, which at {spacing:g} m are more than "
-            f"{MAX_WAYPOINTS} waypoints; ask for a shorter one")
+            f"{MAX_WAYPOINTS} waypoints; ask for a shorter one"
+        )
     counts = pieces.astype(np.intp)
     segment = np.repeat(np.arange(len(steps)), counts)
     within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -310,18 +342,23 @@ def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
 
 
 def _rings_within(
-    start: NDArray[np.float64], goal: NDArray[np.float64], tolerance: float,
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    tolerance: float,
 ) -> Iterator[list[NDArray[np.float64]]]:
     """Yield rings of goals of increasing distance, on each ring those towards the start first."""
     if tolerance <= 0.0:
         return
     rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / _RING_STEP)))
     towards_start = math.atan2(start[1] - goal[1], start[0] - goal[0])
-    turns = sorted((2.0 * math.pi * k / _RING_GOALS for k in range(_RING_GOALS)),
-                   key=lambda turn: -math.cos(turn))
+    turns = sorted(
+        (2.0 * math.pi * k / _RING_GOALS for k in range(_RING_GOALS)),
+        key=lambda turn: -math.cos(turn),
+    )
     for ring in range(1, rings + 1):
         # A hair within the tolerance, so that rounding does not carry a goal out of it.
         distance = tolerance * ring / rings * (1.0 - 1e-6)
         angles = [towards_start + turn for turn in turns]
-        yield [goal + distance * np.array([math.cos(angle), math.sin(angle), 0.0])
-               for angle in angles]
+        yield [
+            goal + distance * np.array([math.cos(angle), math.sin(angle), 0.0]) for angle in angles
+        ]
