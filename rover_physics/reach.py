@@ -1,4 +1,4 @@
-"""A query of the rover at rest: can the arm reach a point and push there, and will it hold?"""
+"""A query of the rover at rest: whether the arm can reach a point and push there, and hold."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
