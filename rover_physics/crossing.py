@@ -44,7 +44,12 @@ class Crossings:
 
 
 def find_crossings(
-    terrain: Terrain, radius: float, poses: np.ndarray, columns: Columns, evaluate: Evaluate
+    terrain: Terrain,
+    radius: float,
+    poses: np.ndarray,
+    columns: Columns,
+    evaluate: Evaluate,
+    direction: float = 1.0,
 ) -> Crossings:
     """Evaluate the poses between waypoints where contacts jump.
 
@@ -55,6 +60,7 @@ def find_crossings(
         columns: Their results.
         evaluate: Evaluates poses (k, 3), with heights and contact angles (k, 6, 2) of held
             wheels or None.
+        direction: 1 where the rover drives forwards along the path, -1 backwards.
     """
     found: list[tuple[float, np.ndarray, Columns, int]] = []
     spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
@@ -83,7 +89,7 @@ def find_crossings(
                 if _jumps(piece[4], piece[5], radius):
                     short = np.hypot(*(piece[3] - piece[2])[:2]) < SHORTEST
                     (places if short else halves).append(piece)
-        found.extend(_climb(terrain, radius, places, evaluate))
+        found.extend(_climb(terrain, radius, places, evaluate, direction))
         open_ = halves
     return _in_order(found)
 
@@ -129,7 +135,9 @@ def _jumps(before: Columns, after: Columns, radius: float) -> bool:
     return bool(_find_jumps(status, angle, height, radius)[0])
 
 
-def _climb(terrain: Terrain, radius: float, places, evaluate: Evaluate):
+def _climb(
+    terrain: Terrain, radius: float, places, evaluate: Evaluate, direction: float
+) -> list[tuple]:
     """Evaluate wheels held at stages between foot and edge where they jump up at one place."""
     poses, held, keys = [], [], []
     for start, end, a, _, row_a, row_b in places:
@@ -137,12 +145,13 @@ def _climb(terrain: Terrain, radius: float, places, evaluate: Evaluate):
         climbing = rise > 0.05 * radius
         if not climbing.any() or rise.max() <= HEIGHT_JUMP * radius:
             continue
-        face = [_face_ahead(terrain, radius, row_a.centres[w], a[2]) for w in range(6)]
+        course = a[2] if direction > 0.0 else a[2] + np.pi
+        face = [_face_ahead(terrain, radius, row_a.centres[w], course) for w in range(6)]
         for stage in CLIMB_STAGES:
             holds = np.full((6, 2), np.nan)
             for wheel in np.flatnonzero(climbing):
                 height = row_a.centres[wheel, 2] + stage * rise[wheel]
-                holds[wheel] = height, _angle_on_face(radius, height, *face[wheel])
+                holds[wheel] = height, direction * _angle_on_face(radius, height, *face[wheel])
             poses.append(a)
             held.append(holds)
             keys.append((start + stage * (end - start), int(np.floor(start)) + 1))
@@ -150,10 +159,15 @@ def _climb(terrain: Terrain, radius: float, places, evaluate: Evaluate):
         return []
     results = evaluate(np.array(poses), np.array(held))
     rows = _take(results, range(len(poses)))
-    return [
-        (place, pose, row, waypoint)
-        for (place, waypoint), pose, row in zip(keys, poses, rows, strict=True)
-    ]
+    stages = len(CLIMB_STAGES)
+    climbs = []
+    for first in range(0, len(rows), stages):
+        group = range(first, first + stages)
+        settled = [k for k in group if rows[k].status == SETTLED]
+        for k in settled or group:
+            place, waypoint = keys[k]
+            climbs.append((place, poses[k], rows[k], waypoint))
+    return climbs
 
 
 def _face_ahead(terrain: Terrain, radius: float, centre: np.ndarray, yaw: float):

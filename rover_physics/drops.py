@@ -17,6 +17,8 @@ LEAST_ANGLE = np.radians(15.0)
 """A wheel falls only from contacts at least this steep, however slippery they are."""
 MOST_FALLING = 2
 """One axle at a time may fall; more is a rover sliding down a slope."""
+ON_THE_EDGE = np.radians(-2.0)
+"""Contact angle from which on a wheel turns over an edge."""
 LONGEST_FALL = 2.5
 """Way of the rover, in wheel radii, from before the edge to after the landing."""
 
@@ -33,8 +35,17 @@ class Falls:
     """(n, 6) how far each wheel has dropped when it comes to a waypoint [m]."""
 
 
-def find_falls(radius: float, poses: np.ndarray, columns: Columns, crossings: Crossings) -> Falls:
-    """Find where wheels of `radius` [m] fall along a path with its crossings."""
+def find_falls(
+    radius: float,
+    poses: np.ndarray,
+    columns: Columns,
+    crossings: Crossings,
+    direction: float = 1.0,
+) -> Falls:
+    """Find where wheels of `radius` [m] fall along a path with its crossings.
+
+    `direction` is 1 where the rover drives forwards along the path, -1 backwards.
+    """
     n = len(poses)
     order = np.argsort(np.concatenate([np.arange(n), crossings.place]), kind="stable")
 
@@ -43,14 +54,14 @@ def find_falls(radius: float, poses: np.ndarray, columns: Columns, crossings: Cr
 
     extra = crossings.columns
     steps = np.hypot(*np.diff(in_order(poses, crossings.poses)[:, :2], axis=0).T)
-    steep = _find_steep(
-        in_order(columns.contact_angle, extra.contact_angle),
-        in_order(columns.friction, extra.friction),
-    )
-    falling = _keep_short_runs(steep, np.concatenate([[0.0], np.cumsum(steps)]), radius)
+    distance = np.concatenate([[0.0], np.cumsum(steps)])
+    angle = direction * in_order(columns.contact_angle, extra.contact_angle)
+    steep = _find_steep(angle, in_order(columns.friction, extra.friction))
+    falling = _keep_short_runs(steep, distance, radius)
+    rolling_over = _extend_to_edges(falling, angle, distance, radius)
     heights = in_order(columns.centres, extra.centres)[:, :, 2]
     owner = in_order(np.arange(n), crossings.waypoint)
-    drops = _measure_drops(radius, heights, steps, falling, owner, n)
+    drops = _measure_drops(radius, heights, steps, rolling_over, owner, n)
     unordered = np.empty_like(falling)
     unordered[order] = falling
     return Falls(unordered[:n], unordered[n:], drops)
@@ -81,6 +92,19 @@ def _keep_short_runs(steep: np.ndarray, distance: np.ndarray, radius: float) -> 
             if inside and distance[end] - distance[start - 1] <= LONGEST_FALL * radius:
                 kept[start:end, wheel] = True
     return kept
+
+
+def _extend_to_edges(
+    falling: np.ndarray, angle: np.ndarray, distance: np.ndarray, radius: float
+) -> np.ndarray:
+    """Return `falling` with the way on which a wheel turns over the edge before it falls."""
+    extended = falling.copy()
+    for row, wheel in np.argwhere(falling[1:] & ~falling[:-1]):
+        k = row
+        while k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[row] - distance[k] <= radius:
+            extended[k, wheel] = True
+            k -= 1
+    return extended
 
 
 def _measure_drops(

@@ -28,10 +28,10 @@ NEWTON_TOLERANCE = 5e-6
 """Largest gap at which Newton's method stops [m]."""
 NEWTON_STEPS = 20
 QUICK_ATTEMPTS = 3
-RECOVERIES = 5
+RECOVERIES = 6
 LEVEL, SLOPED = np.arange(2)
-RELAXATION_STEPS = 60
-RELAXED = 0.01
+RELAXATION_STEPS = 120
+RELAXED = 0.003
 """Largest gap, in wheel radii, at which relaxation hands over to Newton's method."""
 RELAXATION = 0.3
 
