@@ -235,7 +235,8 @@ def parameters_document() -> str:
             "# Parameters",
             "",
             "Made from the tables in `rover_planner/parameters.py` by",
-            "`python -m rover_planner.parameters > docs/parameters.md`; a test holds them together.",
+            "`python -m rover_planner.parameters > docs/parameters.md`; "
+            "a test holds them together.",
             "",
             "## /traverse_server",
             "",
@@ -243,8 +244,8 @@ def parameters_document() -> str:
             "",
             "Read-only parameters are set at start, the others at any time "
             "(`ros2 param set /traverse_server friction 0.6`).",
-            "A value of the wrong type, NaN, out of bounds or not among the choices is refused with "
-            "the reason.",
+            "A value of the wrong type, NaN, out of bounds or not among the choices "
+            "is refused with the reason.",
             "",
         ]
     )
