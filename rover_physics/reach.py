@@ -1,4 +1,4 @@
-"""A query of the rover at rest: whether the arm can reach a point and push there, and what gives."""
+"""A query of the rover at rest: whether the arm can reach a point and push, or what fails."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
