@@ -49,6 +49,8 @@ class Settings(NamedTuple):
     """Whether anything but the ground's own Coulomb friction may hold."""
     soils: np.ndarray
     """(1 + k, 8) table of `pack_soils`: the default soil, then those of the terrain's layer."""
+    direction: float
+    """1 where the rover drives forwards, -1 backwards."""
     speed: float
     """Speed of the wheels over the ground [m/s]."""
     max_wheel_speed: float
@@ -201,8 +203,9 @@ def _write_forces(ground, linkage, settings, work, i, columns):
         if settings.on_soil:
             soil = settings.soils[work.soil_rows[wheel]]
             slip, sinkage, resistance, pull, torque, utilisation = solve_wheel(
-                soil, mu, linkage.radius, linkage.width, N, T, S
+                soil, mu, linkage.radius, linkage.width, N, settings.direction * T, S
             )
+            torque *= settings.direction
             mu = effective_friction(soil, mu, linkage.radius, linkage.width, N)
         else:
             torque = linkage.radius * T
@@ -218,7 +221,9 @@ def _write_forces(ground, linkage, settings, work, i, columns):
         columns.saturation[i, wheel] = abs(torque) / settings.max_torque
         columns.sinkage[i, wheel] = sinkage
         columns.resistance[i, wheel] = resistance
-        power += max(torque, 0.0) * _wheel_speed(linkage.radius, slip, settings)
+        power += max(settings.direction * torque, 0.0) * _wheel_speed(
+            linkage.radius, slip, settings
+        )
     columns.power[i] = power
 
 

@@ -46,6 +46,7 @@ def set_up(
     tool_force: ArrayLike | None = None,
     tool_moment: ArrayLike | None = None,
     soil: str | None = None,
+    backward: bool = False,
 ) -> Setup:
     """Check the arguments of a sweep and pack them; `sweep_path` says what they are.
 
@@ -71,6 +72,7 @@ def set_up(
         allowed_torque=float(torque * rover.limits.torque_saturation),
         on_soil=bool(terrain.soil_names or soil is not None),
         soils=_pack_soils(terrain.soil_names, soil),
+        direction=-1.0 if backward else 1.0,
         speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),
         max_wheel_speed=float(rover.wheel.max_speed),
         flat_angle=flat_angle,

@@ -57,7 +57,7 @@ def _write_grip(linkage, settings, work):
         N, mu = weight * search.N[wheel], search.mu[wheel]
         solved = solve_wheel(soil, mu, linkage.radius, linkage.width, N, 0.0, 0.0)
         search.mu[wheel] = effective_friction(soil, mu, linkage.radius, linkage.width, N)
-        search.resistance[wheel] = solved[2] / weight
+        search.resistance[wheel] = settings.direction * solved[2] / weight
 
 
 @kernel
@@ -74,7 +74,7 @@ def _needed(linkage, settings, work):
             linkage.radius,
             linkage.width,
             weight * search.N[wheel],
-            weight * search.T[wheel],
+            settings.direction * weight * search.T[wheel],
             weight * search.S[wheel],
         )
         saturation = abs(solved[4]) / settings.allowed_torque

@@ -87,6 +87,7 @@ def sweep_path(
         tool_force=tool_force,
         tool_moment=tool_moment,
         soil=soil,
+        backward=backward,
     )
     settings = setup.settings
 

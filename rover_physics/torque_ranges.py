@@ -122,6 +122,7 @@ def _describe_set(
     used = rover.limits.friction_utilisation
     resistance = (columns.resistance[i] / columns.N[i])[:, None] * normal
     strength = columns.friction[i][:, None] * normal + resistance
+    resistance = setup.settings.direction * resistance
     forces = _FeasibleSet(
         load=used * strength,
         along=tangential + used * resistance,

@@ -47,7 +47,7 @@ class TorqueSearch(NamedTuple):
     mu: np.ndarray
     """(6,) friction coefficients."""
     resistance: np.ndarray
-    """(6,) motion resistances, which torque overcomes before it pulls; 0 on firm ground."""
+    """(6,) motion resistances, against the forward way; torque overcomes them beside T."""
     H: np.ndarray
     """(9, 9) Hessian of the barrier."""
     g: np.ndarray

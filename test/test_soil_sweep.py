@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rough_grounds import plane, random_poses, smooth
-from rover_geometry import balance_residuals
+from rover_geometry import balance_residuals, turned_round
 
 from rover_physics.errors import SoilError
 from rover_physics.limits import judge
@@ -15,6 +15,7 @@ from rover_physics.rover import Part, load_rover
 from rover_physics.soil_file import load_soils
 from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain
+from rover_physics.torque_ranges import find_torque_ranges
 
 LSR1 = load_rover("lsr1")
 POSE = [[0.0, 0.0, 0.0]]
@@ -209,3 +210,30 @@ def test_a_soil_without_a_name_among_the_presets_is_refused():
         sweep_path(LSR1, plane(0.0, 0.0), POSE, soil="dry_sad")
     with pytest.raises(SoilError, match="no soil 'gravy'"):
         sweep_path(LSR1, with_soil(plane(0.0, 0.0), "gravy"), POSE)
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+@pytest.mark.parametrize("soil", [None, "dry_sand"])
+def test_up_a_slope_backwards_is_as_forwards_of_the_rover_turned_round(soil, policy):
+    ground, poses = plane(0.1, 0.05), AHEAD[::25]
+    back = sweep_path(
+        LSR1, ground, poses + np.array([0.0, 0.0, np.pi]), soil=soil, policy=policy, backward=True
+    )
+    ahead = sweep_path(turned_round(LSR1), ground, poses, soil=soil, policy=policy)
+    other = [5, 4, 3, 2, 1, 0]
+    assert back.torque == pytest.approx(-ahead.torque[:, other], abs=2e-3)
+    assert back.slip_ratio == pytest.approx(ahead.slip_ratio[:, other], abs=5e-3)
+    assert back.energy == pytest.approx(ahead.energy, rel=1e-2)
+    assert back.energy[-1] > 1.0
+
+
+def test_backwards_on_level_soil_the_torques_turn_the_other_way():
+    forward, back = (
+        sweep_path(LSR1, plane(0.0, 0.0), POSE, soil="dry_sand", backward=backward)
+        for backward in (False, True)
+    )
+    assert (forward.torque > 0.0).all()
+    assert back.torque == pytest.approx(-forward.torque)
+    ranges = find_torque_ranges(LSR1, plane(0.0, 0.0), POSE, soil="dry_sand", backward=True)
+    assert (ranges.lowest < back.torque).all()
+    assert (back.torque < ranges.highest).all()
