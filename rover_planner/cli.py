@@ -31,7 +31,7 @@ RoverName = Annotated[
 TerrainFile = Annotated[Path, typer.Argument(metavar="TERRAIN", help="Elevation map, .npz.")]
 Friction = Annotated[float | None, typer.Option(metavar="MU", help="Coulomb friction everywhere.")]
 MaxTorque = Annotated[
-    float | None, typer.Option(metavar="TAU", help="Largest wheel torque [N m].")
+    float | None, typer.Option(metavar="TAU", help="Largest wheel torque in N m.")
 ]
 Policy = Annotated[
     str, typer.Option(metavar="equal|optimal", help="How the wheels share the traction.")
@@ -40,7 +40,7 @@ SoilName = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="Preset soil where the terrain names none (docs/soil.md)."),
 ]
-Payload = Annotated[float | None, typer.Option(metavar="KG", help="Mass at the arm's tip [kg].")]
+Payload = Annotated[float | None, typer.Option(metavar="KG", help="Mass at the arm's tip in kg.")]
 Vector = tuple[float, float, float]
 
 
@@ -58,16 +58,16 @@ def predict(
     soil: SoilName = None,
     arm: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=RAD", help="Angle of a joint of the arm [rad]; give all."),
+        typer.Option(metavar="NAME=RAD", help="Angle of a joint of the arm in rad; give all."),
     ] = None,
     payload: Payload = None,
     tool_force: Annotated[
         Vector | None,
-        typer.Option(metavar="FX FY FZ", help="Force on the arm's tip [N], body frame."),
+        typer.Option(metavar="FX FY FZ", help="Force on the arm's tip in N, body frame."),
     ] = None,
     tool_moment: Annotated[
         Vector | None,
-        typer.Option(metavar="MX MY MZ", help="Moment on the arm's tip [N m], body frame."),
+        typer.Option(metavar="MX MY MZ", help="Moment on the arm's tip in N m, body frame."),
     ] = None,
     grade: Annotated[
         bool,
@@ -120,19 +120,19 @@ def predict(
 def reach(
     rover: RoverName,
     terrain: TerrainFile,
-    x: Annotated[float, typer.Argument(metavar="X", help="Place of the body [m], map frame.")],
+    x: Annotated[float, typer.Argument(metavar="X", help="Place of the body in m, map frame.")],
     y: Annotated[float, typer.Argument(metavar="Y")],
-    yaw: Annotated[float, typer.Argument(metavar="YAW", help="Heading of the body [rad].")],
-    tx: Annotated[float, typer.Argument(metavar="TX", help="Place for the tip [m], map frame.")],
+    yaw: Annotated[float, typer.Argument(metavar="YAW", help="Heading of the body in rad.")],
+    tx: Annotated[float, typer.Argument(metavar="TX", help="Place for the tip in m, map frame.")],
     ty: Annotated[float, typer.Argument(metavar="TY")],
     tz: Annotated[float, typer.Argument(metavar="TZ")],
     force: Annotated[
         Vector | None,
-        typer.Option(metavar="FX FY FZ", help="Force on the tip there [N], map frame."),
+        typer.Option(metavar="FX FY FZ", help="Force on the tip there in N, map frame."),
     ] = None,
     moment: Annotated[
         Vector | None,
-        typer.Option(metavar="MX MY MZ", help="Moment on the tip there [N m], map frame."),
+        typer.Option(metavar="MX MY MZ", help="Moment on the tip there in N m, map frame."),
     ] = None,
     payload: Payload = None,
     friction: Friction = None,
@@ -174,10 +174,10 @@ def terrain(
         Path, typer.Argument(metavar="OUT", help="Elevation map to write, .npz; is overwritten.")
     ],
     seed: Annotated[int, typer.Option(help="Seed of all that is random.")] = 1,
-    size: Annotated[float, typer.Option(help="Width and height [m].")] = 24.0,
-    resolution: Annotated[float, typer.Option(help="Cell size [m].")] = 0.05,
+    size: Annotated[float, typer.Option(help="Width and height in m.")] = 24.0,
+    resolution: Annotated[float, typer.Option(help="Cell size in m.")] = 0.05,
     roughness: Annotated[
-        float, typer.Option(help="RMS height difference of points 1 m apart [m].")
+        float, typer.Option(help="RMS height difference of points 1 m apart in m.")
     ] = 0.04,
     rocks: Annotated[float, typer.Option(help="Fraction of the ground that rocks cover.")] = 0.03,
     craters: Annotated[

@@ -16,6 +16,7 @@ from rover_physics.rover import Rover, load_rover
 from rover_physics.soil_file import soil_named
 from rover_physics.terrain import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.path_geometry import densify, rings_within
 from rover_planner.path_query import (
     Candidate,
     PathAnswer,
@@ -23,7 +24,6 @@ from rover_planner.path_query import (
     answer_path_query,
     check_path,
 )
-from rover_planner.path_geometry import densify, rings_within
 from rover_planner.path_report import describe_grades, describe_path
 
 OWN_PAYLOAD = -1.0
