@@ -287,7 +287,8 @@ class TraverseServer(Node):
             joints = joint_trajectory(prediction, radius, frame, stamp)
             tip_over = tip_over_array(prediction)
             reasons = judgement.candidate.verdict.reasons
-            markers = path_markers(prediction, reasons, rows, frame, stamp)
+            grades = judgement.verdict["grades"]
+            markers = path_markers(prediction, reasons, rows, frame, stamp, grades)
         self._plan.publish(plan)
         self._joints.publish(joints)
         self._tip_over.publish(tip_over)

@@ -7,6 +7,7 @@ import pytest
 from grounds import make_terrain, waves
 from planner_client import ask
 
+from msg_adapters.markers import WITH_TRACTION_CONTROL as AMBER
 from rover_physics.grades import IMPASSABLE, PASSABLE, WITH_TRACTION_CONTROL
 from rover_physics.names import WHEELS
 from rover_planner.path_report import PER_WAYPOINT
@@ -36,6 +37,13 @@ def test_traction_control_is_named_whichever_policy_is_assumed(
     assert 0.0 < verdict["grade_margin"] < 1.0
     assert {len(verdict[key]) for key in PER_WAYPOINT} == {verdict["waypoints"]}
     assert set(verdict["grades"]) == {WITH_TRACTION_CONTROL}
+
+
+def test_the_drawn_path_is_coloured_by_grade(server, client):
+    client.send_terrain(make_terrain(slope))
+    _, results = client.next_results(lambda: client.check_poses(server, PATH))
+    line = next(marker for marker in results["markers"].markers if marker.ns == "path")
+    assert line.colors and all(colour == AMBER for colour in line.colors)
 
 
 def test_an_easy_path_is_passable_with_the_margin_of_its_worst_waypoint(mapped, client):
