@@ -7,12 +7,13 @@ from the lowest point of the circle, positive towards the front, so a wheel clim
 angles.
 """
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rover_physics.ground import height_at_cell, is_cell_on_map, look_up
-from rover_physics.kernels import allocating_kernel, kernel
+from rover_physics.kernels import kernel
+from rover_physics.records import new_record, record_type
 from rover_physics.rover import Rover
 
 TOUCHING, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
@@ -34,96 +35,61 @@ COMPLIANCE = 2e-3
 that share the load. On a plane a wheel thus touches in its middle, not on an edge at random."""
 
 
-class WheelSamples(NamedTuple):
-    """Where the cylinder of a wheel is sampled."""
+MOST_ANGLES, MOST_CIRCLES = 49, 9
+WHEEL_SAMPLES = record_type(
+    ("radius", float),  # wheel radius [m]
+    ("rows", np.int64),  # number k of contact angles
+    ("circles", np.int64),  # number m of circles
+    ("sines", float, (MOST_ANGLES,)),  # (k,) sines of the contact angles, ascending
+    ("cosines", float, (MOST_ANGLES,)),  # (k,) their cosines
+    ("spacing_sine", float),  # sine of the angle between neighbouring samples
+    ("spacing_cosine", float),  # cosine of the angle between neighbouring samples
+    ("laterals", float, (MOST_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
+)
+"""Where the cylinder of a wheel is sampled: at k angles of m circles."""
 
-    radius: float
-    """Wheel radius [m]."""
-    angles: np.ndarray
-    """(k,) contact angles [rad], ascending."""
-    sines: np.ndarray
-    """(k,) their sines."""
-    cosines: np.ndarray
-    """(k,) their cosines."""
-    spacing_sine: float
-    """Sine of the angle between neighbouring samples."""
-    spacing_cosine: float
-    """Cosine of the angle between neighbouring samples."""
-    laterals: np.ndarray
-    """(m,) distances from the middle plane along the wheel's axis [m], ascending."""
-
-
-class Touch(NamedTuple):
-    """Where the six wheels touch; written by `find_touch` and `find_contact`."""
-
-    gap: np.ndarray
-    """(6,) smallest vertical gap, negative inside the ground [m]."""
-    sine: np.ndarray
-    """(6,) sine of the contact angle."""
-    cosine: np.ndarray
-    """(6,) cosine of the contact angle."""
-    point: np.ndarray
-    """(6, 3) touching point [m], map frame."""
-    normal: np.ndarray
-    """(6, 3) surface normal that governs how the gap changes, with z = 1, map frame."""
-    held_height: np.ndarray
-    """(6,) height [m] at which a wheel that climbs a face is held; NaN for the others."""
-    held_angle: np.ndarray
-    """(6,) contact angle with the face of a held wheel [rad]."""
-    nearest: np.ndarray
-    """(6,) index of the circle that touches."""
-    circle_gap: np.ndarray
-    """(6, m) smallest gap on each circle [m]."""
-    circle_sine: np.ndarray
-    """(6, m) sine of the angle where it is."""
-    circle_cosine: np.ndarray
-    """(6, m) cosine of the angle where it is."""
-    first_row: np.ndarray
-    """(m,) index of the angle of the smallest sampled gap, of the wheel scanned last."""
-    second_gap: np.ndarray
-    """(m,) smallest sampled gap away from the first and its neighbours, as above."""
-    second_row: np.ndarray
-    """(m,) index of its angle."""
+TOUCH = record_type(
+    ("gap", float, (6,)),  # smallest vertical gap, negative inside the ground [m]
+    ("sine", float, (6,)),  # sine of the contact angle
+    ("cosine", float, (6,)),  # cosine of the contact angle
+    ("point", float, (6, 3)),  # touching point [m], map frame
+    ("normal", float, (6, 3)),  # normal that governs how the gap changes, z = 1, map frame
+    ("held_height", float, (6,)),  # height [m] at which a wheel that climbs a face is held, or NaN
+    ("held_angle", float, (6,)),  # contact angle with the face of a held wheel [rad]
+    ("nearest", np.int64, (6,)),  # index of the circle that touches
+    ("circle_gap", float, (6, MOST_CIRCLES)),  # smallest gap on each circle [m]
+    ("circle_sine", float, (6, MOST_CIRCLES)),  # sine of the angle where it is
+    ("circle_cosine", float, (6, MOST_CIRCLES)),  # cosine of the angle where it is
+    ("first_row", np.int64, (MOST_CIRCLES,)),  # row of the smallest sample of the last scan
+    ("second_gap", float, (MOST_CIRCLES,)),  # its smallest sample away from that [m]
+    ("second_row", np.int64, (MOST_CIRCLES,)),  # the row of that
+)
+"""Where the six wheels touch; written by `find_touch` and `find_contact`."""
 
 
-def sample_wheel(rover: Rover, resolution: float) -> WheelSamples:
+def sample_wheel(rover: Rover, resolution: float) -> Any:
     """Choose samples no farther apart than the cells of a terrain of `resolution` [m]."""
     wheel = rover.wheel
     half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 8, 24))
     half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 1, 4))
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * half_angles + 1)
-    laterals = np.linspace(-0.5 * wheel.width, 0.5 * wheel.width, 2 * half_laterals + 1)
-    return WheelSamples(
-        float(wheel.radius),
-        angles,
-        np.sin(angles),
-        np.cos(angles),
-        float(np.sin(angles[1] - angles[0])),
-        float(np.cos(angles[1] - angles[0])),
-        laterals,
+    samples = new_record(
+        WHEEL_SAMPLES,
+        radius=wheel.radius,
+        rows=angles.size,
+        circles=2 * half_laterals + 1,
+        spacing_sine=np.sin(angles[1] - angles[0]),
+        spacing_cosine=np.cos(angles[1] - angles[0]),
     )
+    samples.sines[: angles.size], samples.cosines[: angles.size] = np.sin(angles), np.cos(angles)
+    half = 0.5 * wheel.width
+    samples.laterals[: samples.circles] = np.linspace(-half, half, samples.circles)
+    return samples
 
 
-@allocating_kernel
-def new_touch(samples):
-    """Return an empty set of touches."""
-    circles = samples.laterals.size
-    return Touch(
-        np.empty(6),
-        np.empty(6),
-        np.empty(6),
-        np.empty((6, 3)),
-        np.empty((6, 3)),
-        np.full(6, np.nan),
-        np.full(6, np.nan),
-        np.zeros(6, np.int64),
-        np.empty((6, circles)),
-        np.empty((6, circles)),
-        np.empty((6, circles)),
-        np.zeros(circles, np.int64),
-        np.empty(circles),
-        np.zeros(circles, np.int64),
-    )
+def new_touch() -> Any:
+    """Return an empty TOUCH, no wheel held."""
+    return new_record(TOUCH, held_height=np.nan, held_angle=np.nan)
 
 
 @kernel
@@ -179,7 +145,7 @@ def _refine_circles(ground, samples, placement, wheel, all_circles, touch):
     if not all_circles:
         return
     best_s, best_c = touch.circle_sine[wheel, best], touch.circle_cosine[wheel, best]
-    for m in range(samples.laterals.size):
+    for m in range(samples.circles):
         if m != best and touch.circle_gap[wheel, m] <= reach:
             s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
             if abs(s * best_c - c * best_s) < samples.spacing_sine:
@@ -209,7 +175,7 @@ def _scan(ground, samples, placement, wheel, scope, touch):
     circle_gap, circle_sine, circle_cosine = (
         touch.circle_gap, touch.circle_sine, touch.circle_cosine
     )  # fmt: skip
-    first_m, last_m, stride = 0, laterals.size - 1, 1
+    first_m, last_m, stride = 0, samples.circles - 1, 1
     if scope == COARSE:
         first_m = last_m = last_m // 2
         stride = 2
@@ -217,10 +183,10 @@ def _scan(ground, samples, placement, wheel, scope, touch):
     centre_y = (centres[wheel, 1] - ground.y0) * scale
     centre_z = centres[wheel, 2]
     axis_x, axis_y, axis_z = R[0, 1] * scale, R[1, 1] * scale, R[2, 1]
-    rim = abs(axis_z) * laterals[laterals.size - 1]
+    rim = abs(axis_z) * laterals[samples.circles - 1]
     margin = np.inf if scope == EXACT else PRUNING_MARGIN * radius
     first_row, second_gap, second_row = touch.first_row, touch.second_gap, touch.second_row
-    for m in range(laterals.size):
+    for m in range(samples.circles):
         circle_gap[wheel, m] = np.inf
         second_gap[m] = np.inf
         first_row[m] = -2
@@ -228,7 +194,7 @@ def _scan(ground, samples, placement, wheel, scope, touch):
     if is_cell_on_map(elevation, centre_x, centre_y):
         roof = ground.wheel_ceiling[int(centre_y + 0.5), int(centre_x + 0.5)]
     best, best_m, status = np.inf, first_m, TOUCHING
-    rows = (sines.size - 1) // stride + 1
+    rows = (samples.rows - 1) // stride + 1
     for visit in range(rows):
         k = stride * (rows // 2 + ((visit + 1) // 2) * (1 - 2 * (visit % 2)))
         row_z = centre_z - radius * cosines[k] * up[2]
@@ -375,7 +341,7 @@ def find_contact(samples, placement, wheel, touch):
         return
     allowance = COMPLIANCE * samples.radius
     total, sine_sum, cosine_sum, lateral_sum = 0.0, 0.0, 0.0, 0.0
-    for m in range(samples.laterals.size):
+    for m in range(samples.circles):
         weight = 1.0 - (touch.circle_gap[wheel, m] - touch.gap[wheel]) / allowance
         if weight > 0.0:
             total += weight

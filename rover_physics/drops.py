@@ -7,11 +7,11 @@ it goes on for longer the wheel is on a slope too steep to stand on, and the slo
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rover_physics.crossing import HEIGHT_JUMP, SHORTEST, Crossings
-from rover_physics.evaluation import Columns
 
 LEAST_ANGLE = np.radians(15.0)
 """A wheel falls only from contacts at least this steep, however slippery they are."""
@@ -38,7 +38,7 @@ class Falls:
 def find_falls(
     radius: float,
     poses: np.ndarray,
-    columns: Columns,
+    results: Any,
     crossings: Crossings,
     direction: float = 1.0,
 ) -> Falls:
@@ -52,14 +52,14 @@ def find_falls(
     def in_order(at_waypoints: np.ndarray, between: np.ndarray) -> np.ndarray:
         return np.concatenate([at_waypoints, between])[order]
 
-    extra = crossings.columns
+    extra = crossings.results
     steps = np.hypot(*np.diff(in_order(poses, crossings.poses)[:, :2], axis=0).T)
     distance = np.concatenate([[0.0], np.cumsum(steps)])
-    angle = direction * in_order(columns.contact_angle, extra.contact_angle)
-    steep = _find_steep(angle, in_order(columns.friction, extra.friction))
+    angle = direction * in_order(results.contact_angle, extra.contact_angle)
+    steep = _find_steep(angle, in_order(results.friction, extra.friction))
     falling = _keep_short_runs(steep, distance, radius)
     rolling_over = _extend_to_edges(falling, angle, distance, radius)
-    heights = in_order(columns.centres, extra.centres)[:, :, 2]
+    heights = in_order(results.centres, extra.centres)[:, :, 2]
     owner = in_order(np.arange(n), crossings.waypoint)
     drops = _measure_drops(radius, heights, steps, rolling_over, owner, n)
     unordered = np.empty_like(falling)

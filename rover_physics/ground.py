@@ -30,6 +30,8 @@ class Ground(NamedTuple):
     """(ny, nx) friction coefficient, NaN where the rover's own holds; (0, 0) without a layer."""
     soil: np.ndarray
     """(ny, nx) rows of the table of soils, 0 for the default; (0, 0) without a layer."""
+    soils: np.ndarray
+    """(1 + k, 8) table of `pack_soils`: the default soil, then those of the layer."""
     x0: float
     """x of the centre of cell [0, 0] [m]."""
     y0: float
@@ -40,7 +42,7 @@ class Ground(NamedTuple):
 
 @lru_cache(maxsize=4)
 def pack_ground(terrain: Terrain, wheel_radius: float, wheel_width: float) -> Ground:
-    """Return `terrain` in the form the kernels read for wheels of a radius and width [m]."""
+    """Return `terrain` as the kernels read it for wheels of a radius and width [m], no soil."""
     elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
     friction = np.empty((0, 0)) if terrain.friction is None else terrain.friction
     half_width = 0.5 * wheel_width
@@ -51,6 +53,7 @@ def pack_ground(terrain: Terrain, wheel_radius: float, wheel_width: float) -> Gr
         _find_block_ceiling(elevation),
         np.ascontiguousarray(friction, dtype=np.float64),
         np.empty((0, 0), np.int32) if terrain.soil is None else terrain.soil + np.int32(1),
+        np.zeros((1, 8)),
         float(terrain.origin[0]),
         float(terrain.origin[1]),
         1.0 / float(terrain.resolution),
