@@ -116,7 +116,7 @@ def _find_jumps(results: Any, radius: float) -> np.ndarray:
     settled, angle = results["status"] == SETTLED, results["contact_angle"]
     steep = np.maximum(np.abs(angle[1:]), np.abs(angle[:-1])) > STEEP
     turned = steep & (np.abs(np.diff(angle, axis=0)) > ANGLE_JUMP)
-    lifted = np.abs(np.diff(results["centres"][:, :, 2], axis=0)) > HEIGHT_JUMP * radius
+    lifted = np.abs(np.diff(results["wheel_centres"][:, :, 2], axis=0)) > HEIGHT_JUMP * radius
     return settled[1:] & settled[:-1] & np.any(turned | lifted, axis=1)
 
 
@@ -130,16 +130,16 @@ def _climb(
     """Evaluate wheels held at stages between foot and edge where they jump up at one place."""
     poses, held, keys = [], [], []
     for start, end, a, _, row_a, row_b in places:
-        rise = row_b.centres[:, 2] - row_a.centres[:, 2]
+        rise = row_b.wheel_centres[:, 2] - row_a.wheel_centres[:, 2]
         climbing = rise > 0.05 * radius
         if not climbing.any() or rise.max() <= HEIGHT_JUMP * radius:
             continue
         course = a[2] if direction > 0.0 else a[2] + np.pi
-        face = [_face_ahead(terrain, radius, row_a.centres[w], course) for w in range(6)]
+        face = [_face_ahead(terrain, radius, row_a.wheel_centres[w], course) for w in range(6)]
         for stage in CLIMB_STAGES:
             holds = np.full((6, 2), np.nan)
             for wheel in np.flatnonzero(climbing):
-                height = row_a.centres[wheel, 2] + stage * rise[wheel]
+                height = row_a.wheel_centres[wheel, 2] + stage * rise[wheel]
                 holds[wheel] = height, direction * _angle_on_face(radius, height, *face[wheel])
             poses.append(a)
             held.append(holds)

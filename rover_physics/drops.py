@@ -19,6 +19,8 @@ MOST_FALLING = 2
 """One axle at a time may fall; more is a rover sliding down a slope."""
 ON_THE_EDGE = np.radians(-2.0)
 """Contact angle from which on a wheel turns over an edge."""
+ROUNDING = 1e-9
+"""Descents [m] that are none."""
 LONGEST_FALL = 2.5
 """Way of the rover, in wheel radii, from before the edge to after the landing."""
 
@@ -59,7 +61,7 @@ def find_falls(
     steep = _find_steep(angle, in_order(results.friction, extra.friction))
     falling = _keep_short_runs(steep, distance, radius)
     rolling_over = _extend_to_edges(falling, angle, distance, radius)
-    heights = in_order(results.centres, extra.centres)[:, :, 2]
+    heights = in_order(results.wheel_centres, extra.wheel_centres)[:, :, 2]
     owner = in_order(np.arange(n), crossings.waypoint)
     drops = _measure_drops(radius, heights, steps, rolling_over, owner, n)
     unordered = np.empty_like(falling)
@@ -117,6 +119,7 @@ def _measure_drops(
 ) -> np.ndarray:
     """Add up the descent of each wheel while it falls; a sudden descent at one place is a fall."""
     descents = np.nan_to_num(np.maximum(-np.diff(heights, axis=0), 0.0))
+    descents[descents < ROUNDING] = 0.0
     sudden = (descents > HEIGHT_JUMP * radius) & (steps[:, None] <= 2.0 * SHORTEST)
     dropping = falling[:-1] | falling[1:] | sudden
     drops, fallen = np.zeros((n, 6)), np.zeros(6)

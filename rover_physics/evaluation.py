@@ -8,7 +8,7 @@ from numba import prange
 from rover_physics.clearance import belly_clearance
 from rover_physics.contact import TOUCH
 from rover_physics.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
-from rover_physics.ground import friction_at
+from rover_physics.ground import friction_at, heights_of
 from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.linkage import PLACEMENT, place_masses
 from rover_physics.records import new_record, record_type
@@ -47,25 +47,25 @@ SETTINGS = record_type(
 RESULT = record_type(
     ("status", np.int8),
     ("q", float, (6,)),
-    ("centres", float, (6, 3)),
-    ("points", float, (6, 3)),
+    ("wheel_centres", float, (6, 3)),
+    ("contact_points", float, (6, 3)),
     ("contact_angle", float, (6,)),
-    ("N", float, (6,)),
-    ("T", float, (6,)),
-    ("S", float, (6,)),
+    ("wheel_loads", float, (6,)),
+    ("tangential", float, (6,)),
+    ("lateral", float, (6,)),
     ("torque", float, (6,)),
     ("friction", float, (6,)),
-    ("utilisation", float, (6,)),
-    ("slip", float, (6,)),
-    ("saturation", float, (6,)),
+    ("friction_utilisation", float, (6,)),
+    ("slip_ratio", float, (6,)),
+    ("torque_saturation", float, (6,)),
     ("sinkage", float, (6,)),
-    ("resistance", float, (6,)),
+    ("motion_resistance", float, (6,)),
     ("tip_over_ratio", float),
-    ("force_angle", float),
-    ("clearance", float),
+    ("tip_over_force_angle", float),
+    ("belly_clearance", float),
     ("power", float),
 )
-"""The results of one pose; see `PathPrediction`."""
+"""The results of one pose; all but q are as in `PathPrediction`."""
 
 WORK = record_type(
     ("placement", PLACEMENT),
@@ -135,8 +135,9 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
     for wheel in range(6 if held.shape[0] > 0 else 0):
         touch.held_height[wheel] = held[i, wheel, 0]
         touch.held_angle[wheel] = held[i, wheel, 1]
+    grid = heights_of(ground)
     status = settle(
-        ground, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
+        grid, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
         q, placement, touch, work.J, work.step,
     )  # fmt: skip
     if status == SETTLED:
@@ -152,8 +153,8 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
     _write_forces(ground, linkage, settings, work, result)
     angle, measure = find_tip_over(linkage, work)
     result.tip_over_ratio = angle / settings.flat_angle
-    result.force_angle = measure / settings.flat_measure
-    result.clearance = belly_clearance(ground, linkage, placement)
+    result.tip_over_force_angle = measure / settings.flat_measure
+    result.belly_clearance = belly_clearance(grid, ground.ceiling, linkage, placement)
 
 
 @kernel
@@ -161,8 +162,8 @@ def _write_geometry(placement, touch, result):
     for wheel in range(6):
         result.contact_angle[wheel] = np.arctan2(touch.sine[wheel], touch.cosine[wheel])
         for k in range(3):
-            result.centres[wheel, k] = placement.centres[wheel, k]
-            result.points[wheel, k] = touch.point[wheel, k]
+            result.wheel_centres[wheel, k] = placement.centres[wheel, k]
+            result.contact_points[wheel, k] = touch.point[wheel, k]
 
 
 @kernel
@@ -194,16 +195,16 @@ def _write_forces(ground, linkage, settings, work, result):
             torque = linkage.radius * T
             utilisation = np.sqrt(T * T + S * S) / (mu * N) if N > 0.0 else np.inf
             slip = coulomb_slip(utilisation)
-        result.N[wheel] = N
-        result.T[wheel] = T
-        result.S[wheel] = S
+        result.wheel_loads[wheel] = N
+        result.tangential[wheel] = T
+        result.lateral[wheel] = S
         result.torque[wheel] = torque
         result.friction[wheel] = mu
-        result.utilisation[wheel] = utilisation
-        result.slip[wheel] = slip
-        result.saturation[wheel] = abs(torque) / settings.max_torque
+        result.friction_utilisation[wheel] = utilisation
+        result.slip_ratio[wheel] = slip
+        result.torque_saturation[wheel] = abs(torque) / settings.max_torque
         result.sinkage[wheel] = sinkage
-        result.resistance[wheel] = resistance
+        result.motion_resistance[wheel] = resistance
         power += max(settings.direction * torque, 0.0) * _wheel_speed(
             linkage.radius, slip, settings
         )

@@ -79,8 +79,7 @@ def set_up(
         flat_angle=flat_angle,
         flat_measure=flat_measure,
     )
-    ground = pack_ground(terrain, rover.wheel.radius, rover.wheel.width)
-    ground = ground._replace(soils=_pack_soils(terrain.soil_names, soil))
+    ground = pack_ground(terrain)._replace(soils=_pack_soils(terrain.soil_names, soil))
     return Setup(ground, pack_linkage(rover, mass, com, tool), samples, settings)
 
 

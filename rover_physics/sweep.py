@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rover_physics.crossing import find_crossings
 from rover_physics.drops import find_falls
 from rover_physics.errors import PoseError
-from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, evaluate
+from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, evaluate
 from rover_physics.model_setup import POLICIES, set_up
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover, load_rover
@@ -145,6 +145,7 @@ def _collect(poses: np.ndarray, results: Any, settings: Any, policy: str, **more
     durations = np.hypot(steps, climbs) / settings.speed
     power = np.nan_to_num(results.power)
     work = 0.5 * (power[1:] + power[:-1]) * durations
+    same = {name: results[name] for name in RESULT.names or () if name not in ("q", "status")}
     return PathPrediction(
         poses=poses,
         status=results.status,
@@ -154,27 +155,11 @@ def _collect(poses: np.ndarray, results: Any, settings: Any, policy: str, **more
         pitch=results.q[:, 2],
         rocker_angle=np.column_stack([rocker, -rocker]),
         bogie_angle=results.q[:, 4:6],
-        wheel_centres=results.centres,
-        contact_points=results.points,
-        contact_angle=results.contact_angle,
-        wheel_loads=results.N,
-        tangential=results.T,
-        lateral=results.S,
-        torque=results.torque,
-        friction=results.friction,
-        friction_utilisation=results.utilisation,
-        slip_ratio=results.slip,
-        torque_saturation=results.saturation,
-        tip_over_ratio=results.tip_over_ratio,
-        tip_over_force_angle=results.force_angle,
-        belly_clearance=results.clearance,
-        sinkage=results.sinkage,
-        motion_resistance=results.resistance,
-        power=results.power,
         energy=_accumulate(work, settled),
         time=_accumulate(durations, settled),
         distance=np.concatenate([[0.0], np.cumsum(steps)]),
         policy=policy,
+        **same,
         **more,
     )
 

@@ -100,9 +100,9 @@ def find_torque_ranges(
 
 
 def _is_within(rover: Rover, setup: Setup, result: Any) -> bool:
-    friction = result.utilisation.max() < rover.limits.friction_utilisation
+    friction = result.friction_utilisation.max() < rover.limits.friction_utilisation
     torque = np.abs(result.torque).max() < setup.settings.allowed_torque
-    return bool(friction and torque and result.N.min() > 0.0)
+    return bool(friction and torque and result.wheel_loads.min() > 0.0)
 
 
 def _describe_set(
@@ -110,7 +110,7 @@ def _describe_set(
 ) -> tuple[_FeasibleSet, np.ndarray]:
     """Return the feasible set of a waypoint in units of the weight, and a point x (k,) in it."""
     weight = setup.linkage.mass * setup.linkage.gravity
-    known = np.concatenate([result.T, result.S]) / weight
+    known = np.concatenate([result.tangential, result.lateral]) / weight
     slopes = np.vstack([balance.tangential, balance.lateral])
     start = np.linalg.lstsq(slopes[:, 1:], known - slopes[:, 0], rcond=None)[0]
     shared = np.abs(start[FREE_TORQUES:]).max() <= EQUAL_SHARES
@@ -119,7 +119,7 @@ def _describe_set(
         rows[:, : 1 + free] for rows in (balance.normal, balance.tangential, balance.lateral)
     )
     used = rover.limits.friction_utilisation
-    resistance = (result.resistance / result.N)[:, None] * normal
+    resistance = (result.motion_resistance / result.wheel_loads)[:, None] * normal
     strength = result.friction[:, None] * normal + resistance
     resistance = setup.settings.direction * resistance
     forces = _FeasibleSet(
