@@ -1,63 +1,130 @@
 """How far the belly of the body stays above the ground."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rover_physics.ground import BLOCK
 from rover_physics.kernels import kernel
 
+HALF = 0.5 * (BLOCK - 1)
+"""Distance of a block's outer rows and columns from its middle, in cells."""
+
+
+class Underside(NamedTuple):
+    """The underside's plane above the cells of a map; all linear in row i and column j."""
+
+    z: float
+    """Height of the plane above cell [0, 0] [m]."""
+    z_i: float
+    """Its rise per row."""
+    z_j: float
+    """Its rise per column."""
+    along: float
+    """Place of the plane's point above cell [0, 0] along the body [m]."""
+    along_i: float
+    """Its change per row."""
+    along_j: float
+    """Its change per column."""
+    across: float
+    """The same across the body."""
+    across_i: float
+    """Its change per row."""
+    across_j: float
+    """Its change per column."""
+
 
 @kernel
-def belly_clearance(ground, linkage, placement):
+def belly_clearance(grid, ceiling, linkage, placement):
     """Return the smallest height [m] of the underside above the known ground below it.
 
     Looked up at all cell centres within the outline of the underside; NaN where none is known
-    there. Blocks of cells are passed over whose highest ground stays below what is found already.
+    there. The block of cells that may come nearest is looked at first; others are passed over
+    whose highest ground, as `ceiling` has it, stays farther below than what is found already.
     """
     R, origin, belly = placement.R, placement.origin, linkage.belly
-    blocks = ground.block_ceiling
     if not R[2, 2] > 0.0:
         return np.nan
-    low_i, high_i, low_j, high_j = _cells_below(ground, R, origin, belly)
-    smallest = np.inf
-    for bi in range(max(low_i // BLOCK, 0), min(high_i // BLOCK, blocks.shape[0] - 1) + 1):
-        for bj in range(max(low_j // BLOCK, 0), min(high_j // BLOCK, blocks.shape[1] - 1) + 1):
-            if _lowest_above(ground, R, origin, belly, bi, bj) - blocks[bi, bj] < smallest:
-                smallest = min(smallest, _clear_block(ground, R, origin, belly, bi, bj))
+    plane = _describe_underside(grid, R, origin, belly)
+    low_i, high_i, low_j, high_j = _blocks_below(grid, R, origin, belly, ceiling)
+    nearest, nearest_i, nearest_j = np.inf, low_i, low_j
+    for bi in range(low_i, high_i + 1):
+        for bj in range(low_j, high_j + 1):
+            bound = _lowest_above(plane, bi, bj) - ceiling[bi, bj]
+            if bound < nearest and _is_below(plane, belly, bi, bj):
+                nearest, nearest_i, nearest_j = bound, bi, bj
+    if nearest == np.inf:
+        return np.nan
+    smallest = _clear_block(grid.elevation, plane, belly, nearest_i, nearest_j, np.inf)
+    for bi in range(low_i, high_i + 1):
+        for bj in range(low_j, high_j + 1):
+            if _lowest_above(plane, bi, bj) - ceiling[bi, bj] < smallest and _is_below(
+                plane, belly, bi, bj
+            ):
+                smallest = _clear_block(grid.elevation, plane, belly, bi, bj, smallest)
     return smallest if smallest < np.inf else np.nan
 
 
 @kernel
-def _lowest_above(ground, R, origin, belly, bi, bj):
-    """Return the lowest height [m] of the underside's plane above a block of cells."""
-    half = 0.5 * (BLOCK - 1) / ground.inverse_resolution
-    dx = ground.x0 + BLOCK * bj / ground.inverse_resolution + half - origin[0]
-    dy = ground.y0 + BLOCK * bi / ground.inverse_resolution + half - origin[1]
-    z = (belly[0] - R[0, 2] * dx - R[1, 2] * dy) / R[2, 2]
-    return origin[2] + z - half * (abs(R[0, 2]) + abs(R[1, 2])) / R[2, 2]
+def _describe_underside(grid, R, origin, belly):
+    cell = 1.0 / grid.inverse_resolution
+    dx, dy = grid.x0 - origin[0], grid.y0 - origin[1]
+    rise_x, rise_y = -R[0, 2] / R[2, 2], -R[1, 2] / R[2, 2]
+    z = belly[0] / R[2, 2] + rise_x * dx + rise_y * dy
+    z_i, z_j = rise_y * cell, rise_x * cell
+    return Underside(
+        origin[2] + z,
+        z_i,
+        z_j,
+        R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * z,
+        R[1, 0] * cell + R[2, 0] * z_i,
+        R[0, 0] * cell + R[2, 0] * z_j,
+        R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * z,
+        R[1, 1] * cell + R[2, 1] * z_i,
+        R[0, 1] * cell + R[2, 1] * z_j,
+    )
 
 
 @kernel
-def _clear_block(ground, R, origin, belly, bi, bj):
-    """Return the smallest clearance [m] above the cells of a block below the underside."""
-    elevation, scale = ground.elevation, ground.inverse_resolution
-    smallest = np.inf
+def _lowest_above(plane, bi, bj):
+    """Return the lowest height [m] of the underside's plane above a block of cells."""
+    i = BLOCK * bi + (0 if plane.z_i > 0.0 else BLOCK - 1)
+    j = BLOCK * bj + (0 if plane.z_j > 0.0 else BLOCK - 1)
+    return plane.z + plane.z_i * i + plane.z_j * j
+
+
+@kernel
+def _is_below(plane, belly, bi, bj):
+    """Tell whether any cell of a block may be below the underside."""
+    i, j = BLOCK * bi + HALF, BLOCK * bj + HALF
+    along = plane.along + plane.along_i * i + plane.along_j * j
+    across = plane.across + plane.across_i * i + plane.across_j * j
+    beyond = HALF * (abs(plane.along_i) + abs(plane.along_j))
+    aside = HALF * (abs(plane.across_i) + abs(plane.across_j))
+    return (
+        belly[1] - beyond <= along <= belly[2] + beyond
+        and belly[3] - aside <= across <= belly[4] + aside
+    )
+
+
+@kernel
+def _clear_block(elevation, plane, belly, bi, bj, smallest):
+    """Return the smaller of `smallest` and the clearance [m] above the cells of a block."""
     for i in range(BLOCK * bi, min(BLOCK * (bi + 1), elevation.shape[0])):
+        z = plane.z + plane.z_i * i
         for j in range(BLOCK * bj, min(BLOCK * (bj + 1), elevation.shape[1])):
-            dx = ground.x0 + j / scale - origin[0]
-            dy = ground.y0 + i / scale - origin[1]
-            z = (belly[0] - R[0, 2] * dx - R[1, 2] * dy) / R[2, 2]
-            clearance = origin[2] + z - elevation[i, j]
+            clearance = z + plane.z_j * j - elevation[i, j]
             if clearance < smallest:
-                along = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * z
-                across = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * z
+                along = plane.along + plane.along_i * i + plane.along_j * j
+                across = plane.across + plane.across_i * i + plane.across_j * j
                 if belly[1] <= along <= belly[2] and belly[3] <= across <= belly[4]:
                     smallest = clearance
     return smallest
 
 
 @kernel
-def _cells_below(ground, R, origin, belly):
-    """Return the smallest and largest row and column of the cells around the underside."""
+def _blocks_below(grid, R, origin, belly, ceiling):
+    """Return the smallest and largest row and column of the blocks around the underside."""
     low_x = low_y = np.inf
     high_x = high_y = -np.inf
     for corner in range(4):
@@ -67,10 +134,11 @@ def _cells_below(ground, R, origin, belly):
         y = origin[1] + R[1, 0] * along + R[1, 1] * across + R[1, 2] * belly[0]
         low_x, high_x = min(low_x, x), max(high_x, x)
         low_y, high_y = min(low_y, y), max(high_y, y)
-    scale = ground.inverse_resolution
+    scale = grid.inverse_resolution
+    last_i, last_j = ceiling.shape[0] - 1, ceiling.shape[1] - 1
     return (
-        int(np.ceil((low_y - ground.y0) * scale)),
-        int(np.floor((high_y - ground.y0) * scale)),
-        int(np.ceil((low_x - ground.x0) * scale)),
-        int(np.floor((high_x - ground.x0) * scale)),
+        max(int(np.floor((low_y - grid.y0) * scale)) // BLOCK, 0),
+        min(int(np.ceil((high_y - grid.y0) * scale)) // BLOCK, last_i),
+        max(int(np.floor((low_x - grid.x0) * scale)) // BLOCK, 0),
+        min(int(np.ceil((high_x - grid.x0) * scale)) // BLOCK, last_j),
     )

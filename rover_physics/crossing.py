@@ -9,10 +9,11 @@ contact; downwards it drops.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from rover_physics.evaluation import Columns, new_columns
+from rover_physics.evaluation import NONE_HELD, new_results
 from rover_physics.settling import NOT_SETTLED, SETTLED
 from rover_physics.terrain import Terrain
 
@@ -26,7 +27,7 @@ SHORTEST = 1e-4
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)[1:]
 """Shares of the height of a face at which a climbing wheel is evaluated."""
 
-Evaluate = Callable[[np.ndarray, np.ndarray | None], Columns]
+Evaluate = Callable[[np.ndarray, np.ndarray], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +40,15 @@ class Crossings:
     """(m,) index of the waypoint that follows."""
     poses: np.ndarray
     """(m, 3) x, y [m], yaw [rad]."""
-    columns: Columns
-    """Results, a row per pose."""
+    results: Any
+    """(m,) RESULT of each pose."""
 
 
 def find_crossings(
     terrain: Terrain,
     radius: float,
     poses: np.ndarray,
-    columns: Columns,
+    results: Any,
     evaluate: Evaluate,
     direction: float = 1.0,
 ) -> Crossings:
@@ -57,26 +58,26 @@ def find_crossings(
         terrain: The ground.
         radius: Wheel radius [m].
         poses: (n, 3) waypoints.
-        columns: Their results.
+        results: (n,) their RESULTs.
         evaluate: Evaluates poses (k, 3), with heights and contact angles (k, 6, 2) of held
-            wheels or None.
+            wheels or NONE_HELD.
         direction: 1 where the rover drives forwards along the path, -1 backwards.
     """
-    found: list[tuple[float, np.ndarray, Columns, int]] = []
+    found: list[tuple[float, np.ndarray, Any, int]] = []
     spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     on_a_path = (spacing <= radius) & (spacing > 0.0)
-    jumps = _find_jumps(columns.status, columns.contact_angle, columns.centres[:, :, 2], radius)
+    jumps = _find_jumps(results, radius)
     open_ = [
-        (float(i), i + 1.0, poses[i], poses[i + 1], *_take(columns, [i, i + 1]))
+        (float(i), i + 1.0, poses[i], poses[i + 1], results[i], results[i + 1])
         for i in np.flatnonzero(on_a_path & jumps)
     ]
     while open_:
         middles = np.array([_between(a, b) for _, _, a, b, _, _ in open_])
-        results = evaluate(middles, None)
+        inner = evaluate(middles, NONE_HELD)
         halves: list[tuple] = []
         places: list[tuple] = []
         for k, (start, end, a, b, row_a, row_b) in enumerate(open_):
-            centre, row = 0.5 * (start + end), _take(results, [k])[0]
+            centre, row = 0.5 * (start + end), inner[k]
             if row.status == NOT_SETTLED:
                 places.append(open_[k])
                 continue
@@ -99,7 +100,10 @@ def _in_order(found) -> Crossings:
     waypoint = np.array([item[3] for item in found], dtype=int)
     poses = np.array([item[1] for item in found]).reshape(-1, 3)
     place = np.array([item[0] for item in found])
-    return Crossings(place, waypoint, poses, _stack([item[2] for item in found]))
+    results = new_results(len(found))
+    for k, item in enumerate(found):
+        results[k] = item[2]
+    return Crossings(place, waypoint, poses, results)
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -107,32 +111,17 @@ def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), a[2] + 0.5 * turn])
 
 
-def _take(columns: Columns, rows) -> list[Columns]:
-    return [Columns(*(column[i] for column in columns)) for i in rows]
-
-
-def _stack(rows: list[Columns]) -> Columns:
-    if not rows:
-        return new_columns(0)
-    return Columns(*(np.stack(column) for column in zip(*rows, strict=True)))
-
-
-def _find_jumps(
-    status: np.ndarray, angle: np.ndarray, height: np.ndarray, radius: float
-) -> np.ndarray:
-    """Return (k - 1,) True between rows where a contact jumps; angle, height (k, 6) [rad], [m]."""
-    settled = status == SETTLED
+def _find_jumps(results: Any, radius: float) -> np.ndarray:
+    """Return (k - 1,) True between k results where a contact jumps."""
+    settled, angle = results["status"] == SETTLED, results["contact_angle"]
     steep = np.maximum(np.abs(angle[1:]), np.abs(angle[:-1])) > STEEP
     turned = steep & (np.abs(np.diff(angle, axis=0)) > ANGLE_JUMP)
-    lifted = np.abs(np.diff(height, axis=0)) > HEIGHT_JUMP * radius
+    lifted = np.abs(np.diff(results["wheel_centres"][:, :, 2], axis=0)) > HEIGHT_JUMP * radius
     return settled[1:] & settled[:-1] & np.any(turned | lifted, axis=1)
 
 
-def _jumps(before: Columns, after: Columns, radius: float) -> bool:
-    status = np.array([before.status, after.status])
-    angle = np.array([before.contact_angle, after.contact_angle])
-    height = np.array([before.centres[:, 2], after.centres[:, 2]])
-    return bool(_find_jumps(status, angle, height, radius)[0])
+def _jumps(before: Any, after: Any, radius: float) -> bool:
+    return bool(_find_jumps(np.array([before, after]), radius)[0])
 
 
 def _climb(
@@ -141,24 +130,23 @@ def _climb(
     """Evaluate wheels held at stages between foot and edge where they jump up at one place."""
     poses, held, keys = [], [], []
     for start, end, a, _, row_a, row_b in places:
-        rise = row_b.centres[:, 2] - row_a.centres[:, 2]
+        rise = row_b.wheel_centres[:, 2] - row_a.wheel_centres[:, 2]
         climbing = rise > 0.05 * radius
         if not climbing.any() or rise.max() <= HEIGHT_JUMP * radius:
             continue
         course = a[2] if direction > 0.0 else a[2] + np.pi
-        face = [_face_ahead(terrain, radius, row_a.centres[w], course) for w in range(6)]
+        face = [_face_ahead(terrain, radius, row_a.wheel_centres[w], course) for w in range(6)]
         for stage in CLIMB_STAGES:
             holds = np.full((6, 2), np.nan)
             for wheel in np.flatnonzero(climbing):
-                height = row_a.centres[wheel, 2] + stage * rise[wheel]
+                height = row_a.wheel_centres[wheel, 2] + stage * rise[wheel]
                 holds[wheel] = height, direction * _angle_on_face(radius, height, *face[wheel])
             poses.append(a)
             held.append(holds)
             keys.append((start + stage * (end - start), int(np.floor(start)) + 1))
     if not poses:
         return []
-    results = evaluate(np.array(poses), np.array(held))
-    rows = _take(results, range(len(poses)))
+    rows = evaluate(np.array(poses), np.array(held))
     stages = len(CLIMB_STAGES)
     climbs = []
     for first in range(0, len(rows), stages):

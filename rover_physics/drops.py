@@ -7,11 +7,11 @@ it goes on for longer the wheel is on a slope too steep to stand on, and the slo
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rover_physics.crossing import HEIGHT_JUMP, SHORTEST, Crossings
-from rover_physics.evaluation import Columns
 
 LEAST_ANGLE = np.radians(15.0)
 """A wheel falls only from contacts at least this steep, however slippery they are."""
@@ -19,6 +19,8 @@ MOST_FALLING = 2
 """One axle at a time may fall; more is a rover sliding down a slope."""
 ON_THE_EDGE = np.radians(-2.0)
 """Contact angle from which on a wheel turns over an edge."""
+ROUNDING = 1e-9
+"""Descents [m] that are none."""
 LONGEST_FALL = 2.5
 """Way of the rover, in wheel radii, from before the edge to after the landing."""
 
@@ -38,7 +40,7 @@ class Falls:
 def find_falls(
     radius: float,
     poses: np.ndarray,
-    columns: Columns,
+    results: Any,
     crossings: Crossings,
     direction: float = 1.0,
 ) -> Falls:
@@ -52,14 +54,14 @@ def find_falls(
     def in_order(at_waypoints: np.ndarray, between: np.ndarray) -> np.ndarray:
         return np.concatenate([at_waypoints, between])[order]
 
-    extra = crossings.columns
+    extra = crossings.results
     steps = np.hypot(*np.diff(in_order(poses, crossings.poses)[:, :2], axis=0).T)
     distance = np.concatenate([[0.0], np.cumsum(steps)])
-    angle = direction * in_order(columns.contact_angle, extra.contact_angle)
-    steep = _find_steep(angle, in_order(columns.friction, extra.friction))
+    angle = direction * in_order(results.contact_angle, extra.contact_angle)
+    steep = _find_steep(angle, in_order(results.friction, extra.friction))
     falling = _keep_short_runs(steep, distance, radius)
     rolling_over = _extend_to_edges(falling, angle, distance, radius)
-    heights = in_order(columns.centres, extra.centres)[:, :, 2]
+    heights = in_order(results.wheel_centres, extra.wheel_centres)[:, :, 2]
     owner = in_order(np.arange(n), crossings.waypoint)
     drops = _measure_drops(radius, heights, steps, rolling_over, owner, n)
     unordered = np.empty_like(falling)
@@ -117,6 +119,7 @@ def _measure_drops(
 ) -> np.ndarray:
     """Add up the descent of each wheel while it falls; a sudden descent at one place is a fall."""
     descents = np.nan_to_num(np.maximum(-np.diff(heights, axis=0), 0.0))
+    descents[descents < ROUNDING] = 0.0
     sudden = (descents > HEIGHT_JUMP * radius) & (steps[:, None] <= 2.0 * SHORTEST)
     dropping = falling[:-1] | falling[1:] | sudden
     drops, fallen = np.zeros((n, 6)), np.zeros(6)

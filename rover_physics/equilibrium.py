@@ -10,12 +10,11 @@ differences between the wheels' T are free: the over-actuation. Lengths are scal
 length and forces by the weight, so that the system is of order one for any rover.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from rover_physics.kernels import allocating_kernel, kernel
+from rover_physics.kernels import kernel
 from rover_physics.linear import solve_in_place
+from rover_physics.records import record_type
 
 UNKNOWNS = 9
 FREE_TORQUES = 5
@@ -26,40 +25,20 @@ FREE_LATERAL = np.array([0, 1, 3, 4])
 """Wheels whose lateral forces are the further degrees; the equal share makes up for them."""
 
 
-class Balance(NamedTuple):
-    """How the forces of a settled rover depend on its wheel tractions, in units of its weight.
+BALANCE = record_type(
+    ("normal", float, (6, 1 + FREE_FORCES)),  # wheel loads N
+    ("tangential", float, (6, 1 + FREE_FORCES)),  # tractions T
+    ("lateral", float, (6, 1 + FREE_FORCES)),  # lateral forces S
+    ("A", float, (UNKNOWNS, UNKNOWNS)),  # work space: the equations
+    ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
+    ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
+)
+"""How the forces of a settled rover depend on its wheel tractions, in units of its weight.
 
-    Column 0 holds the forces when all wheels pull alike; column 1 + k, k < 5, how they change when
-    wheel k pulls one unit more and the common pull makes up for it; column 6 + k how they change
-    when wheel FREE_LATERAL[k] is pushed one unit more along its axis and the lateral shares make
-    up for it.
-    """
-
-    normal: np.ndarray
-    """(6, 10) wheel loads N."""
-    tangential: np.ndarray
-    """(6, 10) tractions T."""
-    lateral: np.ndarray
-    """(6, 10) lateral forces S."""
-    A: np.ndarray
-    """(9, 9) work space: the equations."""
-    B: np.ndarray
-    """(9, 10) work space: right-hand sides, then solutions."""
-    frames: np.ndarray
-    """(6, 3, 3) contact frames: rows n, t, a of each wheel, map frame."""
-
-
-@allocating_kernel
-def new_balance():
-    """Return an empty balance."""
-    return Balance(
-        np.empty((6, 1 + FREE_FORCES)),
-        np.empty((6, 1 + FREE_FORCES)),
-        np.empty((6, 1 + FREE_FORCES)),
-        np.empty((UNKNOWNS, UNKNOWNS)),
-        np.empty((UNKNOWNS, 1 + FREE_FORCES)),
-        np.empty((6, 3, 3)),
-    )
+Column 0 holds the forces when all wheels pull alike; column 1 + k, k < 5, how they change when
+wheel k pulls one unit more and the common pull makes up for it; column 6 + k how they change when
+wheel FREE_LATERAL[k] is pushed one unit more along its axis and the lateral shares make up for it.
+"""
 
 
 @kernel
@@ -204,7 +183,7 @@ def _add_weights(linkage, placement, B):
             linkage, placement, B, part_coms, part, mass, (part - 1) % 2, part > 0, part > 2
         )
     for wheel in range(6):
-        on_bogie = linkage.on_bogie[wheel]
+        on_bogie = linkage.on_bogie[wheel] > 0
         mass = linkage.wheel_mass
         _add_weight(linkage, placement, B, centres, wheel, mass, wheel // 3, wheel >= 0, on_bogie)
 

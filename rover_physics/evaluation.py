@@ -1,159 +1,143 @@
 """The full model at one pose, and the compiled sweep of it over many poses."""
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import prange
 
 from rover_physics.clearance import belly_clearance
-from rover_physics.contact import Touch, new_touch
-from rover_physics.equilibrium import (
-    FREE_FORCES,
-    Balance,
-    balance_forces,
-    new_balance,
-    tool_load,
-)
-from rover_physics.ground import friction_at
-from rover_physics.kernels import allocating_kernel, kernel, sweep_kernel
-from rover_physics.linkage import Placement, new_placement, place_masses
+from rover_physics.contact import TOUCH
+from rover_physics.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
+from rover_physics.ground import friction_at, heights_of
+from rover_physics.kernels import kernel, sweep_kernel
+from rover_physics.linkage import PLACEMENT, place_masses
+from rover_physics.records import new_record, record_type
 from rover_physics.settling import SETTLED, settle
 from rover_physics.soil import coulomb_slip, effective_friction, solve_wheel
 from rover_physics.soil_sharing import share_forces_on_soil
 from rover_physics.stability import CORNERS, find_support, tip_over_angles
 from rover_physics.torques import (
     EQUAL,
-    TorqueSearch,
+    TORQUE_SEARCH,
     minimise_friction,
-    new_torque_search,
     take_equal_torques,
 )
 
 NO_EQUILIBRIUM = 4
-CHUNK = 16
-"""Poses that share one work space; small enough to keep all cores busy."""
+CHUNK, MOST_CHUNKS = 16, 64
+"""Poses that share one work space at least, and most such chunks: enough to keep cores busy."""
+NONE_HELD = np.empty((0, 6, 2))
+"""No wheel climbs a face."""
 
 
-class Settings(NamedTuple):
-    """What a sweep is asked for."""
+SETTINGS = record_type(
+    ("policy", np.int64),  # EQUAL or OPTIMAL
+    ("friction", float),  # friction coefficient where the terrain gives none
+    ("max_torque", float),  # largest wheel torque [N m]
+    ("allowed_torque", float),  # largest wheel torque within the safety limit [N m]
+    ("on_soil", np.bool_),  # whether anything but the ground's own Coulomb friction may hold
+    ("direction", float),  # 1 where the rover drives forwards, -1 backwards
+    ("speed", float),  # speed of the wheels over the ground [m/s]
+    ("max_wheel_speed", float),  # largest wheel speed [rad/s]
+    ("flat_angle", float),  # tip-over angle on flat ground [rad]
+    ("flat_measure", float),  # force-angle measure on flat ground [N m]
+)
+"""What a sweep is asked for."""
 
-    policy: int
-    """EQUAL or OPTIMAL."""
-    friction: float
-    """Friction coefficient where the terrain gives none."""
-    max_torque: float
-    """Largest wheel torque [N m]."""
-    allowed_torque: float
-    """Largest wheel torque within the safety limit [N m]."""
-    on_soil: bool
-    """Whether anything but the ground's own Coulomb friction may hold."""
-    soils: np.ndarray
-    """(1 + k, 8) table of `pack_soils`: the default soil, then those of the terrain's layer."""
-    direction: float
-    """1 where the rover drives forwards, -1 backwards."""
-    speed: float
-    """Speed of the wheels over the ground [m/s]."""
-    max_wheel_speed: float
-    """Largest wheel speed [rad/s]."""
-    flat_angle: float
-    """Tip-over angle on flat ground [rad]."""
-    flat_measure: float
-    """Force-angle measure on flat ground [N m]."""
+RESULT = record_type(
+    ("status", np.int8),
+    ("q", float, (6,)),
+    ("wheel_centres", float, (6, 3)),
+    ("contact_points", float, (6, 3)),
+    ("contact_angle", float, (6,)),
+    ("wheel_loads", float, (6,)),
+    ("tangential", float, (6,)),
+    ("lateral", float, (6,)),
+    ("torque", float, (6,)),
+    ("friction", float, (6,)),
+    ("friction_utilisation", float, (6,)),
+    ("slip_ratio", float, (6,)),
+    ("torque_saturation", float, (6,)),
+    ("sinkage", float, (6,)),
+    ("motion_resistance", float, (6,)),
+    ("tip_over_ratio", float),
+    ("tip_over_force_angle", float),
+    ("belly_clearance", float),
+    ("power", float),
+)
+"""The results of one pose; all but q are as in `PathPrediction`."""
 
-
-class Columns(NamedTuple):
-    """Results, a row per pose; see `PathPrediction`."""
-
-    status: np.ndarray
-    q: np.ndarray
-    centres: np.ndarray
-    points: np.ndarray
-    contact_angle: np.ndarray
-    N: np.ndarray
-    T: np.ndarray
-    S: np.ndarray
-    torque: np.ndarray
-    friction: np.ndarray
-    utilisation: np.ndarray
-    slip: np.ndarray
-    saturation: np.ndarray
-    tip_over_ratio: np.ndarray
-    force_angle: np.ndarray
-    clearance: np.ndarray
-    power: np.ndarray
-    sinkage: np.ndarray
-    resistance: np.ndarray
-
-
-def new_columns(n: int) -> Columns:
-    """Return results of n poses, all NaN."""
-
-    def blank(*shape: int) -> np.ndarray:
-        return np.full((n, *shape), np.nan)
-
-    per_wheel = [blank(6) for _ in range(9)]
-    per_pose = [blank() for _ in range(4)]
-    last = [blank(6) for _ in range(2)]
-    return Columns(
-        np.zeros(n, np.int8), blank(6), blank(6, 3), blank(6, 3), *per_wheel, *per_pose, *last
-    )
+WORK = record_type(
+    ("placement", PLACEMENT),
+    ("touch", TOUCH),
+    ("balance", BALANCE),
+    ("search", TORQUE_SEARCH),
+    ("J", float, (6, 6)),
+    ("step", float, (6, 1)),
+    ("corners", float, (CORNERS, 3)),
+    ("centre", float, (3,)),
+    ("force", float, (3,)),
+    ("moment", float, (3,)),
+    ("soil_rows", np.int64, (6,)),
+    ("best", float, (3, 6)),
+)
+"""Work space of one thread."""
 
 
-class Work(NamedTuple):
-    """Work space of one thread."""
-
-    placement: Placement
-    touch: Touch
-    balance: Balance
-    search: TorqueSearch
-    J: np.ndarray
-    step: np.ndarray
-    corners: np.ndarray
-    vectors: np.ndarray
-    soil_rows: np.ndarray
-    best: np.ndarray
+def new_results(n: int) -> Any:
+    """Return the results (n,) of n poses, all NaN."""
+    blank = new_record(RESULT)
+    for name in RESULT.names or ():
+        blank[name] = 0 if name == "status" else np.nan
+    return np.full(n, blank, RESULT).view(np.recarray)
 
 
-@allocating_kernel
-def new_work(samples):
-    """Return empty work space."""
-    return Work(
-        new_placement(),
-        new_touch(samples),
-        new_balance(),
-        new_torque_search(),
-        np.empty((6, 6)),
-        np.empty((6, 1)),
-        np.empty((CORNERS, 3)),
-        np.empty((3, 3)),
-        np.zeros(6, np.int64),
-        np.empty((3, 6)),
-    )
+def new_work() -> Any:
+    """Return empty work space, no wheel held."""
+    work = new_record(WORK)
+    work.touch.held_height = work.touch.held_angle = np.nan
+    return work
+
+
+def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
+    """Evaluate the model at poses (n, 3) and return the results (n,), a RESULT each.
+
+    held (n, 6, 2) gives height [m] and contact angle [rad] of wheels that climb a face, NaN for
+    those that rest on the ground; (0, 6, 2) where none climbs. The others are those of `Setup`.
+    """
+    results = new_results(len(poses))
+    works = np.full(min(MOST_CHUNKS, -(-len(poses) // CHUNK)), new_work(), WORK)
+    records = (np.array([record]) for record in (linkage, samples, settings))
+    evaluate_poses(ground, *records, poses, held, works, results)
+    return results
 
 
 @sweep_kernel
-def evaluate_poses(ground, linkage, samples, settings, poses, held, columns):
-    """Evaluate the model at poses (n, 3) into `columns`, each pose on its own.
+def evaluate_poses(ground, linkages, samplings, settings, poses, held, works, results):
+    """Evaluate the poses into `results` in chunks, as many as there are work spaces.
 
-    held (n, 6, 2) gives height [m] and contact angle [rad] of wheels that climb a face, NaN for
-    those that rest on the ground; (0, 6, 2) where none climbs.
+    Records can't be handed to the threads but as arrays, here of one element.
     """
-    n = poses.shape[0]
-    for chunk in prange((n + CHUNK - 1) // CHUNK):
-        work = new_work(samples)
-        for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, n)):
-            evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, columns)
+    n, chunks = poses.shape[0], works.size
+    for chunk in prange(chunks):
+        for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
+            evaluate_pose(
+                ground, linkages[0], samplings[0], settings[0],
+                poses, held, i, works[chunk], results,
+            )  # fmt: skip
 
 
 @kernel
-def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, columns):
-    """Evaluate the model at pose i into row i of `columns`."""
-    q, placement, touch = columns.q[i], work.placement, work.touch
+def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, results):
+    """Evaluate the model at pose i into row i of `results`."""
+    result = results[i]
+    q, placement, touch = result.q, work.placement, work.touch
     for wheel in range(6 if held.shape[0] > 0 else 0):
         touch.held_height[wheel] = held[i, wheel, 0]
         touch.held_angle[wheel] = held[i, wheel, 1]
+    grid = heights_of(ground)
     status = settle(
-        ground, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
+        grid, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
         q, placement, touch, work.J, work.step,
     )  # fmt: skip
     if status == SETTLED:
@@ -161,29 +145,29 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, colu
         columns_needed = 1 if settings.policy == EQUAL else 1 + FREE_FORCES
         if not balance_forces(linkage, placement, touch, columns_needed, work.balance):
             status = NO_EQUILIBRIUM
-    columns.status[i] = status
+    result.status = status
     if status != SETTLED:
         q[:] = np.nan
         return
-    _write_geometry(placement, touch, i, columns)
-    _write_forces(ground, linkage, settings, work, i, columns)
+    _write_geometry(placement, touch, result)
+    _write_forces(ground, linkage, settings, work, result)
     angle, measure = find_tip_over(linkage, work)
-    columns.tip_over_ratio[i] = angle / settings.flat_angle
-    columns.force_angle[i] = measure / settings.flat_measure
-    columns.clearance[i] = belly_clearance(ground, linkage, placement)
+    result.tip_over_ratio = angle / settings.flat_angle
+    result.tip_over_force_angle = measure / settings.flat_measure
+    result.belly_clearance = belly_clearance(grid, ground.ceiling, linkage, placement)
 
 
 @kernel
-def _write_geometry(placement, touch, i, columns):
+def _write_geometry(placement, touch, result):
     for wheel in range(6):
-        columns.contact_angle[i, wheel] = np.arctan2(touch.sine[wheel], touch.cosine[wheel])
+        result.contact_angle[wheel] = np.arctan2(touch.sine[wheel], touch.cosine[wheel])
         for k in range(3):
-            columns.centres[i, wheel, k] = placement.centres[wheel, k]
-            columns.points[i, wheel, k] = touch.point[wheel, k]
+            result.wheel_centres[wheel, k] = placement.centres[wheel, k]
+            result.contact_points[wheel, k] = touch.point[wheel, k]
 
 
 @kernel
-def _write_forces(ground, linkage, settings, work, i, columns):
+def _write_forces(ground, linkage, settings, work, result):
     search, point = work.search, work.touch.point
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
@@ -201,7 +185,7 @@ def _write_forces(ground, linkage, settings, work, i, columns):
         mu = search.mu[wheel]
         sinkage, resistance = 0.0, 0.0
         if settings.on_soil:
-            soil = settings.soils[work.soil_rows[wheel]]
+            soil = ground.soils[work.soil_rows[wheel]]
             slip, sinkage, resistance, pull, torque, utilisation = solve_wheel(
                 soil, mu, linkage.radius, linkage.width, N, settings.direction * T, S
             )
@@ -211,20 +195,20 @@ def _write_forces(ground, linkage, settings, work, i, columns):
             torque = linkage.radius * T
             utilisation = np.sqrt(T * T + S * S) / (mu * N) if N > 0.0 else np.inf
             slip = coulomb_slip(utilisation)
-        columns.N[i, wheel] = N
-        columns.T[i, wheel] = T
-        columns.S[i, wheel] = S
-        columns.torque[i, wheel] = torque
-        columns.friction[i, wheel] = mu
-        columns.utilisation[i, wheel] = utilisation
-        columns.slip[i, wheel] = slip
-        columns.saturation[i, wheel] = abs(torque) / settings.max_torque
-        columns.sinkage[i, wheel] = sinkage
-        columns.resistance[i, wheel] = resistance
+        result.wheel_loads[wheel] = N
+        result.tangential[wheel] = T
+        result.lateral[wheel] = S
+        result.torque[wheel] = torque
+        result.friction[wheel] = mu
+        result.friction_utilisation[wheel] = utilisation
+        result.slip_ratio[wheel] = slip
+        result.torque_saturation[wheel] = abs(torque) / settings.max_torque
+        result.sinkage[wheel] = sinkage
+        result.motion_resistance[wheel] = resistance
         power += max(settings.direction * torque, 0.0) * _wheel_speed(
             linkage.radius, slip, settings
         )
-    columns.power[i] = power
+    result.power = power
 
 
 @kernel
@@ -237,7 +221,7 @@ def _wheel_speed(radius, slip, settings):
 @kernel
 def find_tip_over(linkage, work):
     """Return tip-over angle [rad] and force-angle measure [N m] of a placed rover."""
-    centre, force, moment = work.vectors[0], work.vectors[1], work.vectors[2]
+    centre, force, moment = work.centre, work.force, work.moment
     _write_centre_of_mass(linkage, work.placement, centre)
     force[0], force[1], force[2] = 0.0, 0.0, -linkage.mass * linkage.gravity
     moment[:] = 0.0

@@ -16,7 +16,13 @@ LOOPS_ONLY = {
     "fusion": False,
 }
 """What numba may make parallel. Looking for more than the loop doubles the time to compile."""
-COMPILE_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+COMPILE_OPTIONS = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+}
+"""A product and a sum may become one operation, rounded once; NaN and infinity are kept."""
 
 
 def kernel(function):

@@ -1,55 +1,35 @@
 """The rocker-bogie linkage as the kernels see it: its constants, and where its parts are."""
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from rover_physics.kernels import allocating_kernel, kernel
+from rover_physics.kernels import kernel
+from rover_physics.records import new_record, record_type
 from rover_physics.rover import Rover
 
-
-class Linkage(NamedTuple):
-    """Geometry and masses of a rover, body frame, flat ground, right side first."""
-
-    radius: float
-    """Wheel radius [m]."""
-    width: float
-    """Wheel width [m]."""
-    wheels: np.ndarray
-    """(6, 3) wheel centres [m] in wheel order."""
-    on_bogie: np.ndarray
-    """(6,) True for the wheels that hang on a bogie."""
-    rocker_pivots: np.ndarray
-    """(2, 3) rocker pivots [m]."""
-    bogie_pivots: np.ndarray
-    """(2, 3) bogie pivots [m]."""
-    gravity: float
-    """Gravity [m/s^2]."""
-    wheel_mass: float
-    """Mass of one wheel [kg]."""
-    body_mass: float
-    """Mass of the body with its arm and payload [kg]."""
-    body_com: np.ndarray
-    """(3,) centre of mass of the body with its arm and payload [m]."""
-    rocker_mass: float
-    """Mass of one rocker [kg]."""
-    rocker_coms: np.ndarray
-    """(2, 3) centres of mass of the rockers [m]."""
-    bogie_mass: float
-    """Mass of one bogie [kg]."""
-    bogie_coms: np.ndarray
-    """(2, 3) centres of mass of the bogies [m]."""
-    mass: float
-    """Mass of the whole rover [kg]."""
-    length: float
-    """Reference length that makes moments comparable with forces: rear to front axle [m]."""
-    belly: np.ndarray
-    """(5,) underside: z, smallest and largest x, smallest and largest y [m]."""
-    has_tool_load: bool
-    """True where the arm's tool is pushed or turned by what is around it."""
-    tool: np.ndarray
-    """(3, 3) tip of the arm [m], force [N] and moment [N m] on the tool, body frame."""
-
+LINKAGE = record_type(
+    ("radius", float),  # wheel radius [m]
+    ("width", float),  # wheel width [m]
+    ("wheels", float, (6, 3)),  # wheel centres [m] in wheel order
+    ("on_bogie", np.uint8, (6,)),  # 1 for the wheels that hang on a bogie
+    ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
+    ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
+    ("gravity", float),  # gravity [m/s^2]
+    ("wheel_mass", float),  # mass of one wheel [kg]
+    ("body_mass", float),  # mass of the body with its arm and payload [kg]
+    ("body_com", float, (3,)),  # centre of mass of the body with its arm and payload [m]
+    ("rocker_mass", float),  # mass of one rocker [kg]
+    ("rocker_coms", float, (2, 3)),  # centres of mass of the rockers [m]
+    ("bogie_mass", float),  # mass of one bogie [kg]
+    ("bogie_coms", float, (2, 3)),  # centres of mass of the bogies [m]
+    ("mass", float),  # mass of the whole rover [kg]
+    ("length", float),  # rear to front axle [m]: makes moments comparable with forces
+    ("belly", float, (5,)),  # underside: z, smallest and largest x, smallest and largest y [m]
+    ("has_tool_load", np.bool_),  # whether the arm's tool is pushed or turned
+    ("tool", float, (3, 3)),  # tip of the arm [m], force [N] and moment [N m] on the tool
+)
+"""Geometry and masses of a rover, body frame, flat ground, right side first."""
 
 NO_TOOL = np.zeros((3, 3))
 """A tool that nothing acts on."""
@@ -57,8 +37,8 @@ NO_TOOL = np.zeros((3, 3))
 
 def pack_linkage(
     rover: Rover, body_mass: float, body_com: np.ndarray, tool: np.ndarray = NO_TOOL
-) -> Linkage:
-    """Return the constants of `rover` as the kernels read them.
+) -> Any:
+    """Return the constants of `rover` as a record LINKAGE.
 
     Args:
         rover: The rover.
@@ -70,7 +50,8 @@ def pack_linkage(
     names = ("rear", "middle", "front")
     left = [suspension.wheels[name] for name in names]
     on_bogie = [name != suspension.rocker_wheel for name in names]
-    return Linkage(
+    return new_record(
+        LINKAGE,
         radius=float(rover.wheel.radius),
         width=float(rover.wheel.width),
         wheels=np.array([_mirror(p) for p in left] + left, dtype=float),
@@ -120,40 +101,17 @@ def attitude_matrix(roll, pitch, yaw, R):
     R[2, 2] = cp * cr
 
 
-class Placement(NamedTuple):
-    """Where a rover's parts are in one configuration, map frame; written by `place`."""
-
-    R: np.ndarray
-    """(3, 3) attitude, body to map; its second column is the axis of all wheels."""
-    origin: np.ndarray
-    """(3,) body origin [m]."""
-    centres: np.ndarray
-    """(6, 3) wheel centres [m]."""
-    rocker_pivots: np.ndarray
-    """(2, 3) rocker pivots [m]."""
-    bogie_pivots: np.ndarray
-    """(2, 3) bogie pivots [m]."""
-    part_coms: np.ndarray
-    """(5, 3) centres of mass of body, right and left rocker, right and left bogie [m]."""
-    forward: np.ndarray
-    """(3,) horizontal direction in the plane of the wheels."""
-    up: np.ndarray
-    """(3,) direction in the plane of the wheels normal to `forward`, upwards."""
-
-
-@allocating_kernel
-def new_placement():
-    """Return an empty placement."""
-    return Placement(
-        np.empty((3, 3)),
-        np.empty(3),
-        np.empty((6, 3)),
-        np.empty((2, 3)),
-        np.empty((2, 3)),
-        np.empty((5, 3)),
-        np.empty(3),
-        np.empty(3),
-    )
+PLACEMENT = record_type(
+    ("R", float, (3, 3)),  # attitude, body to map; its second column is the axis of all wheels
+    ("origin", float, (3,)),  # body origin [m]
+    ("centres", float, (6, 3)),  # wheel centres [m]
+    ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
+    ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
+    ("part_coms", float, (5, 3)),  # centres of mass of body, rockers and bogies, right first [m]
+    ("forward", float, (3,)),  # horizontal direction in the plane of the wheels
+    ("up", float, (3,)),  # direction in the plane of the wheels normal to `forward`, upwards
+)
+"""Where a rover's parts are in one configuration, map frame; written by `place`."""
 
 
 @kernel

@@ -2,17 +2,18 @@
 
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.contact import WheelSamples, sample_wheel
+from rover_physics.contact import sample_wheel
 from rover_physics.errors import ModelError
-from rover_physics.evaluation import Settings, find_tip_over, new_work
+from rover_physics.evaluation import SETTINGS, find_tip_over, new_work
 from rover_physics.ground import Ground, pack_ground
-from rover_physics.linkage import Linkage, pack_linkage, place, place_masses
+from rover_physics.linkage import pack_linkage, place, place_masses
 from rover_physics.manipulator import body_mass_and_com, pack_tool
+from rover_physics.records import new_record
 from rover_physics.rover import Rover
 from rover_physics.soil import pack_soils
 from rover_physics.terrain import Terrain
@@ -26,12 +27,12 @@ class Setup(NamedTuple):
 
     ground: Ground
     """The terrain."""
-    linkage: Linkage
-    """The rover with its arm, payload and tool load."""
-    samples: WheelSamples
-    """Points of a wheel's rim, see `sample_wheel`."""
-    settings: Settings
-    """What is asked for."""
+    linkage: Any
+    """LINKAGE: the rover with its arm, payload and tool load."""
+    samples: Any
+    """WHEEL_SAMPLES: points of a wheel's rim."""
+    settings: Any
+    """SETTINGS: what is asked for."""
 
 
 def set_up(
@@ -64,21 +65,21 @@ def set_up(
     mass, com = body_mass_and_com(rover, joint_angles, payload)
     tool = pack_tool(rover, joint_angles, tool_force, tool_moment)
     samples = sample_wheel(rover, terrain.resolution)
-    flat_angle, flat_measure = _tip_over_on_flat_ground(rover, samples)
-    settings = Settings(
+    flat_angle, flat_measure = _tip_over_on_flat_ground(rover)
+    settings = new_record(
+        SETTINGS,
         policy=POLICIES[policy],
         friction=float(mu),
         max_torque=float(torque),
         allowed_torque=float(torque * rover.limits.torque_saturation),
         on_soil=bool(terrain.soil_names or soil is not None),
-        soils=_pack_soils(terrain.soil_names, soil),
         direction=-1.0 if backward else 1.0,
         speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),
         max_wheel_speed=float(rover.wheel.max_speed),
         flat_angle=flat_angle,
         flat_measure=flat_measure,
     )
-    ground = pack_ground(terrain, rover.wheel.radius, rover.wheel.width)
+    ground = pack_ground(terrain)._replace(soils=_pack_soils(terrain.soil_names, soil))
     return Setup(ground, pack_linkage(rover, mass, com, tool), samples, settings)
 
 
@@ -87,10 +88,10 @@ def _pack_soils(names: tuple[str, ...], default: str | None) -> np.ndarray:
     return pack_soils(names, default=default)
 
 
-def _tip_over_on_flat_ground(rover: Rover, samples) -> tuple[float, float]:
+def _tip_over_on_flat_ground(rover: Rover) -> tuple[float, float]:
     """Return the tip-over measures of the rover as its file has it: arm stowed, at rest."""
     linkage = pack_linkage(rover, *body_mass_and_com(rover))
-    work, q = new_work(samples), np.zeros(6)
+    work, q = new_work(), np.zeros(6)
     place(linkage, 0.0, 0.0, 0.0, q, work.placement)
     place_masses(linkage, q, work.placement)
     work.touch.point[:] = work.placement.centres

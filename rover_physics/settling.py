@@ -8,6 +8,7 @@ small angles.
 import numpy as np
 
 from rover_physics.contact import (
+    AGAIN,
     COARSE,
     EXACT,
     FULL,
@@ -27,7 +28,9 @@ GAP_TOLERANCE = 3e-5
 NEWTON_TOLERANCE = 5e-6
 """Largest gap at which Newton's method stops [m]."""
 NEWTON_STEPS = 20
-QUICK_ATTEMPTS = 3
+QUICK_ATTEMPTS = 5
+NOTES_HOLD = 1e-2
+"""Gaps, in wheel radii, below which a step is too small to bring other circles near."""
 RECOVERIES = 6
 LEVEL, SLOPED = np.arange(2)
 RELAXATION_STEPS = 120
@@ -37,7 +40,7 @@ RELAXATION = 0.3
 
 
 @kernel
-def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def settle(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Settle the rover with its body origin at (x, y) [m] heading `yaw` [rad]; q (6,) is written.
 
     Starts from the suspension at rest, so the answer depends on nothing but the pose. J (6, 6) and
@@ -45,27 +48,29 @@ def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """
     q[:] = 0.0
     place(linkage, x, y, yaw, q, placement)
-    status, worst = _touch_all(ground, samples, placement, COARSE, touch)
+    status, worst = _touch_all(grid, samples, placement, COARSE, touch)
     if np.isnan(worst):
         return status
     _descend(linkage, placement, touch, q, 1.0, J, step)
     place(linkage, x, y, yaw, q, placement)
-    status, worst = _touch_all(ground, samples, placement, QUICK, touch)
+    status, worst = _touch_all(grid, samples, placement, QUICK, touch)
     if status != TOUCHING:
         return status
+    worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
-        _newton(ground, linkage, samples, x, y, yaw, q, placement, NEAR, touch, J, step)
-        status, worst = _touch_all(ground, samples, placement, FULL, touch)
+        scope = AGAIN if worst <= NOTES_HOLD * linkage.radius else FULL
+        _newton(grid, linkage, samples, x, y, yaw, q, placement, NEAR, touch, J, step)
+        status, worst = _touch_all(grid, samples, placement, scope, touch)
         if worst <= GAP_TOLERANCE or np.isnan(worst):
             break
     for attempt in range(RECOVERIES):
         if worst <= GAP_TOLERANCE or np.isnan(worst) or status != TOUCHING:
             break
-        _touch_all(ground, samples, placement, EXACT, touch)
+        _touch_all(grid, samples, placement, EXACT, touch)
         if attempt > 0:
-            _relax(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step)
-        _newton(ground, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
-        status, worst = _touch_all(ground, samples, placement, EXACT, touch)
+            _relax(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+        _newton(grid, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
+        status, worst = _touch_all(grid, samples, placement, EXACT, touch)
     if status != TOUCHING:
         return status
     if not worst <= GAP_TOLERANCE:
@@ -76,12 +81,12 @@ def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
 
 
 @kernel
-def _touch_all(ground, samples, placement, scope, touch):
+def _touch_all(grid, samples, placement, scope, touch):
     """Return the status of the worst wheel and the largest absolute gap [m]."""
     worst = 0.0
     status = TOUCHING
     for wheel in range(6):
-        of_wheel = find_touch(ground, samples, placement, wheel, scope, touch)
+        of_wheel = find_touch(grid, samples, placement, wheel, scope, touch)
         if of_wheel == OFF_MAP or status == TOUCHING:
             status = of_wheel
         gap = abs(touch.gap[wheel])
@@ -93,7 +98,7 @@ def _touch_all(ground, samples, placement, scope, touch):
 
 
 @kernel
-def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, step):
+def _newton(grid, linkage, samples, x, y, yaw, q, placement, scope, touch, J, step):
     """Newton's method on the gaps with a halving line search; returns the largest left."""
     worst = 0.0
     for wheel in range(6):
@@ -111,7 +116,7 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
                 q[i] -= (fraction - taken) * step[i, 0]
             taken = fraction
             place(linkage, x, y, yaw, q, placement)
-            status, improved = _touch_all(ground, samples, placement, scope, touch)
+            status, improved = _touch_all(grid, samples, placement, scope, touch)
             if improved < (1.0 - 0.1 * fraction) * worst:
                 break
             fraction *= 0.5
@@ -122,7 +127,7 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
 
 
 @kernel
-def _relax(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def _relax(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Let the wheels fall or rise by part of their gaps until all are small.
 
     Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
@@ -131,7 +136,7 @@ def _relax(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     for _ in range(RELAXATION_STEPS):
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
-        status, worst = _touch_all(ground, samples, placement, EXACT, touch)
+        status, worst = _touch_all(grid, samples, placement, EXACT, touch)
         if not worst > RELAXED * linkage.radius:
             return
 

@@ -24,14 +24,14 @@ def share_forces_on_soil(ground, linkage, settings, work):
     take_equal_torques(work.balance, search)
     if settings.policy == EQUAL:
         return
-    least = _needed(linkage, settings, work)
+    least = _needed(ground, linkage, settings, work)
     _copy(search, best)
     for _ in range(ROUNDS):
-        _write_grip(linkage, settings, work)
+        _write_grip(ground, linkage, settings, work)
         minimise_friction(
             work.balance, settings.allowed_torque / (linkage.radius * weight), search
         )
-        needed = _needed(linkage, settings, work)
+        needed = _needed(ground, linkage, settings, work)
         if needed <= least:
             least = needed
             _copy(search, best)
@@ -48,12 +48,12 @@ def _copy(search, best):
 
 
 @kernel
-def _write_grip(linkage, settings, work):
+def _write_grip(ground, linkage, settings, work):
     """Write friction and resistance under the present loads into the search."""
     search = work.search
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
-        soil = settings.soils[work.soil_rows[wheel]]
+        soil = ground.soils[work.soil_rows[wheel]]
         N, mu = weight * search.N[wheel], search.mu[wheel]
         solved = solve_wheel(soil, mu, linkage.radius, linkage.width, N, 0.0, 0.0)
         search.mu[wheel] = effective_friction(soil, mu, linkage.radius, linkage.width, N)
@@ -61,13 +61,13 @@ def _write_grip(linkage, settings, work):
 
 
 @kernel
-def _needed(linkage, settings, work):
+def _needed(ground, linkage, settings, work):
     """Return the largest utilisation of the soil, or of the torque where that is beyond 1."""
     search = work.search
     weight = linkage.mass * linkage.gravity
     worst = 0.0
     for wheel in range(6):
-        soil = settings.soils[work.soil_rows[wheel]]
+        soil = ground.soils[work.soil_rows[wheel]]
         solved = solve_wheel(
             soil,
             search.mu[wheel],

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,13 +11,7 @@ from numpy.typing import ArrayLike
 from rover_physics.crossing import find_crossings
 from rover_physics.drops import find_falls
 from rover_physics.errors import PoseError
-from rover_physics.evaluation import (
-    NO_EQUILIBRIUM,
-    Columns,
-    Settings,
-    evaluate_poses,
-    new_columns,
-)
+from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, evaluate
 from rover_physics.model_setup import POLICIES, set_up
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover, load_rover
@@ -34,7 +29,6 @@ __all__ = [
     "warm_up",
 ]
 
-NONE_HELD = np.empty((0, 6, 2))
 one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
 
 
@@ -91,19 +85,17 @@ def sweep_path(
     )
     settings = setup.settings
 
-    def evaluate(at: np.ndarray, held: np.ndarray | None = None) -> Columns:
-        results = new_columns(len(at))
+    def evaluate_at(at: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
         with one_sweep_at_a_time:
-            evaluate_poses(*setup, at, NONE_HELD if held is None else held, results)
-        return results
+            return evaluate(*setup, at, held)
 
-    columns = evaluate(poses)
+    results = evaluate_at(poses)
     radius, direction = rover.wheel.radius, -1.0 if backward else 1.0
-    crossings = find_crossings(terrain, radius, poses, columns, evaluate, direction)
-    falls = find_falls(radius, poses, columns, crossings, direction)
+    crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction)
+    falls = find_falls(radius, poses, results, crossings, direction)
     between = _collect(
         crossings.poses,
-        crossings.columns,
+        crossings.results,
         settings,
         policy,
         wheel_drop=np.zeros((len(crossings.poses), 6)),
@@ -113,7 +105,7 @@ def sweep_path(
     )
     return _collect(
         poses,
-        columns,
+        results,
         settings,
         policy,
         wheel_drop=falls.drops,
@@ -143,46 +135,31 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     return array
 
 
-def _collect(poses: np.ndarray, columns: Columns, settings: Settings, policy: str, **more):
-    settled = columns.status == SETTLED
-    position = np.column_stack([poses[:, :2], columns.q[:, 0]])
+def _collect(poses: np.ndarray, results: Any, settings: Any, policy: str, **more):
+    settled = results.status == SETTLED
+    position = np.column_stack([poses[:, :2], results.q[:, 0]])
     position[~settled] = np.nan
-    rocker = columns.q[:, 3]
+    rocker = results.q[:, 3]
     steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     climbs = np.nan_to_num(np.diff(position[:, 2]))
     durations = np.hypot(steps, climbs) / settings.speed
-    power = np.nan_to_num(columns.power)
+    power = np.nan_to_num(results.power)
     work = 0.5 * (power[1:] + power[:-1]) * durations
+    same = {name: results[name] for name in RESULT.names or () if name not in ("q", "status")}
     return PathPrediction(
         poses=poses,
-        status=columns.status,
+        status=results.status,
         settled=settled,
         position=position,
-        roll=columns.q[:, 1],
-        pitch=columns.q[:, 2],
+        roll=results.q[:, 1],
+        pitch=results.q[:, 2],
         rocker_angle=np.column_stack([rocker, -rocker]),
-        bogie_angle=columns.q[:, 4:6],
-        wheel_centres=columns.centres,
-        contact_points=columns.points,
-        contact_angle=columns.contact_angle,
-        wheel_loads=columns.N,
-        tangential=columns.T,
-        lateral=columns.S,
-        torque=columns.torque,
-        friction=columns.friction,
-        friction_utilisation=columns.utilisation,
-        slip_ratio=columns.slip,
-        torque_saturation=columns.saturation,
-        tip_over_ratio=columns.tip_over_ratio,
-        tip_over_force_angle=columns.force_angle,
-        belly_clearance=columns.clearance,
-        sinkage=columns.sinkage,
-        motion_resistance=columns.resistance,
-        power=columns.power,
+        bogie_angle=results.q[:, 4:6],
         energy=_accumulate(work, settled),
         time=_accumulate(durations, settled),
         distance=np.concatenate([[0.0], np.cumsum(steps)]),
         policy=policy,
+        **same,
         **more,
     )
 

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.equilibrium import FREE_FORCES, FREE_TORQUES, Balance
-from rover_physics.evaluation import Columns, evaluate_pose, new_columns, new_work
+from rover_physics.equilibrium import FREE_FORCES, FREE_TORQUES
+from rover_physics.evaluation import NONE_HELD, evaluate_pose, new_results, new_work
 from rover_physics.model_setup import Setup, set_up
 from rover_physics.prediction import Floats
 from rover_physics.rover import Rover
 from rover_physics.settling import SETTLED
-from rover_physics.sweep import NONE_HELD, check_poses, one_sweep_at_a_time
+from rover_physics.sweep import check_poses, one_sweep_at_a_time
 from rover_physics.terrain import Terrain
 
 PRECISION = 1e-5
@@ -84,34 +84,33 @@ def find_torque_ranges(
     poses = check_poses(poses)
     setup = set_up(rover, terrain, policy="optimal", **arguments)
     n = len(poses)
-    columns = new_columns(n)
+    results, work = new_results(n), new_work()
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
-        work = new_work(setup.samples)
         with one_sweep_at_a_time:
-            evaluate_pose(*setup, poses, NONE_HELD, i, work, columns)
-        if columns.status[i] != SETTLED or not _is_within(rover, setup, columns, i):
+            evaluate_pose(*setup, poses, NONE_HELD, i, work, results)
+        if results[i].status != SETTLED or not _is_within(rover, setup, results[i]):
             continue
         feasible[i] = True
-        forces, start = _describe_set(rover, setup, work.balance, columns, i)
+        forces, start = _describe_set(rover, setup, work.balance, results[i])
         lowest[i], highest[i] = _find_extremes(forces, start)
     scale = setup.linkage.radius * setup.linkage.mass * setup.linkage.gravity
     return TorqueRanges(feasible, scale * lowest, scale * highest)
 
 
-def _is_within(rover: Rover, setup: Setup, columns: Columns, i: int) -> bool:
-    friction = columns.utilisation[i].max() < rover.limits.friction_utilisation
-    torque = np.abs(columns.torque[i]).max() < setup.settings.allowed_torque
-    return bool(friction and torque and columns.N[i].min() > 0.0)
+def _is_within(rover: Rover, setup: Setup, result: Any) -> bool:
+    friction = result.friction_utilisation.max() < rover.limits.friction_utilisation
+    torque = np.abs(result.torque).max() < setup.settings.allowed_torque
+    return bool(friction and torque and result.wheel_loads.min() > 0.0)
 
 
 def _describe_set(
-    rover: Rover, setup: Setup, balance: Balance, columns: Columns, i: int
+    rover: Rover, setup: Setup, balance: Any, result: Any
 ) -> tuple[_FeasibleSet, np.ndarray]:
-    """Return the feasible set of waypoint i in units of the weight, and a point x (k,) in it."""
+    """Return the feasible set of a waypoint in units of the weight, and a point x (k,) in it."""
     weight = setup.linkage.mass * setup.linkage.gravity
-    known = np.concatenate([columns.T[i], columns.S[i]]) / weight
+    known = np.concatenate([result.tangential, result.lateral]) / weight
     slopes = np.vstack([balance.tangential, balance.lateral])
     start = np.linalg.lstsq(slopes[:, 1:], known - slopes[:, 0], rcond=None)[0]
     shared = np.abs(start[FREE_TORQUES:]).max() <= EQUAL_SHARES
@@ -120,8 +119,8 @@ def _describe_set(
         rows[:, : 1 + free] for rows in (balance.normal, balance.tangential, balance.lateral)
     )
     used = rover.limits.friction_utilisation
-    resistance = (columns.resistance[i] / columns.N[i])[:, None] * normal
-    strength = columns.friction[i][:, None] * normal + resistance
+    resistance = (result.motion_resistance / result.wheel_loads)[:, None] * normal
+    strength = result.friction[:, None] * normal + resistance
     resistance = setup.settings.direction * resistance
     forces = _FeasibleSet(
         load=used * strength,

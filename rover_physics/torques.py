@@ -11,13 +11,12 @@ Source: Boyd and El Ghaoui, "Method of centers for minimizing generalized eigenv
 Algebra and its Applications 188, 1993.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rover_physics.equilibrium import FREE_FORCES, FREE_TORQUES
-from rover_physics.kernels import allocating_kernel, kernel
+from rover_physics.kernels import kernel
 from rover_physics.linear import solve_in_place
+from rover_physics.records import record_type
 
 EQUAL, OPTIMAL = 0, 1
 """Torque policies."""
@@ -33,43 +32,18 @@ PRECISION = 1e-5
 """Relative precision of the smallest level."""
 
 
-class TorqueSearch(NamedTuple):
-    """Work space of the search, in units of the rover's weight."""
-
-    y: np.ndarray
-    """(9,) the free degrees, in the order of the columns of `Balance`."""
-    N: np.ndarray
-    """(6,) wheel loads at y."""
-    T: np.ndarray
-    """(6,) tractions at y."""
-    S: np.ndarray
-    """(6,) lateral forces at y."""
-    mu: np.ndarray
-    """(6,) friction coefficients."""
-    resistance: np.ndarray
-    """(6,) motion resistances, against the forward way; torque overcomes them beside T."""
-    H: np.ndarray
-    """(9, 9) Hessian of the barrier."""
-    g: np.ndarray
-    """(9, 1) gradient of the barrier, then the Newton step."""
-    gradient: np.ndarray
-    """(9,) gradient, kept."""
-
-
-@allocating_kernel
-def new_torque_search():
-    """Return empty work space."""
-    return TorqueSearch(
-        np.zeros(FREE_FORCES),
-        np.empty(6),
-        np.empty(6),
-        np.empty(6),
-        np.empty(6),
-        np.zeros(6),
-        np.empty((FREE_FORCES, FREE_FORCES)),
-        np.empty((FREE_FORCES, 1)),
-        np.empty(FREE_FORCES),
-    )
+TORQUE_SEARCH = record_type(
+    ("y", float, (FREE_FORCES,)),  # the free degrees, in the order of the columns of BALANCE
+    ("N", float, (6,)),  # wheel loads at y
+    ("T", float, (6,)),  # tractions at y
+    ("S", float, (6,)),  # lateral forces at y
+    ("mu", float, (6,)),  # friction coefficients
+    ("resistance", float, (6,)),  # motion resistances, against the forward way, beside T
+    ("H", float, (FREE_FORCES, FREE_FORCES)),  # Hessian of the barrier
+    ("g", float, (FREE_FORCES, 1)),  # gradient of the barrier, then the Newton step
+    ("gradient", float, (FREE_FORCES,)),  # gradient, kept
+)
+"""Work space of the search, in units of the rover's weight."""
 
 
 @kernel

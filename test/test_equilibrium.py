@@ -10,7 +10,6 @@ from reference_cases import reference_grounds, reference_predictions
 from rough_grounds import fractal, mirrored, plane, random_poses, rocky, smooth
 from rover_geometry import attitude_of, balance_residuals, turned_round
 
-from rover_physics.contact import sample_wheel
 from rover_physics.equilibrium import balance_forces
 from rover_physics.evaluation import new_work
 from rover_physics.linkage import pack_linkage, place, place_masses
@@ -250,7 +249,7 @@ def load_changes(rover: Rover, torques: list[float]) -> np.ndarray:
     """
     body = rover.masses.body
     linkage = pack_linkage(rover, body.mass, np.array(body.com))
-    work, q = new_work(sample_wheel(rover, 0.05)), np.zeros(6)
+    work, q = new_work(), np.zeros(6)
     place(linkage, 0.0, 0.0, 0.0, q, work.placement)
     place_masses(linkage, q, work.placement)
     work.touch.sine[:], work.touch.cosine[:] = 0.0, 1.0

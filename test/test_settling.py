@@ -72,7 +72,8 @@ def test_attitude_and_suspension_angles_are_those_of_mujoco():
 
 
 def circles_of_the_model(terrain: Terrain) -> np.ndarray:
-    return sample_wheel(LSR1, terrain.resolution).laterals
+    samples = sample_wheel(LSR1, terrain.resolution)
+    return samples.laterals[: samples.circles]
 
 
 def test_wheels_touch_by_an_independent_dense_look_at_the_circles_of_the_model():
