@@ -181,7 +181,9 @@ def _write_forces(ground, linkage, settings, work, result):
         minimise_friction(work.balance, largest, search)
     power = 0.0
     for wheel in range(6):
-        N, T, S = weight * search.N[wheel], weight * search.T[wheel], weight * search.S[wheel]
+        N = weight * search.wheel_loads[wheel]
+        T = weight * search.tangential[wheel]
+        S = weight * search.lateral[wheel]
         mu = search.mu[wheel]
         sinkage, resistance = 0.0, 0.0
         if settings.on_soil:
