@@ -86,10 +86,10 @@ WORK = record_type(
 
 def new_results(n: int) -> Any:
     """Return the results (n,) of n poses, all NaN."""
-    blank = new_record(RESULT)
-    for name in RESULT.names or ():
-        blank[name] = 0 if name == "status" else np.nan
-    return np.full(n, blank, RESULT).view(np.recarray)
+    numbers = np.full((n, RESULT.itemsize // 8), np.nan)
+    results = numbers.view(RESULT)[:, 0]
+    results["status"] = 0
+    return results.view(np.recarray)
 
 
 def new_work() -> Any:
