@@ -8,7 +8,7 @@ from numba import prange
 from rover_physics.clearance import belly_clearance
 from rover_physics.contact import TOUCH
 from rover_physics.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
-from rover_physics.ground import friction_at, heights_of
+from rover_physics.ground import Grid, friction_at
 from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.linkage import PLACEMENT, place_masses
 from rover_physics.records import new_record, record_type
@@ -135,7 +135,9 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
     for wheel in range(6 if held.shape[0] > 0 else 0):
         touch.held_height[wheel] = held[i, wheel, 0]
         touch.held_angle[wheel] = held[i, wheel, 1]
-    grid = heights_of(ground)
+    grid = Grid(
+        ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution
+    )
     status = settle(
         grid, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
         q, placement, touch, work.J, work.step,
