@@ -10,7 +10,7 @@ from rover_physics.kernels import kernel
 from rover_physics.terrain import Terrain
 
 BLOCK = 4
-"""Cells along the side of a block."""
+"""Cells along the side of a block, a power of 2."""
 
 
 class Grid(NamedTuple):
@@ -54,24 +54,29 @@ def pack_ground(terrain: Terrain) -> Ground:
     friction = np.empty((0, 0)) if terrain.friction is None else terrain.friction
     return Ground(
         elevation,
-        _find_block_ceiling(elevation, np.inf),
+        _find_blocks(elevation, np.maximum, np.inf),
         float(terrain.origin[0]),
         float(terrain.origin[1]),
         1.0 / float(terrain.resolution),
-        _find_block_ceiling(elevation, -np.inf),
+        _find_blocks(elevation, np.fmax, -np.inf),
         np.ascontiguousarray(friction, dtype=np.float64),
         np.empty((0, 0), np.int32) if terrain.soil is None else terrain.soil + np.int32(1),
         np.zeros((1, 8)),
     )
 
 
-def _find_block_ceiling(elevation: np.ndarray, unknown: float) -> np.ndarray:
-    """Return the highest elevation of each block, unknown cells counting as `unknown`."""
+def _find_blocks(elevation: np.ndarray, highest: np.ufunc, unknown: float) -> np.ndarray:
+    """Return the highest elevation of each block; `unknown` where `highest` makes it NaN."""
     ny, nx = elevation.shape
-    rows, columns = -(-ny // BLOCK), -(-nx // BLOCK)
-    padded = np.full((rows * BLOCK, columns * BLOCK), -np.inf)
-    padded[:ny, :nx] = np.where(np.isnan(elevation), unknown, elevation)
-    return padded.reshape(rows, BLOCK, columns, BLOCK).max(axis=(1, 3))
+    missing = (0, -ny % BLOCK), (0, -nx % BLOCK)
+    if missing != ((0, 0), (0, 0)):
+        elevation = np.pad(elevation, missing, mode="edge")
+    halvings = BLOCK.bit_length() - 1
+    for _ in range(halvings):
+        elevation = highest(elevation[0::2], elevation[1::2])
+    for _ in range(halvings):
+        elevation = highest(elevation[:, 0::2], elevation[:, 1::2])
+    return np.where(np.isnan(elevation), unknown, elevation)
 
 
 @kernel
