@@ -165,7 +165,8 @@ class TraverseServer(Node):
             start = stamped_pose_to_array(request.start, self._map_frame, "start")
             goal = stamped_pose_to_array(request.goal, self._map_frame, "goal")
             judgement = self._service.answer(start, goal, request.tolerance)
-            judgement.changes()  # worked out here, where a fault makes a refusal
+            if judgement.traversable:
+                judgement.changes()  # worked out here, where a fault makes a refusal
             return judgement
 
         _, response.plan = self._judge("can_traverse", answer)
