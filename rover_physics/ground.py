@@ -51,32 +51,34 @@ class Ground(NamedTuple):
 def pack_ground(terrain: Terrain) -> Ground:
     """Return `terrain` as the kernels read it, with a soil that is none."""
     elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
+    highest = _reduce_blocks(elevation, np.fmax)
+    some_unknown = _reduce_blocks(np.isnan(elevation), np.logical_or)
     friction = np.empty((0, 0)) if terrain.friction is None else terrain.friction
     return Ground(
         elevation,
-        _find_blocks(elevation, np.maximum, np.inf),
+        np.where(some_unknown, np.inf, highest),
         float(terrain.origin[0]),
         float(terrain.origin[1]),
         1.0 / float(terrain.resolution),
-        _find_blocks(elevation, np.fmax, -np.inf),
+        np.where(np.isnan(highest), -np.inf, highest),
         np.ascontiguousarray(friction, dtype=np.float64),
         np.empty((0, 0), np.int32) if terrain.soil is None else terrain.soil + np.int32(1),
         np.zeros((1, 8)),
     )
 
 
-def _find_blocks(elevation: np.ndarray, highest: np.ufunc, unknown: float) -> np.ndarray:
-    """Return the highest elevation of each block; `unknown` where `highest` makes it NaN."""
-    ny, nx = elevation.shape
+def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
+    """Reduce each block of cells to one; blocks at the far edges count their last cells twice."""
+    ny, nx = cells.shape
     missing = (0, -ny % BLOCK), (0, -nx % BLOCK)
     if missing != ((0, 0), (0, 0)):
-        elevation = np.pad(elevation, missing, mode="edge")
+        cells = np.pad(cells, missing, mode="edge")
     halvings = BLOCK.bit_length() - 1
     for _ in range(halvings):
-        elevation = highest(elevation[0::2], elevation[1::2])
+        cells = reduce(cells[0::2], cells[1::2])
     for _ in range(halvings):
-        elevation = highest(elevation[:, 0::2], elevation[:, 1::2])
-    return np.where(np.isnan(elevation), unknown, elevation)
+        cells = reduce(cells[:, 0::2], cells[:, 1::2])
+    return cells
 
 
 def heights_of(ground: Ground) -> Grid:
@@ -85,9 +87,7 @@ def heights_of(ground: Ground) -> Grid:
     Not a kernel: kernels count no references, so none may return an array. In a kernel write
     ``Grid(...)``; fewer arrays are quicker to hand from kernel to kernel.
     """
-    return Grid(
-        ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution
-    )
+    return Grid(ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution)
 
 
 @kernel
