@@ -5,7 +5,7 @@ import os
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
 
 import rclpy
@@ -70,9 +70,13 @@ class Planner:
 class Processes:
     """Starts nodes in processes of their own."""
 
-    def __init__(self, children: list[ChildProcess], folder: FilePath):
+    def __init__(
+        self, children: list[ChildProcess], folder: FilePath, environment: Mapping[str, str]
+    ):
         self._children, self._folder = children, folder
-        self._environment = os.environ | {
+        self._environment = {
+            **os.environ,
+            **environment,
             "ROS_DOMAIN_ID": str(DOMAIN),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "PYTHONPATH": os.pathsep.join([str(HERE), str(HERE.parent)]),
@@ -100,12 +104,15 @@ class Processes:
 
 
 @contextlib.contextmanager
-def planner_and_processes() -> Iterator[tuple[Planner, Processes]]:
-    """Yield a planner, and what starts nodes for it; all of them end with the block."""
+def planner_and_processes(**environment: str) -> Iterator[tuple[Planner, Processes]]:
+    """Yield a planner, and what starts nodes for it; all of them end with the block.
+
+    The nodes have the environment of this process and what is given here.
+    """
     with tempfile.TemporaryDirectory() as folder, stopping_children() as children:
         planner = Planner()
         try:
-            yield planner, Processes(children, FilePath(folder))
+            yield planner, Processes(children, FilePath(folder), environment)
         finally:
             planner.close()
 
