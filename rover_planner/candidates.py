@@ -27,7 +27,7 @@ MAX_WAYPOINTS = 100_000
 
 _SAME_PLACE = 1e-9
 _LONG_WAY_ROUND = 1.5
-_FINE_SAMPLES = 2001
+_FINE_SAMPLES = 501
 _FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
 """Parameters of the fine samples, and half-way between them."""
 _FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)[:, None]
