@@ -1,4 +1,4 @@
-"""Markers for a viewer: the path coloured by verdict, where it fails, the wheels' contacts."""
+"""Markers for a viewer: the path coloured by grade, where it fails, the wheels' contacts."""
 
 from collections.abc import Sequence
 
@@ -9,12 +9,19 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.paths import quaternions
+from rover_physics import grades
 from rover_physics.prediction import PathPrediction
 
 PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
+WITH_TRACTION_CONTROL = ColorRGBA(r=0.95, g=0.65, b=0.10, a=1.0)
 IMPASSABLE = ColorRGBA(r=0.85, g=0.15, b=0.10, a=1.0)
 CONTACT = ColorRGBA(r=0.15, g=0.35, b=0.85, a=0.8)
 
+_COLOURS = {
+    grades.PASSABLE: PASSABLE,
+    grades.WITH_TRACTION_CONTROL: WITH_TRACTION_CONTROL,
+    grades.IMPASSABLE: IMPASSABLE,
+}
 _LINE_WIDTH = 0.05
 _CONTACT_SIZE = 0.04
 _TEXT_HEIGHT = 0.2
@@ -27,6 +34,7 @@ def path_markers(
     rows: NDArray[np.intp],
     frame_id: str,
     stamp,
+    waypoint_grades: Sequence[str] = (),
 ) -> MarkerArray:
     """Draw a judged path; the first marker clears what was drawn before.
 
@@ -36,13 +44,15 @@ def path_markers(
         rows: Waypoints to draw; the first that fails is always drawn.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
+        waypoint_grades: (n,) grades, for the colours; without them the reasons count.
     """
     markers = cleared_markers(frame_id, stamp)
     positions = _drawable_positions(prediction)
     failures = [i for i, reason in enumerate(reasons) if reason]
     rows = np.unique(np.concatenate([rows, failures[:1]]).astype(np.intp))
     settled = rows[prediction.settled[rows]]
-    colours = [IMPASSABLE if reasons[i] else PASSABLE for i in rows]
+    told = [(reasons[i], waypoint_grades[i] if waypoint_grades else "") for i in rows]
+    colours = [_colour(reason, grade) for reason, grade in told]
     markers.markers.append(_path_line(positions[rows], colours, frame_id, stamp))
     markers.markers.append(_contact_points(prediction.contact_points[settled], frame_id, stamp))
     if failures:
@@ -51,6 +61,11 @@ def path_markers(
         markers.markers.append(_failing_pose(positions[first], yaw, frame_id, stamp))
         markers.markers.append(_failing_text(positions[first], reasons[first], frame_id, stamp))
     return markers
+
+
+def _colour(reason: str, grade: str) -> ColorRGBA:
+    """Return the colour of a waypoint, by its grade where that is known."""
+    return _COLOURS[grade] if grade else IMPASSABLE if reason else PASSABLE
 
 
 def cleared_markers(frame_id: str, stamp) -> MarkerArray:

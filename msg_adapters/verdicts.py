@@ -1,21 +1,28 @@
 """Verdicts as messages: a diagnostic status for the operator, JSON text for programs."""
 
 import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from rover_physics.plain import to_plain
+
 STATUS_NAME = "traverse_server: can the rover traverse"
-PER_WAYPOINT = ("reasons", "codes")
-"""Entries of a verdict with a text for each waypoint; only in JSON."""
+PER_WAYPOINT = (
+    "reasons",
+    "codes",
+    "grades",
+    "grade_constraints",
+    "grade_wheels",
+    "grade_margins",
+)
+"""Entries of a verdict with a value for each waypoint; only in JSON."""
 
 
 def verdict_to_json(verdict: Mapping[str, Any]) -> str:
     """Write a verdict as one line of strict JSON; what is not a finite number becomes null."""
-    return json.dumps(_plain(verdict), allow_nan=False)
+    return json.dumps(to_plain(verdict), allow_nan=False)
 
 
 def verdict_to_diagnostics(
@@ -47,23 +54,10 @@ def verdict_to_diagnostics(
     )
     status.values = [
         KeyValue(key=key, value=value if isinstance(value, str) else json.dumps(value))
-        for key, value in _plain(verdict).items()
+        for key, value in to_plain(verdict).items()
         if key not in PER_WAYPOINT
     ]
     message = DiagnosticArray(status=[status])
     message.header.frame_id = frame_id
     message.header.stamp = stamp
     return message
-
-
-def _plain(value: Any) -> Any:
-    """Return a value of JSON's own types: numpy unwrapped, not finite numbers as None."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

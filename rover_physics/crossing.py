@@ -22,6 +22,8 @@ ANGLE_JUMP = np.radians(12.0)
 STEEP = np.radians(25.0)
 HEIGHT_JUMP = 0.25
 """Change of a wheel's height, in wheel radii, that is looked into."""
+PIECES = 4
+"""Pieces into which a stretch with a jump is divided, again and again."""
 SHORTEST = 1e-4
 """Distance between poses [m] below which a jump counts as one place."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)[1:]
@@ -43,6 +45,12 @@ class Crossings:
     results: Any
     """(m,) RESULT of each pose."""
 
+    def select(self, mask: np.ndarray) -> "Crossings":
+        """Return the poses that `mask` (m,) has, or those of some rows in their order."""
+        return Crossings(
+            self.place[mask], self.waypoint[mask], self.poses[mask], self.results[mask]
+        )
+
 
 def find_crossings(
     terrain: Terrain,
@@ -63,99 +71,138 @@ def find_crossings(
             wheels or NONE_HELD.
         direction: 1 where the rover drives forwards along the path, -1 backwards.
     """
-    found: list[tuple[float, np.ndarray, Any, int]] = []
     spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    on_a_path = (spacing <= radius) & (spacing > 0.0)
-    jumps = _find_jumps(results, radius)
-    open_ = [
-        (float(i), i + 1.0, poses[i], poses[i + 1], results[i], results[i + 1])
-        for i in np.flatnonzero(on_a_path & jumps)
-    ]
-    while open_:
-        middles = np.array([_between(a, b) for _, _, a, b, _, _ in open_])
-        inner = evaluate(middles, NONE_HELD)
-        halves: list[tuple] = []
-        places: list[tuple] = []
-        for k, (start, end, a, b, row_a, row_b) in enumerate(open_):
-            centre, row = 0.5 * (start + end), inner[k]
-            if row.status == NOT_SETTLED:
-                places.append(open_[k])
-                continue
-            found.append((centre, middles[k], row, int(np.floor(start)) + 1))
-            pieces = (
-                (start, centre, a, middles[k], row_a, row),
-                (centre, end, middles[k], b, row, row_b),
-            )
-            for piece in pieces:
-                if _jumps(piece[4], piece[5], radius):
-                    short = np.hypot(*(piece[3] - piece[2])[:2]) < SHORTEST
-                    (places if short else halves).append(piece)
-        found.extend(_climb(terrain, radius, places, evaluate, direction))
-        open_ = halves
+    jumps = _jumps(results[:-1], results[1:], radius) & (spacing <= radius) & (spacing > 0.0)
+    at = np.flatnonzero(jumps)
+    open_ = _Stretches(
+        np.column_stack([at, at + 1.0]),
+        np.stack([poses[at], poses[at + 1]], axis=1),
+        np.column_stack([results[at], results[at + 1]]),
+    )
+    found = []
+    while len(open_.place):
+        inner = open_.divide(evaluate)
+        found.append(inner.select(inner.results["status"] != NOT_SETTLED))
+        pieces, stuck = open_.split(inner, radius)
+        short = np.hypot(*(pieces.poses[:, 1] - pieces.poses[:, 0])[:, :2].T) < SHORTEST
+        found.append(_climb(terrain, radius, pieces.select(short | stuck), evaluate, direction))
+        open_ = pieces.select(~(short | stuck))
     return _in_order(found)
 
 
-def _in_order(found) -> Crossings:
-    found = sorted(found, key=lambda item: item[0])
-    waypoint = np.array([item[3] for item in found], dtype=int)
-    poses = np.array([item[1] for item in found]).reshape(-1, 3)
-    place = np.array([item[0] for item in found])
-    results = new_results(len(found))
-    for k, item in enumerate(found):
-        results[k] = item[2]
-    return Crossings(place, waypoint, poses, results)
+@dataclass(frozen=True, eq=False)
+class _Stretches:
+    """Stretches of the path within which a contact jumps."""
+
+    place: np.ndarray
+    """(k, 2) places where each begins and ends, counted in waypoints."""
+    poses: np.ndarray
+    """(k, 2, 3) the poses there."""
+    results: np.ndarray
+    """(k, 2) the RESULTs there."""
+
+    @property
+    def waypoint(self) -> np.ndarray:
+        """(k,) index of the waypoint that follows."""
+        return np.floor(self.place[:, 0]).astype(int) + 1
+
+    def select(self, mask: np.ndarray) -> "_Stretches":
+        """Return the stretches where `mask` (k,) is True."""
+        return _Stretches(self.place[mask], self.poses[mask], self.results[mask])
+
+    def divide(self, evaluate: Evaluate) -> Crossings:
+        """Return the results at PIECES - 1 poses within each stretch, stretch by stretch."""
+        share = np.arange(1, PIECES) / PIECES
+        first, last = self.poses[:, 0], self.poses[:, 1]
+        way = last - first
+        way[:, 2] = (way[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+        poses = (first[:, None] + share[:, None] * way[:, None]).reshape(-1, 3)
+        start, end = self.place[:, :1], self.place[:, 1:]
+        return Crossings(
+            (start + share * (end - start)).ravel(),
+            np.repeat(self.waypoint, PIECES - 1),
+            poses,
+            evaluate(poses, NONE_HELD),
+        )
+
+    def split(self, inner: Crossings, radius: float) -> tuple["_Stretches", np.ndarray]:
+        """Return the pieces within which a contact still jumps, and which of them are stuck.
+
+        Stuck (k,) are those that hold a pose in which the rover does not settle.
+        """
+        k = len(self.place)
+
+        def insert(ends: np.ndarray, between: np.ndarray) -> np.ndarray:
+            between = between.reshape(k, PIECES - 1, *between.shape[1:])
+            whole = np.concatenate([ends[:, :1], between, ends[:, 1:]], axis=1)
+            return whole.reshape(k * (PIECES + 1), *whole.shape[2:])
+
+        results = insert(self.results, np.asarray(inner.results))
+        known = np.flatnonzero(results["status"] != NOT_SETTLED)
+        before, after = known[:-1], known[1:]
+        same = before // (PIECES + 1) == after // (PIECES + 1)
+        before, after = before[same], after[same]
+        jumps = _jumps(results[before], results[after], radius)
+        ends = np.column_stack([before[jumps], after[jumps]])
+        place, poses = insert(self.place, inner.place), insert(self.poses, inner.poses)
+        return _Stretches(place[ends], poses[ends], results[ends]), ends[:, 1] - ends[:, 0] > 1
 
 
-def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    turn = (b[2] - a[2] + np.pi) % (2.0 * np.pi) - np.pi
-    return np.array([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), a[2] + 0.5 * turn])
+def _in_order(found: list[Crossings]) -> Crossings:
+    found = [part for part in found if len(part.place)]
+    if not found:
+        return Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_results(0))
+    place = np.concatenate([part.place for part in found])
+    together = Crossings(
+        place,
+        np.concatenate([part.waypoint for part in found]),
+        np.concatenate([part.poses for part in found]),
+        np.concatenate([part.results for part in found]).view(np.recarray),
+    )
+    return together.select(np.argsort(place, kind="stable"))
 
 
-def _find_jumps(results: Any, radius: float) -> np.ndarray:
-    """Return (k - 1,) True between k results where a contact jumps."""
-    settled, angle = results["status"] == SETTLED, results["contact_angle"]
-    steep = np.maximum(np.abs(angle[1:]), np.abs(angle[:-1])) > STEEP
-    turned = steep & (np.abs(np.diff(angle, axis=0)) > ANGLE_JUMP)
-    lifted = np.abs(np.diff(results["wheel_centres"][:, :, 2], axis=0)) > HEIGHT_JUMP * radius
-    return settled[1:] & settled[:-1] & np.any(turned | lifted, axis=1)
-
-
-def _jumps(before: Any, after: Any, radius: float) -> bool:
-    return bool(_find_jumps(np.array([before, after]), radius)[0])
+def _jumps(before: np.ndarray, after: np.ndarray, radius: float) -> np.ndarray:
+    """Return (k,) True where a contact jumps between the results before and after."""
+    settled = (before["status"] == SETTLED) & (after["status"] == SETTLED)
+    here, there = before["contact_angle"], after["contact_angle"]
+    steep = np.maximum(np.abs(here), np.abs(there)) > STEEP
+    turned = steep & (np.abs(there - here) > ANGLE_JUMP)
+    rise = after["wheel_centres"][:, :, 2] - before["wheel_centres"][:, :, 2]
+    return settled & np.any(turned | (np.abs(rise) > HEIGHT_JUMP * radius), axis=1)
 
 
 def _climb(
-    terrain: Terrain, radius: float, places, evaluate: Evaluate, direction: float
-) -> list[tuple]:
+    terrain: Terrain, radius: float, places: _Stretches, evaluate: Evaluate, direction: float
+) -> Crossings:
     """Evaluate wheels held at stages between foot and edge where they jump up at one place."""
-    poses, held, keys = [], [], []
-    for start, end, a, _, row_a, row_b in places:
-        rise = row_b.wheel_centres[:, 2] - row_a.wheel_centres[:, 2]
-        climbing = rise > 0.05 * radius
-        if not climbing.any() or rise.max() <= HEIGHT_JUMP * radius:
-            continue
-        course = a[2] if direction > 0.0 else a[2] + np.pi
-        face = [_face_ahead(terrain, radius, row_a.wheel_centres[w], course) for w in range(6)]
-        for stage in CLIMB_STAGES:
-            holds = np.full((6, 2), np.nan)
-            for wheel in np.flatnonzero(climbing):
-                height = row_a.wheel_centres[wheel, 2] + stage * rise[wheel]
-                holds[wheel] = height, direction * _angle_on_face(radius, height, *face[wheel])
-            poses.append(a)
-            held.append(holds)
-            keys.append((start + stage * (end - start), int(np.floor(start)) + 1))
-    if not poses:
-        return []
-    rows = evaluate(np.array(poses), np.array(held))
+    before, after = places.results[:, 0]["wheel_centres"], places.results[:, 1]["wheel_centres"]
+    rise = (after - before)[:, :, 2]
+    climbing = rise > 0.05 * radius
+    at = np.flatnonzero(np.any(climbing & (rise > HEIGHT_JUMP * radius), axis=1))
+    if not len(at):
+        return _in_order([])
     stages = len(CLIMB_STAGES)
-    climbs = []
-    for first in range(0, len(rows), stages):
-        group = range(first, first + stages)
-        settled = [k for k in group if rows[k].status == SETTLED]
-        for k in settled or group:
-            place, waypoint = keys[k]
-            climbs.append((place, poses[k], rows[k], waypoint))
-    return climbs
+    held = np.full((len(at), stages, 6, 2), np.nan)
+    for row, i in enumerate(at):
+        course = places.poses[i, 0, 2] + (0.0 if direction > 0.0 else np.pi)
+        for wheel in np.flatnonzero(climbing[i]):
+            centre = before[i, wheel]
+            face, edge = _face_ahead(terrain, radius, centre, course)
+            for k, height in enumerate(centre[2] + CLIMB_STAGES * rise[i, wheel]):
+                angle = direction * _angle_on_face(radius, height, face, edge)
+                held[row, k, wheel] = height, angle
+    poses = np.repeat(places.poses[at, 0], stages, axis=0)
+    results = evaluate(poses, held.reshape(-1, 6, 2))
+    start, end = places.place[at, :1], places.place[at, 1:]
+    settled = (results["status"] == SETTLED).reshape(-1, stages)
+    climbs = Crossings(
+        (start + CLIMB_STAGES * (end - start)).ravel(),
+        np.repeat(places.waypoint[at], stages),
+        poses,
+        results,
+    )
+    return climbs.select((settled | ~settled.any(axis=1, keepdims=True)).ravel())
 
 
 def _face_ahead(terrain: Terrain, radius: float, centre: np.ndarray, yaw: float):

@@ -122,8 +122,9 @@ def _measure_drops(
     descents[descents < ROUNDING] = 0.0
     sudden = (descents > HEIGHT_JUMP * radius) & (steps[:, None] <= 2.0 * SHORTEST)
     dropping = falling[:-1] | falling[1:] | sudden
-    drops, fallen = np.zeros((n, 6)), np.zeros(6)
-    for k in range(len(descents)):
-        fallen = np.where(dropping[k], fallen + descents[k], 0.0)
+    drops, fallen, last = np.zeros((n, 6)), np.zeros(6), -1
+    for k in np.flatnonzero(dropping.any(axis=1)).tolist():
+        fallen = np.where(dropping[k], descents[k] + (fallen if k == last + 1 else 0.0), 0.0)
         drops[owner[k + 1]] = np.maximum(drops[owner[k + 1]], fallen)
+        last = k
     return drops

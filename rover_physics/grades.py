@@ -1,23 +1,25 @@
 """How passable each waypoint is: with equal torques, only with traction control, or not at all."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.limits import UNNEEDED_IN_A_FALL, find_reasons
+from rover_physics.limits import UNNEEDED_IN_A_FALL, Verdict, find_reasons
 from rover_physics.names import WHEELS
 from rover_physics.prediction import PathPrediction
 from rover_physics.reasons import Check, check_limits
 from rover_physics.rover import Rover
-from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain
+from rover_physics.trap import judge_path
 
 PASSABLE = "passable"
 WITH_TRACTION_CONTROL = "passable with traction control"
 IMPASSABLE = "impassable"
+GRADES = (PASSABLE, WITH_TRACTION_CONTROL, IMPASSABLE)
+"""The grades, from best to worst."""
 WHEEL_CONSTRAINTS = ("wheel_lift", "friction", "torque")
 """The paper's three constraints, by their codes in a verdict."""
 
@@ -49,32 +51,64 @@ def grade_path(
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        arguments: Further arguments of `sweep_path`, except `policy`.
+        arguments: Further arguments of `judge_path`, except `policy`.
 
     Returns:
-        A grade per waypoint; a limit broken on the way to a waypoint counts there.
+        A grade per waypoint; a limit broken on the way to a waypoint counts there, and so does
+        that the rover would be trapped.
 
     Raises:
-        PoseError, ModelError, SoilError: As `sweep_path`.
+        PoseError, ModelError, SoilError: As `judge_path`.
     """
-    equal = sweep_path(rover, terrain, poses, policy="equal", **arguments)
-    optimal = sweep_path(rover, terrain, poses, policy="optimal", **arguments)
-    return grade_predictions(rover, equal, optimal)
+    equal = judge_path(rover, terrain, poses, policy="equal", **arguments)
+    return grade_judged(rover, terrain, *equal, **arguments)
 
 
-def grade_predictions(
-    rover: Rover, equal: PathPrediction, optimal: PathPrediction
+def grade_judged(
+    rover: Rover,
+    terrain: Terrain,
+    prediction: PathPrediction,
+    verdict: Verdict,
+    **arguments: Any,
 ) -> tuple[Grade, ...]:
-    """Grade each waypoint from the predictions of the same path under both policies."""
-    grades = []
-    for one, other in zip(_decide(rover, equal), _decide(rover, optimal), strict=True):
-        if not one.reason:
-            grades.append(_grade(PASSABLE, "equal", one, ""))
-        elif not other.reason:
-            grades.append(_grade(WITH_TRACTION_CONTROL, "optimal", other, one.reason))
-        else:
-            grades.append(_grade(IMPASSABLE, "optimal", other, other.reason))
-    return tuple(grades)
+    """Grade each waypoint of a path that `judge_path` has judged under one policy.
+
+    The other policy is asked only where it matters: nothing that equal torques pass needs others.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        prediction: The path under either policy, from `judge_path`.
+        verdict: What was said of it.
+        arguments: The arguments it was judged with, except `policy`.
+
+    Raises:
+        PoseError, ModelError, SoilError: As `judge_path`.
+    """
+    judged = {prediction.policy: (prediction, verdict)}
+    for policy in ("equal", "optimal"):
+        if policy not in judged:
+            judged[policy] = judge_path(
+                rover, terrain, prediction.poses, policy=policy, **arguments
+            )
+        if judged[policy][1].traversable:
+            break
+    equal = _decide(rover, *judged["equal"])
+    optimal = _decide(rover, *judged["optimal"]) if "optimal" in judged else equal
+    return tuple(_grade(one, other) for one, other in zip(equal, optimal, strict=True))
+
+
+def deciding_waypoint(grades: Sequence[Grade]) -> int:
+    """Return the index of the waypoint that the grade of a whole path hangs on.
+
+    Of the waypoints with the worst grade it is the first where that is IMPASSABLE, else the one
+    with the least margin.
+    """
+    worst = max(GRADES.index(grade.grade) for grade in grades)
+    among = [i for i, grade in enumerate(grades) if GRADES.index(grade.grade) == worst]
+    if worst == GRADES.index(IMPASSABLE):
+        return among[0]
+    return min(among, key=lambda i: np.nan_to_num(grades[i].margin, nan=np.inf))
 
 
 @dataclass(frozen=True)
@@ -87,17 +121,34 @@ class _Decision:
     reason: str
 
 
-def _grade(grade: str, policy: str, decision: _Decision, reason: str) -> Grade:
+def _grade(equal: _Decision, optimal: _Decision) -> Grade:
+    """Return the grade of a waypoint from what decides about it under either policy."""
+    if not equal.reason:
+        grade, policy, decision, reason = PASSABLE, "equal", equal, ""
+    elif not optimal.reason:
+        grade, policy, decision, reason = WITH_TRACTION_CONTROL, "optimal", optimal, equal.reason
+    else:
+        grade, policy, decision, reason = IMPASSABLE, "optimal", optimal, optimal.reason
     wheel = WHEELS[decision.wheel] if decision.wheel >= 0 else ""
     return Grade(grade, policy, decision.constraint, wheel, decision.margin, reason)
 
 
-def _decide(rover: Rover, prediction: PathPrediction) -> list[_Decision]:
+def _decide(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> list[_Decision]:
     """Return what decides about each waypoint, the way to it included."""
     decisions = list(_decide_rows(rover, prediction))
+    _look_between(rover, prediction, decisions)
+    for i, (code, reason) in enumerate(zip(verdict.codes, verdict.reasons, strict=True)):
+        if code != (decisions[i].constraint if decisions[i].reason else ""):
+            # trapped, or what else is about more than the waypoint itself
+            decisions[i] = _Decision(code, -1, float("nan"), reason)
+    return decisions
+
+
+def _look_between(rover: Rover, prediction: PathPrediction, decisions: list[_Decision]) -> None:
+    """Replace what decides about a waypoint where the way to it is worse."""
     between = prediction.between
     if between is None or not len(between.poses):
-        return decisions
+        return
     on_the_way = zip(between.waypoint.tolist(), _decide_rows(rover, between), strict=True)
     for i, other in on_the_way:
         own = decisions[i]
@@ -108,7 +159,6 @@ def _decide(rover: Rover, prediction: PathPrediction) -> list[_Decision]:
             decisions[i] = _Decision(other.constraint, other.wheel, other.margin, reason)
         elif other.margin < own.margin or np.isnan(own.margin):
             decisions[i] = other
-    return decisions
 
 
 def _decide_rows(rover: Rover, prediction: PathPrediction) -> Iterator[_Decision]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.evaluation import NO_EQUILIBRIUM
+from rover_physics.plain import to_plain
 from rover_physics.prediction import PathPrediction
 from rover_physics.reasons import check_limits, tilt_of
 from rover_physics.rover import Rover
@@ -70,6 +71,8 @@ class Verdict:
     """Smallest belly clearance on the settled part [m]."""
     max_wheel_drop: float
     """Largest drop of a wheel that rolled off an edge [m]."""
+    max_sinkage: float
+    """Largest sinkage of a wheel on the settled part [m]; 0 on ground that does not yield."""
     map_sigmas: float = 0.0
     """Standard deviations by which the heights of the map may be wrong; 0 where it is exact."""
     tip_over_ratio_bound: float = float("nan")
@@ -85,13 +88,7 @@ class Verdict:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as JSON can hold it: lists for tuples, None for NaN and infinity."""
-        plain = asdict(self)
-        plain["reasons"], plain["codes"] = list(self.reasons), list(self.codes)
-        return {key: _plain(value) for key, value in plain.items()}
-
-
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+        return to_plain(asdict(self))
 
 
 def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
@@ -130,6 +127,7 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
         max_tilt=extreme(np.max, tilt_of),
         min_belly_clearance=extreme(np.min, lambda part: part.belly_clearance),
         max_wheel_drop=extreme(np.max, lambda part: part.wheel_drop),
+        max_sinkage=extreme(np.max, lambda part: part.sinkage),
     )
 
 

@@ -1,7 +1,7 @@
 """A query of the rover at rest: whether the arm can reach a point and push there."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,24 @@ from scipy.spatial.transform import Rotation
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.limits import Verdict, judge
 from rover_physics.manipulator import as_vector, distance_to_reach, inverse_kinematics
+from rover_physics.plain import to_plain
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Manipulator, Rover
 from rover_physics.sweep import check_poses, sweep_path
 from rover_physics.terrain import Terrain
+
+OF_THE_VERDICT = (
+    "policy",
+    "min_tip_over_ratio",
+    "max_friction_utilisation",
+    "max_torque_saturation",
+    "max_tilt",
+    "min_belly_clearance",
+    "max_sinkage",
+)
+"""What an answer in words tells of its verdict."""
+PER_WHEEL = ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation")
+"""What it tells of each wheel, in the order of `names.WHEELS`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +53,17 @@ class ReachAnswer:
     """The limits held against the rover with the arm there; None where it was not asked."""
     prediction: PathPrediction | None
     """Loads, utilisations and margins with the arm there, one row; None where not asked."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the answer as JSON can hold it; what is not known is None or left out."""
+        names = ("possible", "reachable", "code", "reason", "target", "out_of_reach")
+        answer = {name: getattr(self, name) for name in (*names, "joint_angles")}
+        if self.verdict is not None:
+            told = asdict(self.verdict)
+            answer |= {name: told[name] for name in OF_THE_VERDICT}
+        if self.prediction is not None:
+            answer |= {name: getattr(self.prediction, name)[0] for name in PER_WHEEL}
+        return to_plain(answer)
 
 
 def judge_reach(

@@ -106,7 +106,7 @@ def solve_wheel(soil, mu, radius, width, N, T, S):
     strength = shear_strength(soil, width * length, N)
     largest = _largest_thrust(soil, radius, sinkage, length, strength)
     thrust = T + resistance
-    utilisation = _use_of_shear(T, S, resistance, largest)
+    utilisation = use_of_shear(T, S, resistance, largest)
     slip = 1.0 if thrust >= 0.0 else -1.0
     if utilisation <= 1.0:
         slip = _slip_of_thrust(thrust, S, strength, soil[SHEAR_MODULUS] / length)
@@ -226,7 +226,7 @@ def _largest_thrust(soil, radius, sinkage, length, strength):
 
 
 @kernel
-def _use_of_shear(T, S, resistance, largest):
+def use_of_shear(T, S, resistance, largest):
     """Return (T, S) relative to the largest forces in its direction.
 
     The forces that the soil can give are the circle sqrt((T + R)^2 + S^2) <= F(1).

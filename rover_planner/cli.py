@@ -1,9 +1,10 @@
-"""The command `rover_planner`: predict a path, make a terrain, run the demo, draw Figure 4."""
+"""The command `rover_planner`: predict, reach, make a terrain, run the demo, draw Figure 4."""
 
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -24,45 +25,147 @@ app = typer.Typer(
 )
 
 
+RoverName = Annotated[
+    str, typer.Argument(metavar="ROVER", help="Preset name (lsr1, m2020) or rover file.")
+]
+TerrainFile = Annotated[Path, typer.Argument(metavar="TERRAIN", help="Elevation map, .npz.")]
+Friction = Annotated[float | None, typer.Option(metavar="MU", help="Coulomb friction everywhere.")]
+MaxTorque = Annotated[
+    float | None, typer.Option(metavar="TAU", help="Largest wheel torque in N m.")
+]
+Policy = Annotated[
+    str, typer.Option(metavar="equal|optimal", help="How the wheels share the traction.")
+]
+SoilName = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="Preset soil where the terrain names none (docs/soil.md)."),
+]
+Payload = Annotated[float | None, typer.Option(metavar="KG", help="Mass at the arm's tip in kg.")]
+Vector = tuple[float, float, float]
+
+
 @app.command()
 def predict(
-    rover: Annotated[
-        str, typer.Argument(metavar="ROVER", help="Preset name (lsr1, m2020) or rover file.")
-    ],
-    terrain: Annotated[Path, typer.Argument(metavar="TERRAIN", help="Elevation map, .npz.")],
+    rover: RoverName,
+    terrain: TerrainFile,
     poses: Annotated[
         Path, typer.Argument(metavar="POSES", help="Poses x, y, yaw of the body, .npz.")
     ],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Predictions, .npz; is overwritten.")],
-    friction: Annotated[
-        float | None, typer.Option(metavar="MU", help="Coulomb friction everywhere.")
+    friction: Friction = None,
+    max_torque: MaxTorque = None,
+    policy: Policy = "equal",
+    soil: SoilName = None,
+    arm: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=RAD", help="Angle of a joint of the arm in rad; give all."),
     ] = None,
-    max_torque: Annotated[
-        float | None, typer.Option(metavar="TAU", help="Largest wheel torque [N m].")
+    payload: Payload = None,
+    tool_force: Annotated[
+        Vector | None,
+        typer.Option(metavar="FX FY FZ", help="Force on the arm's tip in N, body frame."),
     ] = None,
-    policy: Annotated[
-        str, typer.Option(metavar="equal|optimal", help="How the wheels share the traction.")
-    ] = "equal",
+    tool_moment: Annotated[
+        Vector | None,
+        typer.Option(metavar="MX MY MZ", help="Moment on the arm's tip in N m, body frame."),
+    ] = None,
+    grade: Annotated[
+        bool,
+        typer.Option("--grade", help="Add the grade of each waypoint, by both torque policies."),
+    ] = False,
+    torque_ranges: Annotated[
+        bool,
+        typer.Option("--torque-ranges", help="Add the torques with which each wheel can do."),
+    ] = False,
 ) -> None:
     """Predict loads, slip and margins along a path of poses and write them to a file.
 
     Exit code 0 when it ran, whatever the verdict; 2 for bad input.
     """
+    from rover_physics.grades import grade_judged
     from rover_physics.rover import load_rover
     from rover_physics.terrain import load_terrain
+    from rover_physics.torque_ranges import find_torque_ranges
     from rover_physics.trap import judge_path
+    from rover_planner.arm_options import read_arm_angles
     from rover_planner.prediction_files import read_poses, write_prediction
     from rover_planner.progress import show_progress
 
     model = load_rover(rover)
     ground = load_terrain(terrain)
     path = read_poses(poses)
+    options: dict[str, Any] = {
+        "friction": friction,
+        "max_torque": max_torque,
+        "soil": soil,
+        "joint_angles": read_arm_angles(model, arm or ()),
+        "payload": payload,
+        "tool_force": tool_force,
+        "tool_moment": tool_moment,
+    }
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
-        prediction, verdict = judge_path(
-            model, ground, path, friction=friction, max_torque=max_torque, policy=policy
+        judged = judge_path(model, ground, path, policy=policy, **options)
+        if grade:
+            progress("grade the waypoints")
+        grades = grade_judged(model, ground, *judged, **options) if grade else None
+        if torque_ranges:
+            progress("find the ranges of the torques")
+        ranges = find_torque_ranges(model, ground, path, **options) if torque_ranges else None
+    on_soil = soil is not None or bool(ground.soil_names)
+    write_prediction(out, *judged, on_soil=on_soil, grades=grades, ranges=ranges)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})  # so that -1.5 is a number
+def reach(
+    rover: RoverName,
+    terrain: TerrainFile,
+    x: Annotated[float, typer.Argument(metavar="X", help="Place of the body in m, map frame.")],
+    y: Annotated[float, typer.Argument(metavar="Y")],
+    yaw: Annotated[float, typer.Argument(metavar="YAW", help="Heading of the body in rad.")],
+    tx: Annotated[float, typer.Argument(metavar="TX", help="Place for the tip in m, map frame.")],
+    ty: Annotated[float, typer.Argument(metavar="TY")],
+    tz: Annotated[float, typer.Argument(metavar="TZ")],
+    force: Annotated[
+        Vector | None,
+        typer.Option(metavar="FX FY FZ", help="Force on the tip there in N, map frame."),
+    ] = None,
+    moment: Annotated[
+        Vector | None,
+        typer.Option(metavar="MX MY MZ", help="Moment on the tip there in N m, map frame."),
+    ] = None,
+    payload: Payload = None,
+    friction: Friction = None,
+    max_torque: MaxTorque = None,
+    policy: Policy = "equal",
+    soil: SoilName = None,
+) -> None:
+    """Tell as JSON whether the rover at rest can reach a point with its arm, and push there.
+
+    Exit code 0 when it ran, whatever the answer; 2 for bad input.
+    """
+    from rover_physics.reach import judge_reach
+    from rover_physics.rover import load_rover
+    from rover_physics.terrain import load_terrain
+    from rover_planner.progress import show_progress
+
+    model, ground = load_rover(rover), load_terrain(terrain)
+    with show_progress() as progress:
+        progress(f"ask {model.name} (the first run compiles the model)")
+        answer = judge_reach(
+            model,
+            ground,
+            (x, y, yaw),
+            (tx, ty, tz),
+            tool_force=force,
+            tool_moment=moment,
+            payload=payload,
+            friction=friction,
+            max_torque=max_torque,
+            policy=policy,
+            soil=soil,
         )
-    write_prediction(out, prediction, verdict)
+    print(json.dumps(answer.to_dict(), allow_nan=False))
 
 
 @app.command()
@@ -71,10 +174,10 @@ def terrain(
         Path, typer.Argument(metavar="OUT", help="Elevation map to write, .npz; is overwritten.")
     ],
     seed: Annotated[int, typer.Option(help="Seed of all that is random.")] = 1,
-    size: Annotated[float, typer.Option(help="Width and height [m].")] = 24.0,
-    resolution: Annotated[float, typer.Option(help="Cell size [m].")] = 0.05,
+    size: Annotated[float, typer.Option(help="Width and height in m.")] = 24.0,
+    resolution: Annotated[float, typer.Option(help="Cell size in m.")] = 0.05,
     roughness: Annotated[
-        float, typer.Option(help="RMS height difference of points 1 m apart [m].")
+        float, typer.Option(help="RMS height difference of points 1 m apart in m.")
     ] = 0.04,
     rocks: Annotated[float, typer.Option(help="Fraction of the ground that rocks cover.")] = 0.03,
     craters: Annotated[

@@ -166,7 +166,7 @@ def _compile(steps: Steps, children: list, environment: dict[str, str], folder: 
     """Compile the kernels in a process that can be stopped at any time."""
     with steps.step("compile the model's kernels (the first time takes a while)"):
         child = ChildProcess(
-            "rover_planner.compile_kernels", (), environment, folder / "compile_kernels.log"
+            "rover_physics.sweep", (), environment, folder / "compile_kernels.log"
         )
         children.append(child)
         for _ in child.lines(lambda: None):

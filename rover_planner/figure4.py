@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from rover_physics.rover import Rover
 from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain
-from rover_planner.errors import PlanningError
+from rover_planner.pictures import STYLE, save_figure
 
 AXLES = ("rear", "middle", "front")
 LARGEST_TORQUE = 0.2
@@ -32,20 +32,6 @@ _COLOURS = {ALONE: "#0072B2", HELD: "#D55E00"}
 _DASHES = {ALONE: "-", HELD: (0, (4, 2))}
 _HEADROOM = 1.55
 """Room above the lines, in units of the room below, for what is written there."""
-_STYLE = {
-    "font.size": 9.5,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "axes.labelsize": 9.5,
-    "axes.edgecolor": "#666666",
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "axes.grid": True,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.6,
-}
 
 
 def loads_at_rest(rover: Rover) -> np.ndarray:
@@ -115,7 +101,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
     }
     centre = loads_at_rest(rover)
     reach = 1.15 * max(np.abs(values - centre).max() for values in loads.values())
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE | {"axes.titlesize": 11, "axes.titleweight": "bold"}):
         figure = Figure(figsize=(10.5, 9.0), layout="constrained")
         FigureCanvasAgg(figure)
         panels = figure.subplots(3, 3, sharex=True, sharey="col")
@@ -137,10 +123,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
             fontweight="bold",
         )
         figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
-        try:
-            figure.savefig(path, dpi=130)
-        except (OSError, ValueError) as error:
-            raise PlanningError(f"cannot write the picture {path}: {error}") from None
+        save_figure(path, figure)
 
 
 def _draw_line(axes: Axes, torques: np.ndarray, loads: np.ndarray, case: str) -> None:

@@ -96,6 +96,18 @@ TRAVERSE_SERVER = (
         bounds=(0.0, 1e6),
     ),
     ParameterSpec(
+        "soil",
+        "",
+        "Soil of config/soils.yaml where the map names none; empty is Coulomb friction.",
+    ),
+    ParameterSpec(
+        "payload",
+        -1.0,
+        "Mass at the tip of the manipulator; -1 takes the rover file's.",
+        "kg",
+        bounds=(-1.0, 1e6),
+    ),
+    ParameterSpec(
         "policy",
         "equal",
         "How the wheels share the traction: equal torques, or optimal with traction control.",

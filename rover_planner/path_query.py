@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,19 @@ class PathQueryOptions:
     """Coulomb friction everywhere; None: that of the terrain, or of the rover file."""
     max_torque: float | None = None
     """Largest wheel torque [N m]; None: that of the rover file."""
+    soil: str | None = None
+    """Preset soil where the terrain names none; None: Coulomb friction."""
+    payload: float | None = None
+    """Mass at the tip of the manipulator [kg]; None: that of the rover file."""
+
+    def ground_and_load(self) -> dict[str, Any]:
+        """Return the arguments of `sweep_path` that these options set, but for the policy."""
+        return {
+            "friction": self.friction,
+            "max_torque": self.max_torque,
+            "soil": self.soil,
+            "payload": self.payload,
+        }
 
 
 @dataclass(frozen=True)
@@ -160,10 +174,9 @@ def check_path(
         rover,
         terrain,
         poses,
-        friction=options.friction,
-        max_torque=options.max_torque,
         policy=options.policy,
         joint_angles=joint_angles,
+        **options.ground_and_load(),
     )
     return Candidate(prediction.poses, prediction, verdict, path_cost(rover, prediction, verdict))
 

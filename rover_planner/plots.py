@@ -19,6 +19,7 @@ from rover_physics.rover import Rover
 from rover_physics.terrain import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.path_query import Candidate, PathAnswer
+from rover_planner.pictures import STYLE, save_figure
 
 # The palette of Okabe and Ito, which readers with colour-blindness can tell apart.
 PASSABLE = "#0072B2"
@@ -69,7 +70,7 @@ def draw_answers(
         raise PlanningError("no answers to draw; there must be at least one")
     passable = [a for a in answers if a.answer.traversable]
     shown = (passable or list(answers))[:_COLUMNS]
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(12.5, 15.5), layout="constrained")
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.05))
@@ -78,25 +79,7 @@ def draw_answers(
             figure.suptitle(title, fontsize=14, fontweight="bold")
         _draw_map(above.subplots(), terrain, answers)
         _draw_panels(below, rover, shown)
-        try:
-            figure.savefig(path, dpi=130)
-        except (OSError, ValueError) as error:
-            raise PlanningError(f"cannot write the picture {path}: {error}") from None
-
-
-_STYLE = {
-    "font.size": 9.5,
-    "axes.titlesize": 10.5,
-    "axes.labelsize": 9.5,
-    "axes.edgecolor": "#666666",
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "axes.grid": True,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.6,
-}
+        save_figure(path, figure)
 
 
 def hill_shade(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:

@@ -3,13 +3,16 @@
 import io
 import zipfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.grades import Grade
 from rover_physics.limits import Verdict
 from rover_physics.prediction import PathPrediction
+from rover_physics.torque_ranges import TorqueRanges
 from rover_planner.errors import PlanningError
 
 ARRAYS = (
@@ -33,6 +36,8 @@ ARRAYS = (
     "time",
 )
 """The arrays of a prediction that the output file holds, under the same names."""
+SOIL_ARRAYS = ("sinkage", "motion_resistance")
+"""Those that it holds besides where soil was asked for, or the terrain names soils."""
 
 
 def read_poses(path: Path) -> NDArray[np.float64]:
@@ -63,19 +68,44 @@ def read_poses(path: Path) -> NDArray[np.float64]:
     return poses.astype(np.float64)
 
 
-def write_prediction(path: Path, prediction: PathPrediction, verdict: Verdict) -> None:
+def write_prediction(
+    path: Path,
+    prediction: PathPrediction,
+    verdict: Verdict,
+    *,
+    on_soil: bool = False,
+    grades: Sequence[Grade] | None = None,
+    ranges: TorqueRanges | None = None,
+) -> None:
     """Write a prediction and its verdict to an .npz file of exactly that name.
 
     Beside the ARRAYS it holds `reason` (n,) text, empty where passable, `traversable` () bool and
     `first_failure` () int, -1 if there is none.
 
+    Args:
+        path: The file; it is overwritten.
+        prediction: The path of n waypoints.
+        verdict: What the limits say to it.
+        on_soil: Whether to write SOIL_ARRAYS (n, 6), in m and N.
+        grades: Of each waypoint, written as `grade`, `grade_constraint` and `grade_wheel` (n,)
+            text and `grade_margin` (n,).
+        ranges: Written as `torque_range` (n, 6, 2), lowest and highest torque [N m].
+
     Raises:
         PlanningError: The file cannot be written.
     """
-    arrays = {name: getattr(prediction, name) for name in ARRAYS}
+    names = ARRAYS + SOIL_ARRAYS if on_soil else ARRAYS
+    arrays = {name: getattr(prediction, name) for name in names}
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
     arrays["traversable"] = np.array(verdict.traversable, dtype=np.bool_)
     arrays["first_failure"] = np.array(verdict.first_failure, dtype=np.int64)
+    if grades is not None:
+        for name, field in (("", "grade"), ("_constraint", "constraint"), ("_wheel", "wheel")):
+            texts = [getattr(grade, field) for grade in grades]
+            arrays[f"grade{name}"] = np.array(texts, dtype=np.str_)
+        arrays["grade_margin"] = np.array([grade.margin for grade in grades])
+    if ranges is not None:
+        arrays["torque_range"] = np.stack([ranges.lowest, ranges.highest], axis=-1)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     try:

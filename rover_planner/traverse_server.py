@@ -1,7 +1,6 @@
 """The node /traverse_server: asks and answers over ROS 2 whether the rover can traverse."""
 
 import sys
-import traceback
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path as FilePath
@@ -43,13 +42,13 @@ from msg_adapters.predictions import (
     waypoint_array,
 )
 from msg_adapters.verdicts import verdict_to_diagnostics, verdict_to_json
-from rover_physics.errors import RoverError
 from rover_physics.names import WHEELS
 from rover_physics.sweep import warm_up
 from rover_physics.terrain import Terrain, load_terrain
-from rover_planner.errors import PlanningError
 from rover_planner.parameters import TRAVERSE_SERVER, check_changes, declare_parameters
 from rover_planner.qos import map_subscriptions_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.reach_topics import ReachTopics
+from rover_planner.refusals import BAD_INPUT, answer_or_refuse
 from rover_planner.traverse_service import (
     Judgement,
     TraverseService,
@@ -65,8 +64,6 @@ WHEEL_TOPICS = {
     "torque_saturation": "torque_saturation",
 }
 """Topics of one value per waypoint and wheel, and the field of the prediction each carries."""
-
-_BAD_INPUT = (MessageError, PlanningError, RoverError)
 
 
 class TraverseServer(Node):
@@ -84,6 +81,7 @@ class TraverseServer(Node):
         self.create_service(GetPlan, "~/can_traverse", self._can_traverse)
         self.create_service(Trigger, "~/check_path", self._check_path)
         self.create_service(LoadMap, "~/load_map", self._load_map)
+        self._reach = ReachTopics(self, self._service, self._map_frame)
         self.add_on_set_parameters_callback(
             check_changes(TRAVERSE_SERVER, self._values, settings_from_parameters)
         )
@@ -94,6 +92,11 @@ class TraverseServer(Node):
     def service(self) -> TraverseService:
         """What the node knows."""
         return self._service
+
+    @property
+    def reach(self) -> ReachTopics:
+        """What the node knows of the arm's tool."""
+        return self._reach
 
     def _create_publishers(self) -> None:
         qos = result_qos()
@@ -124,7 +127,7 @@ class TraverseServer(Node):
             return
         try:
             self._take_terrain(load_terrain(file), file)
-        except _BAD_INPUT as error:
+        except BAD_INPUT as error:
             self.get_logger().error(f"terrain_file not loaded: {error}")
 
     def _apply_parameters(self, parameters) -> None:
@@ -146,7 +149,7 @@ class TraverseServer(Node):
                 cloud, self._values["map_resolution"], self._values["cell_height"]
             )
             self._take_terrain(terrain, "elevation_cloud")
-        except _BAD_INPUT as error:
+        except BAD_INPUT as error:
             there = self._service.terrain is not None
             kept = "the last good map stays" if there else "there is no map yet"
             self.get_logger().error(f"elevation_cloud refused, {kept}: {error}")
@@ -223,7 +226,7 @@ class TraverseServer(Node):
         try:
             terrain = load_terrain(file)
             self._take_terrain(terrain, str(file))
-        except _BAD_INPUT as error:
+        except BAD_INPUT as error:
             self.get_logger().error(f"load_map: {error}")
             response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
             return response
@@ -235,14 +238,7 @@ class TraverseServer(Node):
 
     def _judge(self, request: str, judge: Callable[[], Judgement]) -> Judgement:
         """Answer a request and log it; whatever is wrong with it makes a refused verdict."""
-        try:
-            judgement = judge()
-        except _BAD_INPUT as error:
-            judgement = refusal("bad_request", str(error))
-        except Exception as error:
-            # A fault of this program must not leave the rover without a planner.
-            self.get_logger().error(f"{request}: {traceback.format_exc()}")
-            judgement = refusal("internal_error", f"{type(error).__name__}: {error}")
+        judgement = answer_or_refuse(self.get_logger(), request, judge, refusal)
         verdict = judgement.verdict
         if judgement.traversable:
             self.get_logger().info(
@@ -291,7 +287,8 @@ class TraverseServer(Node):
             joints = joint_trajectory(prediction, radius, frame, stamp)
             tip_over = tip_over_array(prediction)
             reasons = judgement.candidate.verdict.reasons
-            markers = path_markers(prediction, reasons, rows, frame, stamp)
+            grades = judgement.verdict["grades"]
+            markers = path_markers(prediction, reasons, rows, frame, stamp, grades)
         self._plan.publish(plan)
         self._joints.publish(joints)
         self._tip_over.publish(tip_over)
@@ -317,7 +314,7 @@ def main(arguments: list[str] | None = None) -> int:
         _run(TraverseServer)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
-    except _BAD_INPUT as error:
+    except BAD_INPUT as error:
         logger.fatal(str(error))
         return 2
     finally:

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.grades import Grade, grade_judged
+from rover_physics.manipulator import body_mass_and_com
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover import Rover, load_rover
+from rover_physics.soil_file import soil_named
 from rover_physics.terrain import Terrain
-from rover_planner.candidates import MAX_WAYPOINTS
 from rover_planner.errors import PlanningError
+from rover_planner.path_geometry import densify, rings_within
 from rover_planner.path_query import (
     Candidate,
     PathAnswer,
@@ -21,10 +24,10 @@ from rover_planner.path_query import (
     answer_path_query,
     check_path,
 )
+from rover_planner.path_report import describe_grades, describe_path
 
-_RING_STEP = 0.1
-_MAX_RINGS = 4
-_RING_GOALS = 8
+OWN_PAYLOAD = -1.0
+"""Value of the parameter payload that takes what the rover file has."""
 _QUERIES_PER_RING = 4
 
 
@@ -66,10 +69,22 @@ def settings_from_parameters(values: Mapping[str, Any]) -> ServiceSettings:
         values: All of the table `TRAVERSE_SERVER`, each already checked.
 
     Raises:
-        RoverError: The rover cannot be loaded.
+        RoverError: The rover cannot be loaded, the soil is not among the presets, or the payload
+            is none for this rover.
+        PlanningError: The payload is below 0 and not -1.
     """
+    rover, payload, soil = load_rover(values["rover"]), values["payload"], values["soil"]
+    if payload < 0.0 and payload != OWN_PAYLOAD:
+        raise PlanningError(
+            f"parameter payload is {payload}; it must be a mass of 0 kg or more, "
+            f"or {OWN_PAYLOAD:g} for that of the rover file"
+        )
+    if payload != OWN_PAYLOAD:
+        body_mass_and_com(rover, payload=payload)
+    if soil:
+        soil_named(soil)
     return ServiceSettings(
-        rover=load_rover(values["rover"]),
+        rover=rover,
         query=PathQueryOptions(
             count=values["candidate_count"],
             spacing=values["candidate_spacing"],
@@ -77,6 +92,8 @@ def settings_from_parameters(values: Mapping[str, Any]) -> ServiceSettings:
             policy=values["policy"],
             friction=values["friction"] or None,
             max_torque=values["max_torque"] or None,
+            soil=soil or None,
+            payload=None if payload == OWN_PAYLOAD else payload,
         ),
         interpolate=values["unknown_cells"] == "interpolate",
         max_gap=values["max_gap"],
@@ -174,6 +191,12 @@ class TraverseService:
                     break
         return self._judge_answer(answer, goal, reached, tried)
 
+    def refuse_for_want(self) -> Judgement | None:
+        """Refuse what needs a path and a map where there is none; None where there are both."""
+        if self._path is None:
+            return refusal("no_path", self._path_refusal)
+        return self._refuse_for_want_of_a_map() if self._terrain is None else None
+
     def check_last_path(self) -> Judgement:
         """Judge the last path that was received.
 
@@ -181,10 +204,11 @@ class TraverseService:
             PlanningError: The path is too long.
             RoverError: The model refuses the path.
         """
-        if self._path is None:
-            return refusal("no_path", self._path_refusal)
-        if self._terrain is None:
-            return self._refuse_for_want_of_a_map()
+        want = self.refuse_for_want()
+        if want is not None:
+            return want
+        assert self._path is not None
+        assert self._terrain is not None
         poses = densify(self._path, self._settings.query.waypoint_spacing)
         candidate = check_path(
             self._settings.rover,
@@ -213,7 +237,7 @@ class TraverseService:
         A ring's goals on the start's side come first: where those cannot be reached, the ones
         behind them rarely can, and each costs a sweep of all candidates.
         """
-        for ring in _rings_within(start, goal, tolerance):
+        for ring in rings_within(start, goal, tolerance):
             standing = (pose for pose in ring if self._can_stand(pose))
             yield from itertools.islice(standing, _QUERIES_PER_RING)
 
@@ -250,17 +274,22 @@ class TraverseService:
 
     def _describe(self, candidate: Candidate) -> dict[str, Any]:
         """Say about a judged path what a program or an operator wants to know."""
-        prediction, failure = candidate.prediction, candidate.verdict.first_failure
-        verdict = dict(candidate.verdict.to_dict())
-        verdict["waypoints"] = len(prediction.poses)
-        verdict["length"] = candidate.length
-        verdict["time"] = float(prediction.time[-1])
-        verdict["energy"] = float(prediction.energy[-1])
-        if failure >= 0:
-            verdict["failure_pose"] = prediction.poses[failure].tolist()
-            verdict["failure_distance"] = candidate.reach * candidate.length
+        verdict = describe_path(candidate)
+        verdict.update(describe_grades(self._grade(candidate)))
         verdict.update(self._compare_suspension(candidate))
         return verdict
+
+    def _grade(self, candidate: Candidate) -> tuple[Grade, ...]:
+        """Grade a judged path by what both torque policies make of it."""
+        assert self._terrain is not None
+        return grade_judged(
+            self._settings.rover,
+            self._terrain,
+            candidate.prediction,
+            candidate.verdict,
+            joint_angles=self._manipulator_angles(),
+            **self._settings.query.ground_and_load(),
+        )
 
     def _compare_suspension(self, candidate: Candidate) -> dict[str, Any]:
         """Compare the measured suspension with the predicted one at the path's start."""
@@ -310,55 +339,3 @@ class TraverseService:
 def refusal(code: str, reason: str) -> Judgement:
     """Refuse a request that no path could be judged for."""
     return Judgement({"traversable": False, "code": code, "reason": reason, "first_failure": -1})
-
-
-def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """Put waypoints between the poses (n, 3) of a path until none are further apart.
-
-    The given poses stay. Between them x and y run along the straight line and the heading turns
-    evenly the shorter way; the turn on the spot of poses at one place stays one step.
-
-    Args:
-        poses: x, y [m], yaw [rad].
-        spacing: Largest distance between waypoints [m].
-
-    Raises:
-        PlanningError: The path would have more than MAX_WAYPOINTS.
-    """
-    steps = np.diff(poses, axis=0)
-    steps[:, 2] = np.arctan2(np.sin(steps[:, 2]), np.cos(steps[:, 2]))
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    pieces = np.maximum(1.0, np.ceil(lengths / spacing - 1e-9))
-    if pieces.sum() >= MAX_WAYPOINTS:
-        raise PlanningError(
-            f"path is {lengths.sum():.4g} m long, which at {spacing:g} m are more than "
-            f"{MAX_WAYPOINTS} waypoints; ask for a shorter one"
-        )
-    counts = pieces.astype(np.intp)
-    segment = np.repeat(np.arange(len(steps)), counts)
-    within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
-    dense = poses[segment] + steps[segment] * (within / counts[segment])[:, None]
-    return np.vstack([dense, poses[-1:]])
-
-
-def _rings_within(
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
-    tolerance: float,
-) -> Iterator[list[NDArray[np.float64]]]:
-    """Yield rings of goals of increasing distance, on each ring those towards the start first."""
-    if tolerance <= 0.0:
-        return
-    rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / _RING_STEP)))
-    towards_start = math.atan2(start[1] - goal[1], start[0] - goal[0])
-    turns = sorted(
-        (2.0 * math.pi * k / _RING_GOALS for k in range(_RING_GOALS)),
-        key=lambda turn: -math.cos(turn),
-    )
-    for ring in range(1, rings + 1):
-        # A hair within the tolerance, so that rounding does not carry a goal out of it.
-        distance = tolerance * ring / rings * (1.0 - 1e-6)
-        angles = [towards_start + turn for turn in turns]
-        yield [
-            goal + distance * np.array([math.cos(angle), math.sin(angle), 0.0]) for angle in angles
-        ]

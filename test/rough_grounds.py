@@ -49,6 +49,23 @@ def rocky(seed: int, half: float = 3.0, count: int = 120) -> Terrain:
     return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
 
 
+def bouldered(seed: int, half: float = 3.0, count: int = 150, highest: float = 0.1) -> Terrain:
+    """Return gentle relief strewn with half-ellipsoids from 2 cm to `highest` [m] high.
+
+    They are at most twice as wide, from middle to rim, as high: their rims stand upright.
+    """
+    rng = np.random.default_rng(seed)
+    x, y = _grid(half)
+    relief = fractal(seed + 500, half, 0.03).elevation
+    z = relief.copy()
+    for _ in range(count):
+        (cx, cy), height = rng.uniform(-half, half, 2), rng.uniform(0.02, highest)
+        width = height * rng.uniform(1.0, 2.0)
+        inside = np.clip(1.0 - ((x - cx) ** 2 + (y - cy) ** 2) / width**2, 0.0, None)
+        z = np.maximum(z, relief + height * np.sqrt(inside))
+    return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
+
+
 def random_poses(seed: int, count: int, half: float) -> np.ndarray:
     """Return poses (count, 3) within `half` [m] of the origin, all headings."""
     rng = np.random.default_rng(seed)

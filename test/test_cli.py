@@ -1,5 +1,6 @@
 """The command keeps its contract: arrays out, exit code 0, or exit code 2 and one line."""
 
+import json
 import os
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rover_physics.names import WHEELS
 from rover_physics.terrain import Terrain, load_terrain, save_terrain
 from rover_planner.cli import main
 
@@ -232,3 +234,137 @@ def test_help_is_exit_code_0(capfd):
     assert main(["--help"]) == 0
     assert main(["predict", "--help"]) == 0
     assert "TERRAIN" in capfd.readouterr().out
+
+
+GRADE_SHAPES = {
+    "grade": (N,),
+    "grade_constraint": (N,),
+    "grade_wheel": (N,),
+    "grade_margin": (N,),
+    "torque_range": (N, 6, 2),
+}
+
+
+def test_grades_and_torque_ranges_are_added_on_demand(files):
+    assert main([*arguments(files), "--grade", "--torque-ranges"]) == 0
+    with np.load(files / "out.npz", allow_pickle=False) as out:
+        assert {name: out[name].shape for name in out.files} == SHAPES | GRADE_SHAPES
+        assert set(out["grade"]) == {"passable"}
+        assert set(out["grade_constraint"]) <= {"friction", "torque", "wheel_lift"}
+        assert set(out["grade_wheel"]) <= set(WHEELS)
+        assert (out["grade_margin"] > 0.5).all()
+        low, high = out["torque_range"][..., 0], out["torque_range"][..., 1]
+        assert (low < 0.0).all() and (high > 0.0).all()
+
+
+def test_what_only_traction_control_passes_is_graded_so_under_either_policy(files):
+    rise = np.tile(0.45 * 0.05 * np.arange(120), (80, 1))
+    save_terrain(files / "terrain.npz", Terrain(rise, 0.05, (0.0, 0.0)))
+    for policy, traversable in (("equal", False), ("optimal", True)):
+        assert main([*arguments(files), "--grade", "--policy", policy]) == 0
+        with np.load(files / "out.npz") as out:
+            assert bool(out["traversable"]) == traversable
+            assert set(out["grade"]) == {"passable with traction control"}
+            assert (out["grade_margin"] > 0.0).all()
+
+
+def test_on_soil_the_file_has_sinkage_and_resistance_too(files):
+    assert main([*arguments(files), "--soil", "dry_sand"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert set(out.files) == SHAPES.keys() | {"sinkage", "motion_resistance"}
+        assert out["sinkage"].shape == out["motion_resistance"].shape == (N, 6)
+        assert (out["sinkage"] > 0.001).all()
+        assert (out["motion_resistance"] > 0.5).all()
+        assert (out["slip_ratio"] > 0.0).all()
+
+
+def test_arm_payload_and_tool_load_change_the_prediction(files):
+    loads = {}
+    stretched = ["arm_yaw=0", "arm_shoulder=0", "arm_elbow=0"]
+    for name, words in {
+        "stowed": [],
+        "stretched": [word for joint in stretched for word in ("--arm", joint)],
+        "payload": ["--payload", "1.5"],
+        "force": ["--tool-force", "0", "0", "5.5"],
+        "moment": ["--tool-moment", "0", "-2", "0"],
+    }.items():
+        assert main([*arguments(files), *words]) == 0
+        with np.load(files / "out.npz") as out:
+            loads[name] = out["wheel_loads"][0].copy()
+    front, stowed = [2, 5], loads["stowed"]
+    weight = stowed.sum()
+    assert loads["stretched"][front].sum() > stowed[front].sum() + 0.1
+    assert loads["payload"].sum() == pytest.approx(weight + 1.5 * 9.81)
+    assert loads["force"].sum() == pytest.approx(weight - 5.5)
+    assert loads["moment"][front].sum() < stowed[front].sum() - 0.1
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["--soil", "snow"], "dry_sand"),
+        (["--payload", "-1"], "payload"),
+        (["--payload", "nan"], "payload"),
+        (["--tool-force", "0", "nan", "0"], "tool_force"),
+        (["--tool-force", "0", "1"], "tool-force"),
+        (["--tool-moment", "inf", "0", "0"], "tool_moment"),
+        (["--arm", "arm_yaw"], "NAME=RAD"),
+        (["--arm", "arm_yaw=left"], "NAME=RAD"),
+        (["--arm", "arm_yaw=nan"], "NAME=RAD"),
+        (["--arm", "arm_wrist=0.1"], "arm_elbow"),
+        (["--arm", "arm_yaw=0.1"], "lacks arm_shoulder, arm_elbow"),
+        (["--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"], "twice"),
+    ],
+)
+def test_impossible_soils_arms_and_loads_are_one_line(capfd, files, words, names):
+    assert_refused(capfd, main([*arguments(files), *words]), names)
+
+
+def test_an_arm_that_is_not_there_has_no_angles(capfd, files):
+    words = [*arguments(files, rover="m2020"), "--arm", "arm_yaw=0"]
+    assert_refused(capfd, main(words), "no manipulator")
+
+
+def ask_reach(files, *words, rover="lsr1"):
+    return main(["reach", rover, str(files / "terrain.npz"), *words])
+
+
+def test_reach_answers_in_json_whatever_the_answer(capfd, files):
+    there = ["2.0", "2.0", "0.5", "2.5", "2.3", "0.3"]
+    assert ask_reach(files, *there) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["possible"] and answer["reachable"] and answer["code"] == ""
+    assert set(answer["joint_angles"]) == {"arm_yaw", "arm_shoulder", "arm_elbow"}
+    free = answer["wheel_loads"]
+    assert ask_reach(files, *there, "--force", "0", "0", "-10", "--payload", "0") == 0
+    pushed = json.loads(capfd.readouterr().out)["wheel_loads"]
+    assert sum(pushed) == pytest.approx(sum(free) + 10.0)
+    assert ask_reach(files, *there[:3], "-3.5", "2.0", "0.3") == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert not answer["possible"] and answer["code"] == "too_far" and answer["out_of_reach"] > 4.0
+    assert ask_reach(files, *there, "--force", "-500", "0", "0") == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["reachable"] and not answer["possible"] and answer["reason"]
+    assert ask_reach(files, "-9.0", *there[1:]) == 0
+    assert json.loads(capfd.readouterr().out)["code"] == "off_map"
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"place": "nan"}, "pose"),
+        ({"target": "inf"}, "target"),
+        ({"place": "here"}, "'X'"),
+        ({"more": ["--force", "0", "0"]}, "force"),
+        ({"more": ["--moment", "0", "nan", "0"]}, "tool_moment"),
+        ({"more": ["--soil", "snow"]}, "dry_sand"),
+        ({"more": ["--payload", "-2"]}, "payload"),
+        ({"more": ["--policy", "lucky"]}, "lucky"),
+        ({"more": ["--colour"]}, "--colour"),
+        ({"rover": "m2020"}, "no manipulator"),
+    ],
+)
+def test_impossible_questions_to_the_arm_are_one_line(capfd, files, change, names):
+    place, target = change.get("place", "2"), change.get("target", "2.5")
+    words = [place, "2", "0.5", target, "2.3", "0.3", *change.get("more", [])]
+    assert_refused(capfd, ask_reach(files, *words, rover=change.get("rover", "lsr1")), names)

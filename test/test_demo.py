@@ -123,7 +123,7 @@ def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file, number, 
 
 def test_ctrl_c_to_the_whole_group_during_compilation_ends_everything(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
-    demo.wait_for("rover_planner.compile_kernels")
+    demo.wait_for("rover_physics.sweep")
     os.killpg(demo.process.pid, signal.SIGINT)
     returned, _, err = demo.finish()
     assert returned == 130

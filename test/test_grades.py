@@ -6,17 +6,22 @@ import numpy as np
 import pytest
 from rough_grounds import plane, random_poses, rocky
 
+from rover_physics import grades as grades_module
 from rover_physics.grades import (
     IMPASSABLE,
     PASSABLE,
     WHEEL_CONSTRAINTS,
     WITH_TRACTION_CONTROL,
+    deciding_waypoint,
+    grade_judged,
     grade_path,
 )
 from rover_physics.limits import judge
 from rover_physics.names import WHEELS
 from rover_physics.rover import load_rover
 from rover_physics.sweep import sweep_path
+from rover_physics.terrain import Terrain
+from rover_physics.trap import judge_path
 
 LSR1 = load_rover("lsr1")
 POSE = [[0.0, 0.0, 0.0]]
@@ -115,3 +120,64 @@ def test_what_breaks_on_the_way_counts_at_the_waypoint_that_follows():
 
 def xs(ground) -> np.ndarray:
     return ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])[None, :]
+
+
+def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
+    ground, poses = crater(), way_into_the_crater()
+    verdict = judge_path(LSR1, ground, poses, policy="optimal", soil="dry_sand")[1]
+    grades = grade_path(LSR1, ground, poses, soil="dry_sand")
+    assert verdict.code == "trapped"
+    deciding = deciding_waypoint(grades)
+    assert deciding == verdict.first_failure
+    assert grades[deciding].grade == IMPASSABLE
+    assert (grades[deciding].constraint, grades[deciding].wheel) == ("trapped", "")
+    assert grades[deciding].reason == verdict.reason
+    assert np.isnan(grades[deciding].margin)
+
+
+@pytest.mark.parametrize(("slope", "friction"), [(0.2, 0.8), (0.45, 0.8), (0.45, 0.4)])
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_grades_do_not_depend_on_the_policy_that_was_judged_first(slope, friction, policy):
+    ground = plane(slope, 0.0)
+    judged = judge_path(LSR1, ground, POSE, policy=policy, friction=friction)
+    found = grade_judged(LSR1, ground, *judged, friction=friction)
+    assert found == grade_path(LSR1, ground, POSE, friction=friction)
+
+
+def test_what_equal_torques_pass_is_not_asked_about_again(monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        grades_module,
+        "judge_path",
+        lambda *a, **k: asked.append(k["policy"]) or judge_path(*a, **k),
+    )
+    grade_path(LSR1, plane(0.2, 0.0), POSE)
+    assert asked == ["equal"]
+    grade_path(LSR1, plane(0.45, 0.0), POSE)
+    assert asked == ["equal", "equal", "optimal"]
+
+
+def test_a_path_hangs_on_its_worst_waypoint():
+    poses = [[x, 0.0, 0.0] for x in (-0.3, -0.1, 0.1, 0.3)]
+    level = plane(0.0, 0.0)
+    height = 0.08 * np.clip(xs(level) + 1.2, 0.0, None) ** 2
+    rising = replace(level, elevation=level.elevation + height)
+    grades = grade_path(LSR1, rising, poses)
+    assert {grade.grade for grade in grades} == {PASSABLE}
+    margins = [grade.margin for grade in grades]
+    assert deciding_waypoint(grades) == int(np.argmin(margins)) == 3
+    refused = grade_path(LSR1, rising, [*poses, [50.0, 0.0, 0.0], [60.0, 0.0, 0.0]])
+    assert deciding_waypoint(refused) == 4
+
+
+def crater() -> Terrain:
+    """Return a crater 0.7 m deep with walls of 18 degrees around a level floor."""
+    axis = np.arange(-6.0, 6.025, 0.05)
+    away = np.hypot(*np.meshgrid(axis, axis))
+    height = np.clip((away - 1.2) * np.tan(np.radians(18.0)), 0.0, 0.7)
+    return Terrain(height, 0.05, (-6.0, -6.0))
+
+
+def way_into_the_crater() -> np.ndarray:
+    x = np.arange(-5.0, 0.0, 0.04)
+    return np.column_stack([x, 0.0 * x, 0.0 * x])
