@@ -22,6 +22,9 @@ CELL_HEIGHTS = ("max", "mean")
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud; one stray point far away must not take the memory."""
 
+LAYERS = ("friction", "elevation_std")
+"""Fields of a cloud besides x, y and z that become layers of the terrain."""
+
 _MIN_FILL = 0.05
 """Least share of a detected grid's cells that have a point; below it the spacing is a chance."""
 
@@ -43,6 +46,8 @@ class CloudPoints:
     """(n, 3) coordinates [m]; NaN where the message has NaN."""
     friction: NDArray[np.float64] | None
     """(n,) friction coefficient, where the cloud has such a field."""
+    elevation_std: NDArray[np.float64] | None
+    """(n,) standard deviation of z [m], where the cloud has such a field."""
     precision: float
     """Rounding error of the x and y coordinates [m]."""
 
@@ -51,7 +56,7 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     """Read the points of a cloud, whatever its layout.
 
     Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
-    and the optional `friction` may be FLOAT32 or FLOAT64.
+    and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64.
 
     Raises:
         MessageError: no points, a field missing or of another datatype, or lengths that disagree.
@@ -65,8 +70,7 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
         raise MessageError(
             f"cloud has no field {', '.join(missing)}; it needs x, y and z, and has {has}"
         )
-    if "friction" in fields:
-        names.append("friction")
+    names += [name for name in LAYERS if name in fields]
     formats = [_field_format(fields[name], cloud) for name in names]
     point = np.dtype(
         {
@@ -87,7 +91,7 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
     extent = np.abs(xyz[np.isfinite(xyz[:, :2]).all(axis=1), :2]).max(initial=1.0)
     precision = float(np.finfo(np.float32 if single else np.float64).eps * extent)
-    return CloudPoints(xyz, columns.get("friction"), precision)
+    return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 
 
 def terrain_from_point_cloud(
@@ -140,7 +144,10 @@ def terrain_from_point_cloud(
         # The lowest coefficient of a cell counts; not finite ones say nothing.
         values = np.where(np.isfinite(points.friction), points.friction, np.nan)[known]
         friction = -_combine(cells, -values, grid, "max")
-    return Terrain(elevation, grid.resolution, grid.origin, friction)
+    std = None
+    if points.elevation_std is not None:
+        std = _combine(cells, points.elevation_std[known], grid, "max")
+    return Terrain(elevation, grid.resolution, grid.origin, friction, elevation_std=std)
 
 
 def terrain_to_point_cloud(
@@ -158,14 +165,15 @@ def terrain_to_point_cloud(
         datatype: PointField.FLOAT32 (what viewers show; heights are rounded to it) or FLOAT64.
     """
     rows, columns = terrain.elevation.shape
-    names = ["x", "y", "z"] + (["friction"] if terrain.friction is not None else [])
+    layers = [name for name in LAYERS if getattr(terrain, name) is not None]
+    names = ["x", "y", "z", *layers]
     kind = np.dtype("<" + _FLOATS[datatype])
     values = np.empty((rows, columns, len(names)), kind)
     values[:, :, 0] = terrain.origin[0] + terrain.resolution * np.arange(columns)
     values[:, :, 1] = (terrain.origin[1] + terrain.resolution * np.arange(rows))[:, None]
     values[:, :, 2] = terrain.elevation
-    if terrain.friction is not None:
-        values[:, :, 3] = terrain.friction
+    for column, name in enumerate(layers, start=3):
+        values[:, :, column] = getattr(terrain, name)
     cloud = PointCloud2(height=rows, width=columns, is_bigendian=False, is_dense=False)
     cloud.header.frame_id = frame_id
     if stamp is not None:

@@ -337,10 +337,34 @@ def _go_to_extreme(ground, linkage, settings, pose, spread, box):
             box.at[k] = end
         elif gain > 0.0:
             total += gain * gain
-    if total > 0.0:
-        scale = np.sqrt(TOGETHER / total)
-        for k in range(ANGLE, PLACE):
-            at = box.base[k] + scale * box.gain[k] * (box.end[k] - box.base[k])
-            box.at[k] = min(max(at, -0.5 * np.pi), 0.5 * np.pi)
+    _share_deviation(total, box)
     if _evaluate(ground, linkage, settings, pose, spread, box):
         _include_values(box)
+
+
+@kernel
+def _share_deviation(total, box):
+    """Move the angles from their nominal values by their gains, none beyond its end.
+
+    `total` is the sum of the squares of their gains. What an angle at its end leaves is shared
+    among the others.
+    """
+    left = TOGETHER
+    for _ in range(6):
+        capped = False
+        for k in range(ANGLE, PLACE):
+            gain = box.gain[k]
+            if gain > 0.0 and gain * gain * left >= total:
+                box.at[k] = box.end[k]
+                box.gain[k] = 0.0
+                total -= gain * gain
+                left -= 1.0
+                capped = True
+                if left <= 0.0:
+                    return
+        if not capped:
+            break
+    for k in range(ANGLE, PLACE):
+        if box.gain[k] > 0.0:
+            share = box.gain[k] * np.sqrt(left / max(total, 1e-30))
+            box.at[k] = box.base[k] + min(share, 1.0) * (box.end[k] - box.base[k])
