@@ -41,12 +41,12 @@ kernels: $(READY) ## compile the numba kernels into their cache
 	$(BIN)/python -m rover_physics.sweep
 
 .PHONY: bench
-bench: kernels ## measure the time of a full evaluation
-	@for file in benchmarks/bench_*.py; do $(BIN)/python "$$file"; done
+bench: kernels ## measure times and memory, as a table and bench_output/results.json
+	@$(BIN)/python benchmarks/run.py
 
 .PHONY: clean
 clean: ## remove the environment and everything that was made
-	rm -rf "$(VENV)" build dist install log demo_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf "$(VENV)" build dist install log demo_output bench_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find $(PACKAGES) test -name __pycache__ -prune -exec rm -rf {} +
 
 $(READY): setup.py pyproject.toml constraints.txt .ci/make_venv

@@ -30,10 +30,14 @@ GAP_PRECISION = 1e-5
 """How far the gap of a circle may be from its smallest, in wheel radii."""
 TURN_TOLERANCE = 3e-3
 """Error of the contact angle [rad] at which the search along the circle stops."""
-CIRCLE_REACH = 1.5e-2
+CIRCLE_REACH = 2e-2
 """How far above the nearest circle, in wheel radii, another one is looked at more closely."""
 EXACT_REACH = 0.5
 """The same for samples of an exact search: beside a face much can lie between two samples."""
+BESIDE_REACH = 5e-3
+"""How far above the nearest circle, in wheel radii, another is looked at between its samples."""
+BESIDE_SHARE = 0.8
+"""Share of the circle's own rise from which on the ground counts as no plane."""
 FAR_ROW = -9
 """Row of a sample that there is none of."""
 COMPLIANCE = 2e-3
@@ -51,6 +55,8 @@ WHEEL_SAMPLES = record_type(
     ("cosines", float, (MOST_ANGLES,)),  # (k,) their cosines
     ("spacing_sine", float),  # sine of the angle between neighbouring samples
     ("spacing_cosine", float),  # cosine of the angle between neighbouring samples
+    ("beside_sine", float),  # sine of half that angle
+    ("beside_cosine", float),  # cosine of half that angle
     ("laterals", float, (MOST_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
 )
 """Where the cylinder of a wheel is sampled: at k angles of m circles."""
@@ -80,7 +86,7 @@ TOUCH = record_type(
 def sample_wheel(rover: Rover, resolution: float) -> Any:
     """Choose samples no farther apart than the cells of a terrain of `resolution` [m]."""
     wheel = rover.wheel
-    half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 8, 24))
+    half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 10, 24))
     half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 1, 4))
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * half_angles + 1)
     samples = new_record(
@@ -91,6 +97,8 @@ def sample_wheel(rover: Rover, resolution: float) -> Any:
         circles=2 * half_laterals + 1,
         spacing_sine=np.sin(angles[1] - angles[0]),
         spacing_cosine=np.cos(angles[1] - angles[0]),
+        beside_sine=np.sin(0.5 * (angles[1] - angles[0])),
+        beside_cosine=np.cos(0.5 * (angles[1] - angles[0])),
     )
     samples.sines[: angles.size], samples.cosines[: angles.size] = np.sin(angles), np.cos(angles)
     half = 0.5 * wheel.width
@@ -319,6 +327,37 @@ def _refine_others(grid, samples, placement, wheel, touch):
             _refine_from(grid, samples, placement, wheel, m, s, c, touch)
         if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
             touch.nearest[wheel] = m
+    reach = touch.circle_gap[wheel, touch.nearest[wheel]] + BESIDE_REACH * samples.radius
+    for m in range(samples.circles):
+        if touch.circle_gap[wheel, m] <= reach:
+            _look_beside(grid, samples, placement, wheel, m, touch)
+            if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
+                touch.nearest[wheel] = m
+
+
+@kernel
+def _look_beside(grid, samples, placement, wheel, m, touch):
+    """Search circle m from between the samples, too, where the ground comes nearer there.
+
+    Over a plane the gap grows away from the smallest with the rise of the circle; where it grows
+    less, a wheel that bridges a hollow may come nearer to the hollow's other side.
+    """
+    R, forward, up = placement.R, placement.forward, placement.up
+    centres, radius, across = placement.centres, samples.radius, samples.laterals[m]
+    gap, s0, c0 = (
+        touch.circle_gap[wheel, m], touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+    )  # fmt: skip
+    limit = gap + BESIDE_SHARE * radius * (1.0 - samples.beside_cosine)
+    for side in range(-1, 2, 2):
+        turn = side * samples.beside_sine
+        s, c = s0 * samples.beside_cosine + c0 * turn, c0 * samples.beside_cosine - s0 * turn
+        if c < 0.0:
+            continue
+        x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
+        y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
+        z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+        if z - look_up(grid, x, y)[0] < limit:
+            _refine_from(grid, samples, placement, wheel, m, s, c, touch)
 
 
 @kernel

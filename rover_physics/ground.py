@@ -74,9 +74,12 @@ def _find_block_ceiling(elevation: np.ndarray, unknown: float) -> np.ndarray:
     return padded.reshape(rows, BLOCK, columns, BLOCK).max(axis=(1, 3))
 
 
-@kernel
-def heights_of(ground):
-    """Return the Grid of a Ground; fewer arrays are quicker to hand from kernel to kernel."""
+def heights_of(ground: Ground) -> Grid:
+    """Return the Grid of a Ground.
+
+    Not a kernel: kernels count no references, so none may return an array. In a kernel write
+    ``Grid(...)``; fewer arrays are quicker to hand from kernel to kernel.
+    """
     return Grid(
         ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution
     )

@@ -36,6 +36,8 @@ LEVEL, SLOPED = np.arange(2)
 RELAXATION_STEPS = 120
 RELAXED = 0.003
 """Largest gap, in wheel radii, at which relaxation hands over to Newton's method."""
+RELAXED_FURTHER = 0.25
+"""The same after each attempt that failed: wedged between tread and face, gaps are small."""
 RELAXATION = 0.3
 
 
@@ -68,7 +70,8 @@ def settle(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
             break
         _touch_all(grid, samples, placement, EXACT, touch)
         if attempt > 0:
-            _relax(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+            relaxed = RELAXED * linkage.radius * RELAXED_FURTHER ** (attempt - 1)
+            _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
         _newton(grid, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
         status, worst = _touch_all(grid, samples, placement, EXACT, touch)
     if status != TOUCHING:
@@ -127,8 +130,8 @@ def _newton(grid, linkage, samples, x, y, yaw, q, placement, scope, touch, J, st
 
 
 @kernel
-def _relax(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
-    """Let the wheels fall or rise by part of their gaps until all are small.
+def _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+    """Let the wheels fall or rise by part of their gaps until none is above `relaxed` [m].
 
     Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
     its top, as it would on the ground.
@@ -137,7 +140,7 @@ def _relax(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
         status, worst = _touch_all(grid, samples, placement, EXACT, touch)
-        if not worst > RELAXED * linkage.radius:
+        if not worst > relaxed:
             return
 
 

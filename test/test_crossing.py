@@ -228,15 +228,12 @@ def test_on_a_face_the_needed_friction_does_not_depend_on_the_spacing():
 
 @pytest.mark.parametrize("height", [0.03, 0.06, 0.1, 0.15, 0.25])
 def test_at_the_foot_of_a_step_every_pose_settles(height):
-    """Each millimetre from 3 cm before the wheel touches the face to 3 cm after.
-
-    But for the tenth of a millimetre of way on which the wheel leaves the tread for the edge.
-    """
+    """Each 0.1 mm from 3 cm before the wheel touches the face to 3 cm after."""
     reach = np.sqrt(RADIUS**2 - max(RADIUS - height, 0.0) ** 2)
     place = -LSR1.suspension.wheels["front"][0] - reach
-    x = place + np.arange(-0.03, 0.03, 0.001)
+    x = place + np.arange(-0.03, 0.03, 0.0001)
     prediction = sweep_path(FREE, sharp("step", height), np.column_stack([x, 0 * x, 0 * x]))
-    assert (~prediction.settled).sum() <= 1
+    assert prediction.settled.all()
 
 
 @pytest.mark.parametrize("height", [0.12, 0.2])
@@ -244,7 +241,7 @@ def test_at_the_foot_of_a_wall_a_wheel_touches_tread_and_face_at_once(height):
     """Its centre is a radius above the tread and a radius before the face, and no higher yet."""
     ground = sharp("step", height)
     place = -LSR1.suspension.wheels["front"][0] - RADIUS
-    x = place + np.arange(-0.01, 0.02, 0.0007)
+    x = place + np.arange(-0.01, 0.02, 0.0005)
     prediction = sweep_path(FREE, ground, np.column_stack([x, 0 * x, 0 * x]))
     centre = prediction.wheel_centres[:, 2]
     before = centre[:, 2] < RADIUS + 1e-3

@@ -35,7 +35,8 @@ def brute_force_gaps() -> np.ndarray:
     """Return the gaps (n, 6) [m] of settled poses by sampling each wheel's circles densely."""
     gaps = []
     for ground, prediction in predictions():
-        circles = sample_wheel(LSR1, ground.resolution).laterals
+        samples = sample_wheel(LSR1, ground.resolution)
+        circles = samples.laterals[: samples.circles]
         for i in np.flatnonzero(prediction.settled)[::EVERY]:
             gaps.append(wheel_gaps(LSR1, ground, prediction, i, circles, angles=401))
     return np.array(gaps)
@@ -59,11 +60,10 @@ def test_no_wheel_of_a_settled_pose_is_in_the_air():
     assert brute_force_gaps().max() <= 3e-5
 
 
-def test_no_wheel_of_a_settled_pose_is_in_the_ground():
-    """By more than 0.1 mm fewer than 1 in 200, and none by half a millimetre."""
-    gaps = brute_force_gaps()
-    assert (gaps >= -1e-4).mean() >= 0.995
-    assert gaps.min() >= -5e-4
+def test_of_1000_settled_poses_999_have_all_wheels_within_a_tenth_of_a_millimetre():
+    worst = np.abs(brute_force_gaps()).max(axis=1)
+    assert (worst <= 1e-4).mean() >= 0.999
+    assert worst.max() <= 3e-4
 
 
 @pytest.mark.parametrize("make", [fractal, bouldered])
