@@ -201,13 +201,9 @@ def _evaluate(ground, linkage, settings, pose, spread, box):
     else:
         apply_torques(work.balance, FREE_FORCES, search)
     for wheel in range(6):
-        box.value[LOAD + wheel] = search.N[wheel]
-        box.value[PULL + wheel] = search.T[wheel]
-        box.value[SIDE + wheel] = search.S[wheel]
-        box.value[USE + wheel] = _worst_use(
-            ground, linkage, settings, wheel, search.N[wheel], search.T[wheel], search.S[wheel],
-            box,
-        )  # fmt: skip
+        N, T, S = search.wheel_loads[wheel], search.tangential[wheel], search.lateral[wheel]
+        box.value[LOAD + wheel], box.value[PULL + wheel], box.value[SIDE + wheel] = N, T, S
+        box.value[USE + wheel] = _worst_use(ground, linkage, settings, wheel, N, T, S, box)
     find_tip_over(linkage, work)
     for edge in range(CORNERS):
         angle, measure = measure_edge(

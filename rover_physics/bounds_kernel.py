@@ -17,7 +17,7 @@ from rover_physics.bounds_pose import (
 )
 from rover_physics.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.evaluation import CHUNK, MOST_CHUNKS
-from rover_physics.ground import heights_of
+from rover_physics.ground import Grid
 from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.linkage import place
 from rover_physics.records import new_record, record_type
@@ -41,7 +41,6 @@ BOUNDS = record_type(
     ("bogie_angle", float, (2, 2)),
     ("belly_clearance", float, (2,)),
     ("tip_over_ratio", float, (2,)),
-    ("contact_angle", float, (6, 2)),
     ("wheel_loads", float, (6, 2)),
     ("friction_utilisation", float, (6, 2)),
     ("torque_saturation", float, (6, 2)),
@@ -103,7 +102,7 @@ def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nomin
         return NOT_SETTLED
     for k in range(6):
         spread.q[k] = nominal.q[k]
-    grid = heights_of(ground)
+    grid = Grid(ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution)
     outcome = bound_configuration(grid, low, high, linkage, samples, pose, spread)
     if outcome != BOUNDED:
         return outcome
@@ -115,7 +114,7 @@ def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nomin
     bound_clearance(grid, error, linkage, spread, result.belly_clearance)
     if not bound_forces(ground, linkage, samples, settings, pose, spread, contacts, box):
         return SINGULAR
-    _write_configuration(spread, contacts, result)
+    _write_configuration(spread, result)
     _write_tip_over(settings, box, result)
     for wheel in range(6):
         _write_wheel(ground, linkage, settings, wheel, box, result)
@@ -125,7 +124,7 @@ def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nomin
 
 
 @kernel
-def _write_configuration(spread, contacts, result):
+def _write_configuration(spread, result):
     for side in range(2):
         low, high = spread.q_low, spread.q_high
         ends = low if side == 0 else high
@@ -134,9 +133,6 @@ def _write_configuration(spread, contacts, result):
         result.rocker_angle[0, side] = ends[3]
         result.rocker_angle[1, side] = -opposite[3]
         result.bogie_angle[0, side], result.bogie_angle[1, side] = ends[4], ends[5]
-    for wheel in range(6):
-        result.contact_angle[wheel, 0] = contacts.angle_low[wheel]
-        result.contact_angle[wheel, 1] = contacts.angle_high[wheel]
 
 
 @kernel

@@ -38,7 +38,6 @@ BOUNDED_VALUES = (
     "bogie_angle",
     "belly_clearance",
     "tip_over_ratio",
-    "contact_angle",
     "wheel_loads",
     "friction_utilisation",
     "torque_saturation",
@@ -76,8 +75,6 @@ class PathBounds:
     """(n, 2) [m]."""
     tip_over_ratio: Floats
     """(n, 2)."""
-    contact_angle: Floats
-    """(n, 6, 2) [rad]."""
     wheel_loads: Floats
     """(n, 6, 2) [N]; largest infinite where the torques follow the ground (policy "optimal")."""
     friction_utilisation: Floats
