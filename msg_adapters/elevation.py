@@ -29,6 +29,8 @@ from msg_adapters.gridding import (
 from rover_physics.terrain import Terrain
 
 CELL_HEIGHTS = ("max", "mean")
+LAYERS = ("friction", "elevation_std")
+"""Fields of a cloud besides x, y and z that become layers of the terrain."""
 
 _FLOATS = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
 _DATATYPE_NAMES = {
@@ -45,6 +47,8 @@ class CloudPoints:
     """(n, 3) coordinates [m]; NaN where the message has NaN."""
     friction: NDArray[np.float64] | None
     """(n,) friction coefficient, where the cloud has such a field."""
+    elevation_std: NDArray[np.float64] | None
+    """(n,) standard deviation of z [m], where the cloud has such a field."""
     precision: float
     """Rounding error of the x and y coordinates [m]."""
 
@@ -53,7 +57,7 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     """Read the points of a cloud, whatever its layout.
 
     Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
-    and the optional `friction` may be FLOAT32 or FLOAT64.
+    and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64.
 
     Raises:
         MessageError: no points, a field missing or of another datatype, or lengths that disagree.
@@ -62,7 +66,7 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     columns = {name: points[name].astype(np.float64).ravel() for name in points.dtype.names or ()}
     xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
     precision = rounding_error(points["x"], points["y"])
-    return CloudPoints(xyz, columns.get("friction"), precision)
+    return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 
 
 def terrain_from_point_cloud(
@@ -115,7 +119,12 @@ def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
     if "friction" in (points.dtype.names or ()):
         friction = raster.arrange(points["friction"])
         friction[unknown | ~np.isfinite(friction)] = np.nan
-    return Terrain(elevation, raster.grid.resolution, raster.grid.origin, friction)
+    std = None
+    if "elevation_std" in (points.dtype.names or ()):
+        std = raster.arrange(points["elevation_std"])
+        std[unknown] = np.nan
+    grid = raster.grid
+    return Terrain(elevation, grid.resolution, grid.origin, friction, elevation_std=std)
 
 
 def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str) -> Terrain:
@@ -141,7 +150,10 @@ def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str
         # The lowest coefficient of a cell counts; not finite ones say nothing.
         values = np.where(np.isfinite(points.friction), points.friction, np.nan)[known]
         friction = -combine(cells, -values, grid, "max")
-    return Terrain(elevation, grid.resolution, grid.origin, friction)
+    std = None
+    if points.elevation_std is not None:
+        std = combine(cells, points.elevation_std[known], grid, "max")
+    return Terrain(elevation, grid.resolution, grid.origin, friction, elevation_std=std)
 
 
 def terrain_to_point_cloud(
@@ -159,14 +171,15 @@ def terrain_to_point_cloud(
         datatype: PointField.FLOAT32 (what viewers show; heights are rounded to it) or FLOAT64.
     """
     rows, columns = terrain.elevation.shape
-    names = ["x", "y", "z"] + (["friction"] if terrain.friction is not None else [])
+    layers = [name for name in LAYERS if getattr(terrain, name) is not None]
+    names = ["x", "y", "z", *layers]
     kind = np.dtype("<" + _FLOATS[datatype])
     values = np.empty((rows, columns, len(names)), kind)
     values[:, :, 0] = terrain.origin[0] + terrain.resolution * np.arange(columns)
     values[:, :, 1] = (terrain.origin[1] + terrain.resolution * np.arange(rows))[:, None]
     values[:, :, 2] = terrain.elevation
-    if terrain.friction is not None:
-        values[:, :, 3] = terrain.friction
+    for column, name in enumerate(layers, start=3):
+        values[:, :, column] = getattr(terrain, name)
     cloud = PointCloud2(height=rows, width=columns, is_bigendian=False, is_dense=False)
     cloud.header.frame_id = frame_id
     if stamp is not None:
@@ -212,8 +225,7 @@ def _view_points(cloud: PointCloud2) -> NDArray[np.void]:
         raise MessageError(
             f"cloud has no field {', '.join(missing)}; it needs x, y and z, and has {has}"
         )
-    if "friction" in fields:
-        names.append("friction")
+    names += [name for name in LAYERS if name in fields]
     point = np.dtype(
         {
             "names": names,

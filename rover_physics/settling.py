@@ -167,6 +167,15 @@ def _limit_step(step):
 @kernel
 def _find_step(linkage, placement, touch, ground_is, J, step):
     """Solve J step = gaps; the ground counts as SLOPED as it is, or as LEVEL under each wheel."""
+    write_gap_rates(linkage, placement, touch, ground_is, J)
+    for i in range(6):
+        step[i, 0] = touch.gap[i]
+    return solve_in_place(J, step, 6, 1)
+
+
+@kernel
+def write_gap_rates(linkage, placement, touch, ground_is, J):
+    """Write the derivatives of the gaps by q into J (6, 6); the ground is as in `_find_step`."""
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
     rocker_pivots, bogie_pivots = placement.rocker_pivots, placement.bogie_pivots
@@ -192,8 +201,6 @@ def _find_step(linkage, placement, touch, ground_is, J, step):
             dy = point[i, 1] - bogie_pivots[side, 1]
             dz = point[i, 2] - bogie_pivots[side, 2]
             J[i, 4 + side] = _gap_rate(R[0, 1], R[1, 1], R[2, 1], dx, dy, dz, nx, ny)
-        step[i, 0] = touch.gap[i]
-    return solve_in_place(J, step, 6, 1)
 
 
 @kernel

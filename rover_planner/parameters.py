@@ -18,6 +18,7 @@ from rclpy.parameter import Parameter
 from msg_adapters.elevation import CELL_HEIGHTS
 from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
+from rover_physics.uncertainty import SIGMAS
 from rover_planner.errors import PlanningError
 from rover_planner.qos import MAP_DURABILITIES
 
@@ -175,6 +176,13 @@ TRAVERSE_SERVER = (
     ),
     ParameterSpec(
         "max_gap", 0.2, "Widest unknown region that is interpolated.", "m", bounds=(0.0, 100.0)
+    ),
+    ParameterSpec(
+        "map_sigmas",
+        SIGMAS,
+        "Standard deviations by which heights may be wrong where the map has elevation_std; "
+        "0 takes them as exact.",
+        bounds=(0.0, 10.0),
     ),
     ParameterSpec(
         "terrain_file", "", "Terrain file to start with; empty waits for a map.", read_only=True

@@ -81,6 +81,7 @@ def settings_from_parameters(values: Mapping[str, Any]) -> ServiceSettings:
             max_torque=values["max_torque"] or None,
             soil=soil or None,
             payload=None if payload == OWN_PAYLOAD else payload,
+            map_sigmas=values["map_sigmas"],
         ),
         interpolate=values["unknown_cells"] == "interpolate",
         max_gap=values["max_gap"],
@@ -270,6 +271,7 @@ class TraverseService:
             candidate.prediction,
             candidate.verdict,
             joint_angles=self._manipulator_angles(),
+            sigmas=self._settings.query.map_sigmas,
             **self._settings.query.ground_and_load(),
         )
         verdict = candidate.verdict
