@@ -32,6 +32,7 @@ EXTRAS = {
         "pytest-xdist>=3.4,<4",
         "hypothesis>=6.98,<7",
     ],
+    "bench": ["mujoco>=3.2,<5"],
     "dev": [
         "ruff>=0.9,<1",
         "mypy>=1.14,<3",

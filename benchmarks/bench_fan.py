@@ -1,15 +1,16 @@
 """Whole sets of poses: JPL's ENav fan of 1,694 paths, and a map of a million cells."""
 
 import resource
+import statistics
 import time
 
 import numba
 import numpy as np
-from measure import Figure, median_time
+from measure import REPEATS, Figure, median_time, median_times
 
-from rover_physics.evaluation import evaluate
-from rover_physics.model_setup import set_up
+from rover_physics.map_sweep import score_poses, sweep_map
 from rover_physics.rover import load_rover
+from rover_physics.terrain import Terrain
 from rover_planner.mars_terrain import make_mars_terrain
 
 ARCS = (14, 11, 11)
@@ -20,7 +21,8 @@ SPACING = 0.25
 """Distance of the poses along a path [m]."""
 TURN = 0.35
 """Largest curvature [1/m]."""
-BATCH = 50_000
+MAP_ROWS = (100, 180)
+"""Rows of the map that are timed; it is alike all over, but for its edges."""
 
 
 def enav_fan(start: float) -> np.ndarray:
@@ -39,44 +41,51 @@ def enav_fan(start: float) -> np.ndarray:
 def measure() -> list[Figure]:
     """Measure the fan on one and two threads, and the map."""
     rover = load_rover("lsr1")
-    setup = set_up(rover, make_mars_terrain(1, 24.0, 0.05))
+    ground = make_mars_terrain(1, 24.0, 0.05)
     fan = enav_fan(-3.0)
-    figures = [Figure("fan", "poses", len(fan), "")]
-    clock = time.perf_counter
-    numba.set_num_threads(1)
-    one = median_time(lambda: evaluate(*setup, fan), clock=clock)
-    figures.append(Figure("fan", "1,694 paths on one thread", one, "s", 0.35))
+
+    def score_on(threads: int) -> None:
+        numba.set_num_threads(threads)
+        score_poses(rover, ground, fan)
+
+    figures = [Figure("fan", "poses", len(fan), "", repeats=1)]
+    one = median_time(lambda: score_on(1), REPEATS)
+    figures.append(Figure("fan", "1,694 paths on one thread, CPU time", one, "s", 0.35))
     if numba.config.NUMBA_NUM_THREADS > 1:
-        numba.set_num_threads(2)
-        two = median_time(lambda: evaluate(*setup, fan), clock=clock)
-        figures.append(Figure("fan", "1,694 paths on two threads", two, "s"))
-        figures.append(Figure("fan", "one thread / two threads", one / two, "x", 1.7, True))
+        both = [lambda: score_on(1), lambda: score_on(2)]
+        one, two = median_times(both, REPEATS, time.perf_counter)
+        against = "one thread by the same clock"
+        figures.append(Figure("fan", "1,694 paths on two threads, by the clock", two, "s"))
+        figures.append(
+            Figure("fan", "how much faster two threads are", one / two, "x", 1.7, True, against)
+        )
     return figures + measure_map(rover)
 
 
 def measure_map(rover) -> list[Figure]:
-    """Evaluate a map of 1,000 x 1,000 cells at 8 headings in batches, a sample of it timed."""
+    """Sweep a map of 1,000 x 1,000 cells at 8 headings, row by row, until there is enough."""
     ground = make_mars_terrain(2, 50.0, 0.05)
-    setup = set_up(rover, ground)
-    ny, nx = ground.elevation.shape
-    rows = np.linspace(20, ny - 21, 12).astype(int)
-    x = ground.origin[0] + ground.resolution * np.arange(nx)
-    poses = np.array(
-        [
-            (x[j], ground.origin[1] + ground.resolution * i, heading)
-            for i in rows
-            for heading in np.arange(8) * np.pi / 4
-            for j in range(20, nx - 20)
-        ]
-    )
-    start = time.perf_counter()
-    for first in range(0, len(poses), BATCH):
-        evaluate(*setup, poses[first : first + BATCH])
-    taken = time.perf_counter() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    rate = len(poses) / taken
+    ground = Terrain(ground.elevation[:1000, :1000], ground.resolution, ground.origin)
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    rates, before = [], peak_memory()
+    began = time.perf_counter()
+    for first, scores in sweep_map(rover, ground):
+        taken = time.perf_counter() - began
+        if MAP_ROWS[0] <= first < MAP_ROWS[1]:
+            rates.append(scores.status.size / taken)
+        if first >= MAP_ROWS[1]:
+            break
+        began = time.perf_counter()
+    rate, cells = statistics.median(rates), ground.elevation.size
+    name = "map of 1,000 x 1,000 cells"
     return [
-        Figure("map", f"poses per second, map of {ny} x {nx} cells", rate, "1/s"),
-        Figure("map", "the whole map at 8 headings", 8 * ny * nx / rate, "s"),
-        Figure("map", "peak memory of the process", peak, "MB"),
+        Figure("map", f"{name}: poses per second, all threads", rate, "1/s", repeats=len(rates)),
+        Figure("map", f"{name}: 8 headings take", 8 * cells / rate, "s", repeats=len(rates)),
+        Figure("map", f"{name}: memory for it", peak_memory() - before, "MB", repeats=1),
+        Figure("map", "peak memory of the process", peak_memory(), "MB", repeats=1),
     ]
+
+
+def peak_memory() -> float:
+    """Return the largest memory that this process has had [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -51,6 +51,7 @@ SPREAD = record_type(
     ("high", float, (6,)),  # the same at its highest [m]
     ("q_low", float, (6,)),  # smallest q
     ("q_high", float, (6,)),  # largest q
+    ("reach", float, (6,)),  # how far each wheel may move forward or back [m]
     ("rate", float, (6,)),  # how fast a wheel goes in one direction as q changes
     ("trial", float, (6,)),  # a configuration on the way to an extreme one
     ("raised", np.uint8, (6,)),  # 1 for the wheels that stand on the high surface in it
@@ -132,6 +133,7 @@ def _may_change_level(low, high, linkage, samples, spread):
     for wheel in range(6):
         slope = -touch.normal[wheel, 0] * fx - touch.normal[wheel, 1] * fy
         along, reach = _find_moves(linkage, wheel, spread)
+        spread.reach[wheel] = reach
         for way in range(2):
             surface, sign = high if way == 0 else low, 1.0 - 2.0 * way
             margin = spread.high[wheel] if way == 0 else -spread.low[wheel]

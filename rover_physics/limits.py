@@ -1,6 +1,6 @@
 """Safety limits held against a prediction: whether each waypoint is passable, and if not, why."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -88,7 +88,7 @@ class Verdict:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as JSON can hold it: lists for tuples, None for NaN and infinity."""
-        return to_plain(asdict(self))
+        return to_plain({field.name: getattr(self, field.name) for field in fields(self)})
 
 
 def judge(rover: Rover, prediction: PathPrediction) -> Verdict:

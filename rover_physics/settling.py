@@ -71,7 +71,8 @@ def settle(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
         _touch_all(grid, samples, placement, EXACT, touch)
         if attempt > 0:
             relaxed = RELAXED * linkage.radius * RELAXED_FURTHER ** (attempt - 1)
-            _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+            scope = EXACT if attempt == RECOVERIES - 1 else QUICK
+            _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
         _newton(grid, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
         status, worst = _touch_all(grid, samples, placement, EXACT, touch)
     if status != TOUCHING:
@@ -130,7 +131,7 @@ def _newton(grid, linkage, samples, x, y, yaw, q, placement, scope, touch, J, st
 
 
 @kernel
-def _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Let the wheels fall or rise by part of their gaps until none is above `relaxed` [m].
 
     Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
@@ -139,9 +140,10 @@ def _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, s
     for _ in range(RELAXATION_STEPS):
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
-        status, worst = _touch_all(grid, samples, placement, EXACT, touch)
+        status, worst = _touch_all(grid, samples, placement, scope, touch)
         if not worst > relaxed:
-            return
+            break
+    _touch_all(grid, samples, placement, EXACT, touch)
 
 
 @kernel

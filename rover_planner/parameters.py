@@ -136,8 +136,9 @@ TRAVERSE_SERVER = (
     ),
     ParameterSpec(
         "plan_spacing",
-        0.2,
-        "Distance between poses of a plan; 0 returns every waypoint.",
+        0.1,
+        "Distance between poses of a plan, which has those where the grade changes too; "
+        "0 returns every waypoint.",
         "m",
         bounds=(0.0, 100.0),
     ),
