@@ -9,6 +9,7 @@ as a cloud comes back as it was.
 import array
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
@@ -115,7 +116,7 @@ def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
     if unknown.all():
         raise MessageError(f"none of the cloud's {unknown.size} points has finite x, y and z")
     elevation[unknown] = np.nan
-    layers = {
+    layers: dict[str, Any] = {
         name: raster.arrange(points[name]) for name in LAYERS if name in (points.dtype.names or ())
     }
     for layer in layers.values():

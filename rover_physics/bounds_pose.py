@@ -105,9 +105,12 @@ def _find_heights(grid, low, high, linkage, samples, pose, spread):
         gap = touch.gap[wheel]
         if abs(gap) > NOMINAL_GAP * linkage.radius:
             return ON_EDGE
-        doubt = abs(gap) if abs(gap) > EXTREME_GAP * linkage.radius else 0.0
-        spread.low[wheel] = min(spread.low[wheel] + gap, 0.0) - doubt
-        spread.high[wheel] = max(spread.high[wheel] + gap, 0.0) + doubt
+        spread.low[wheel] = min(spread.low[wheel] + gap, 0.0)
+        spread.high[wheel] = max(spread.high[wheel] + gap, 0.0)
+        in_doubt = spread.high[wheel] > spread.low[wheel]
+        if in_doubt and abs(gap) > EXTREME_GAP * linkage.radius:
+            spread.low[wheel] -= abs(gap)
+            spread.high[wheel] += abs(gap)
     write_gap_rates(linkage, placement, touch, LEVEL, spread.rates)
     if not _invert(spread.rates, work.J, spread.lift):
         return ON_EDGE
