@@ -101,7 +101,7 @@ def show_by_value(outcomes: dict[tuple[str, ...], Outcome]) -> Table:
 def show_times() -> Table:
     """Return the time of the bounds per waypoint on one core."""
     numba.set_num_threads(1)
-    table = Table(title="Time per waypoint on one core [us], least of five")
+    table = Table(title="Time per waypoint on one core in us, least of five")
     for heading in ("rover", "ground", "policy", "sweep", "bounds"):
         table.add_column(heading, justify="left" if heading < "s" else "right")
     for name in ("lsr1", "m2020"):

@@ -2,7 +2,8 @@
 
 A point of the rim can touch only where its gap, less the error of the height difference, is
 smaller than all gaps on the way from there to the nearest point. The error of a difference is that
-of cells that err independently; cells that err alike, as neighbours do, differ by less.
+of cells that err independently; cells that err alike, as neighbours do, differ by less. It also
+counts that the wheel moves along as the others rise and fall, which changes gaps by the slope.
 """
 
 import numpy as np
@@ -14,12 +15,17 @@ from rover_physics.records import record_type
 
 RUNGS = 4
 """Places between a point and the nearest one that it is held against."""
+STEEPEST = np.radians(70.0)
+"""Contact angle from which on steeper ones count as that steep, where the wheel moves along."""
+SQRT2 = np.sqrt(2.0)
 HALVINGS = 5
 """How often the way from the last sample that may touch to the first that can't is halved."""
 
 RIM = record_type(
     ("gap", float, (MOST_CIRCLES, MOST_ANGLES)),  # vertical gap of each sample [m]
     ("lowest", float, (MOST_CIRCLES, MOST_ANGLES)),  # angle of a smallest gap near, NaN if none
+    ("largest_error", float),  # of the ground anywhere near [m]
+    ("reach", float),  # how far the wheel may move forward or back [m]
     ("nearest", float, (MOST_CIRCLES,)),  # smallest gap of each circle [m]
     ("nearest_angle", float, (MOST_CIRCLES,)),  # contact angle there [rad]
 )
@@ -38,13 +44,13 @@ CONTACTS = record_type(
 
 
 @kernel
-def bound_contacts(grid, error, samples, placement, angles, points, contacts):
+def bound_contacts(grid, error, samples, placement, angles, points, reach, contacts):
     """Write the possible contacts of all wheels of a placed rover into `contacts`.
 
     `error` (ny, nx) bounds the error of each cell's height [m]; angles (6,) [rad] and points
-    (6, 3) [m] are the nominal contacts.
+    (6, 3) [m] are the nominal contacts; reach (6,) bounds how far the wheels move along [m].
     """
-    R = placement.R
+    R, rim = placement.R, contacts.rim
     for wheel in range(6):
         lateral = 0.0
         for i in range(3):
@@ -53,22 +59,25 @@ def bound_contacts(grid, error, samples, placement, angles, points, contacts):
         contacts.angle[wheel] = contacts.angle_low[wheel] = contacts.angle_high[wheel] = angle
         contacts.lateral[wheel] = lateral
         contacts.lateral_low[wheel] = contacts.lateral_high[wheel] = lateral
-        if _is_in_doubt(grid, error, samples, placement, wheel):
-            _look_around(grid, samples, placement, wheel, angle, contacts.rim)
+        rim.reach = reach[wheel]
+        rim.largest_error = _find_largest_error(grid, error, samples, placement, wheel)
+        if max(rim.largest_error, rim.reach) > 0.0:
+            _look_around(grid, samples, placement, wheel, angle, rim)
             _widen(grid, error, samples, placement, wheel, contacts)
 
 
 @kernel
-def _is_in_doubt(grid, error, samples, placement, wheel):
-    """Tell whether any height within reach of a wheel may be wrong."""
+def _find_largest_error(grid, error, samples, placement, wheel):
+    """Return the largest error [m] of a height within reach of a wheel."""
     reach = samples.reach * grid.inverse_resolution
     gx = (placement.centres[wheel, 0] - grid.x0) * grid.inverse_resolution
     gy = (placement.centres[wheel, 1] - grid.y0) * grid.inverse_resolution
+    largest = 0.0
     for i in range(max(int(gy - reach), 0), min(int(gy + reach) + 2, error.shape[0])):
         for j in range(max(int(gx - reach), 0), min(int(gx + reach) + 2, error.shape[1])):
-            if error[i, j] > 0.0:
-                return True
-    return False
+            if error[i, j] > largest:
+                largest = error[i, j]
+    return largest
 
 
 @kernel
@@ -183,29 +192,35 @@ def _widen(grid, error, samples, placement, wheel, contacts):
 
 @kernel
 def _error_to_circle(grid, error, samples, placement, wheel, m, best, rim):
-    """Return a bound on the error [m] between the nearest points of two circles."""
-    s, c = np.sin(rim.nearest_angle[m]), np.cos(rim.nearest_angle[m])
-    gap, ax, ay = _gap_at(grid, samples, placement, wheel, m, s, c)
-    s, c = np.sin(rim.nearest_angle[best]), np.cos(rim.nearest_angle[best])
-    gap, bx, by = _gap_at(grid, samples, placement, wheel, best, s, c)
-    return _error_between(error, ax, ay, bx, by)
+    """Return a bound on the error [m] between the gaps of the nearest points of two circles."""
+    here, there = rim.nearest_angle[m], rim.nearest_angle[best]
+    gap, ax, ay = _gap_at(grid, samples, placement, wheel, m, np.sin(here), np.cos(here))
+    gap, bx, by = _gap_at(grid, samples, placement, wheel, best, np.sin(there), np.cos(there))
+    return np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, here, there))
+
+
+@kernel
+def _shift_between(rim, angle, other):
+    """Return how much the gaps at two contacts change apart [m] as the wheel moves along."""
+    angle = min(max(angle, -STEEPEST), STEEPEST)
+    other = min(max(other, -STEEPEST), STEEPEST)
+    return rim.reach * abs(np.tan(angle) - np.tan(other))
 
 
 @kernel
 def _widen_angles(grid, error, samples, placement, wheel, m, contacts):
     """Widen the angles of a wheel to those at which circle m may touch."""
-    nearest = contacts.rim.nearest_angle[m]
+    rim = contacts.rim
+    nearest = rim.nearest_angle[m]
     contacts.angle_low[wheel] = min(contacts.angle_low[wheel], nearest)
     contacts.angle_high[wheel] = max(contacts.angle_high[wheel], nearest)
     for side in range(2):
-        inside, outside = _find_farthest(
-            grid, error, samples, placement, wheel, m, side, contacts.rim
-        )
+        inside, outside = _find_farthest(grid, error, samples, placement, wheel, m, side, rim)
         if contacts.angle_low[wheel] <= outside <= contacts.angle_high[wheel]:
             continue
         for _ in range(HALVINGS):
             middle = 0.5 * (inside + outside)
-            if _may_touch(grid, error, samples, placement, wheel, m, middle, nearest):
+            if _may_touch(grid, error, samples, placement, wheel, m, middle, nearest, rim):
                 inside = middle
             else:
                 outside = middle
@@ -231,11 +246,14 @@ def _find_farthest(grid, error, samples, placement, wheel, m, side, rim):
             break
         outside = angle
         lowest = rim.lowest[m, k]
+        doubt = np.hypot(SQRT2 * rim.largest_error, _shift_between(rim, angle, nearest))
+        if lowest != lowest and rim.gap[m, k] - rim.nearest[m] > doubt:
+            continue
         if lowest == lowest and _may_touch(
-            grid, error, samples, placement, wheel, m, lowest, nearest
+            grid, error, samples, placement, wheel, m, lowest, nearest, rim
         ):
             return lowest, _clip_angle(max(away * angle, away * lowest + spacing) * away)
-        if _may_touch(grid, error, samples, placement, wheel, m, angle, nearest):
+        if _may_touch(grid, error, samples, placement, wheel, m, angle, nearest, rim):
             return angle, _clip_angle(angle + away * spacing)
     return nearest, outside
 
@@ -246,7 +264,7 @@ def _clip_angle(angle):
 
 
 @kernel
-def _may_touch(grid, error, samples, placement, wheel, m, angle, nearest):
+def _may_touch(grid, error, samples, placement, wheel, m, angle, nearest, rim):
     """Tell whether circle m may touch at `angle` [rad] rather than on the way to `nearest`."""
     s, c = np.sin(angle), np.cos(angle)
     gap, ax, ay = _gap_at(grid, samples, placement, wheel, m, s, c)
@@ -256,6 +274,9 @@ def _may_touch(grid, error, samples, placement, wheel, m, angle, nearest):
         other = angle + (nearest - angle) * ((rung + 1.0) / RUNGS) ** 2
         s, c = np.sin(other), np.cos(other)
         lower, bx, by = _gap_at(grid, samples, placement, wheel, m, s, c)
-        if lower == lower and gap - lower > _error_between(error, ax, ay, bx, by):
+        if not gap - lower > 0.0:
+            continue
+        doubt = np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, angle, other))
+        if gap - lower > doubt:
             return False
     return True

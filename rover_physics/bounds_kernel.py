@@ -109,8 +109,9 @@ def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nomin
     placement = spread.model.placement
     place(linkage, pose[0], pose[1], pose[2], spread.q, placement)
     bound_contacts(
-        grid, error, samples, placement, nominal.contact_angle, nominal.contact_points, contacts
-    )
+        grid, error, samples, placement, nominal.contact_angle, nominal.contact_points,
+        spread.reach, contacts,
+    )  # fmt: skip
     bound_clearance(grid, error, linkage, spread, result.belly_clearance)
     if not bound_forces(ground, linkage, samples, settings, pose, spread, contacts, box):
         return SINGULAR

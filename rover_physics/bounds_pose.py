@@ -51,6 +51,7 @@ SPREAD = record_type(
     ("high", float, (6,)),  # the same at its highest [m]
     ("q_low", float, (6,)),  # smallest q
     ("q_high", float, (6,)),  # largest q
+    ("reach", float, (6,)),  # how far each wheel may move forward or back [m]
     ("rate", float, (6,)),  # how fast a wheel goes in one direction as q changes
     ("trial", float, (6,)),  # a configuration on the way to an extreme one
     ("raised", np.uint8, (6,)),  # 1 for the wheels that stand on the high surface in it
@@ -104,9 +105,12 @@ def _find_heights(grid, low, high, linkage, samples, pose, spread):
         gap = touch.gap[wheel]
         if abs(gap) > NOMINAL_GAP * linkage.radius:
             return ON_EDGE
-        doubt = abs(gap) if abs(gap) > EXTREME_GAP * linkage.radius else 0.0
-        spread.low[wheel] = min(spread.low[wheel] + gap, 0.0) - doubt
-        spread.high[wheel] = max(spread.high[wheel] + gap, 0.0) + doubt
+        spread.low[wheel] = min(spread.low[wheel] + gap, 0.0)
+        spread.high[wheel] = max(spread.high[wheel] + gap, 0.0)
+        in_doubt = spread.high[wheel] > spread.low[wheel]
+        if in_doubt and abs(gap) > EXTREME_GAP * linkage.radius:
+            spread.low[wheel] -= abs(gap)
+            spread.high[wheel] += abs(gap)
     write_gap_rates(linkage, placement, touch, LEVEL, spread.rates)
     if not _invert(spread.rates, work.J, spread.lift):
         return ON_EDGE
@@ -132,6 +136,7 @@ def _may_change_level(low, high, linkage, samples, spread):
     for wheel in range(6):
         slope = -touch.normal[wheel, 0] * fx - touch.normal[wheel, 1] * fy
         along, reach = _find_moves(linkage, wheel, spread)
+        spread.reach[wheel] = reach
         for way in range(2):
             surface, sign = high if way == 0 else low, 1.0 - 2.0 * way
             margin = spread.high[wheel] if way == 0 else -spread.low[wheel]
