@@ -57,7 +57,7 @@ def test_settings_change_the_answer():
 
 def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     certain = make_terrain(waves)
-    uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.01))
+    uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain)
     refused = service.answer(start, goal).verdict
