@@ -1,4 +1,4 @@
-"""The command `rover_planner`: predict, reach, make a terrain, run the demo, draw Figure 4."""
+"""The command `rover_planner`: predict, reach, view, terrain, demo, figure4."""
 
 import json
 import sys
@@ -10,6 +10,7 @@ import typer
 
 from rover_physics.errors import RoverError
 from rover_planner.errors import DemoError, PlanningError
+from rover_planner.view_command import view
 
 BAD_INPUT = 2
 """Exit code when the input makes no sense, with one line on stderr that says why."""
@@ -242,6 +243,9 @@ def figure4(
     with show_progress() as progress:
         progress(f"draw {out.name} (the first run compiles the model)")
         draw_figure4(out, model)
+
+
+app.command(context_settings={"ignore_unknown_options": True})(view)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

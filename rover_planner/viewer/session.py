@@ -1,0 +1,167 @@
+"""What is looked at: a rover, a terrain, where from and where to, and what the model says."""
+
+import dataclasses
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.errors import RoverError
+from rover_physics.limits import Verdict
+from rover_physics.rover import Rover
+from rover_physics.terrain import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.path_query import (
+    Candidate,
+    PathAnswer,
+    PathQueryOptions,
+    answer_path_query,
+    check_path,
+)
+from rover_planner.viewer.journey import Journey
+from rover_planner.viewer.rover_values import Key, with_value
+
+REFUSALS = (RoverError, PlanningError)
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The path that is shown, and how it was judged."""
+
+    candidate: Candidate
+    """The path."""
+    journey: Journey
+    """What is played of it."""
+    judged_in: float
+    """How long the model took [s]."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the rover can drive it, and why not."""
+        return self.candidate.verdict
+
+
+class ViewSession:
+    """Keeps the last good state: what is refused changes nothing, and says why."""
+
+    def __init__(
+        self,
+        rover: Rover,
+        terrain: Terrain,
+        start: Pose,
+        goal: Pose,
+        options: PathQueryOptions | None = None,
+    ):
+        """Plan from start to goal, x, y [m] and yaw [rad] each.
+
+        Raises:
+            RoverError, PlanningError: The rover, the poses or the options make no sense.
+        """
+        self.rover, self.terrain = rover, terrain
+        self.start, self.goal = start, goal
+        self.options = options or PathQueryOptions(count=5, spacing=0.5)
+        self.arm_angles: dict[str, float] = {}
+        self.refusal = ""
+        """Why the last change was refused, empty where it was not."""
+        self.answer: PathAnswer
+        self.shown: Shown
+        self._plan()
+
+    def _plan(self) -> None:
+        began = time.perf_counter()
+        self.answer = answer_path_query(
+            self.rover, self.terrain, self.start, self.goal, self.options, self.arm_angles
+        )
+        self._show(self.answer.chosen, time.perf_counter() - began)
+
+    def _show(self, candidate: Candidate, taken: float) -> None:
+        journey = Journey(self.rover, candidate.prediction, candidate.verdict)
+        self.shown = Shown(candidate, journey, taken)
+
+    def show_candidate(self, index: int) -> None:
+        """Show another candidate of the last answer, by its index."""
+        self._show(self.answer.candidates[index], self.shown.judged_in)
+
+    def plan_to(self, goal: NDArray[np.float64]) -> bool:
+        """Plan to a place (2,) [m], arriving on the straight way; return whether it was taken."""
+        return self._take_places(self.start, _facing(self.start, goal))
+
+    def plan_from(self, start: NDArray[np.float64]) -> bool:
+        """Plan from a place (2,) [m], heading for the goal; return whether it was taken."""
+        towards = np.asarray(self.goal[:2]) - np.asarray(start)
+        yaw = float(np.arctan2(towards[1], towards[0]))
+        placed = (float(start[0]), float(start[1]), yaw)
+        return self._take_places(placed, (self.goal[0], self.goal[1], yaw))
+
+    def _take_places(self, start: Pose, goal: Pose) -> bool:
+        return self._try(start=start, goal=goal)
+
+    def take_options(self, **changes: object) -> bool:
+        """Change fields of PathQueryOptions and plan anew; return whether it was taken."""
+        return self._try(options=dataclasses.replace(self.options, **changes))  # type: ignore[arg-type]
+
+    def take_rover(self, rover: Rover) -> bool:
+        """Take another rover and plan anew; return whether it was taken."""
+        return self._try(rover=rover, arm_angles={})
+
+    def _try(self, **changes: object) -> bool:
+        """Plan with other attributes; put the old ones back where that is refused."""
+        before = {name: getattr(self, name) for name in changes}
+        for name, value in changes.items():
+            setattr(self, name, value)
+        try:
+            self._plan()
+        except REFUSALS as error:
+            for name, value in before.items():
+                setattr(self, name, value)
+            self.refusal = str(error)
+            return False
+        self.refusal = ""
+        return True
+
+    def change_rover(self, key: Key, value: float) -> bool:
+        """Change a number of the rover and judge the path that is shown again, at once.
+
+        The other candidates keep their verdicts until `plan_again`.
+
+        Args:
+            key: Where the number is in the rover file.
+            value: What it is to be.
+
+        Returns:
+            Whether it was taken; if not, `refusal` says why and the last good rover stays.
+        """
+        try:
+            rover = with_value(self.rover, key, value)
+        except REFUSALS as error:
+            self.refusal = str(error)
+            return False
+        return self._judge_shown(rover, self.arm_angles)
+
+    def change_arm(self, joint: str, angle: float) -> bool:
+        """Turn a joint of the arm to an angle [rad], as `change_rover`."""
+        return self._judge_shown(self.rover, {**self.arm_angles, joint: angle})
+
+    def _judge_shown(self, rover: Rover, arm_angles: dict[str, float]) -> bool:
+        began = time.perf_counter()
+        try:
+            poses = self.shown.candidate.poses
+            candidate = check_path(rover, self.terrain, poses, self.options, arm_angles)
+        except REFUSALS as error:
+            self.refusal = str(error)
+            return False
+        self.rover, self.arm_angles, self.refusal = rover, arm_angles, ""
+        self._show(candidate, time.perf_counter() - began)
+        return True
+
+    def plan_again(self) -> bool:
+        """Judge all candidates anew, after the rover was changed; return whether that worked."""
+        return self._try()
+
+
+def _facing(start: Pose, goal: NDArray[np.float64]) -> Pose:
+    """Return the goal (2,) with the heading of the straight way there."""
+    way = np.asarray(goal, dtype=float) - np.asarray(start[:2])
+    return float(goal[0]), float(goal[1]), float(np.arctan2(way[1], way[0]))
