@@ -32,6 +32,7 @@ EXTRAS = {
         "pytest-xdist>=3.4,<4",
         "hypothesis>=6.98,<7",
     ],
+    "bench": ["mujoco>=3.2,<5"],
     "dev": [
         "ruff>=0.9,<1",
         "mypy>=1.14,<3",
@@ -81,6 +82,7 @@ setup(
         "console_scripts": [
             "rover_planner = rover_planner.cli:main",
             "traverse_server = rover_planner.traverse_server:main",
+            "traction_controller = rover_planner.traction_controller:main",
             "mission_planner = rover_planner.mission_planner:main",
         ],
     },

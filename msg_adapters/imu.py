@@ -40,7 +40,8 @@ def imu_to_attitude(imu: Imu) -> Attitude:
     norm = math.sqrt(x * x + y * y + z * z + w * w)
     if not 0.99 < norm < 1.01:
         raise MessageError(
-            f"imu has orientation {[x, y, z, w]} of norm {norm:g}; it must be a quaternion of norm 1"
+            f"imu has orientation {[x, y, z, w]} of norm {norm:g}; it must be a quaternion of "
+            "norm 1"
         )
     roll = math.atan2(2.0 * (w * x + y * z), norm**2 - 2.0 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x) / norm**2)))

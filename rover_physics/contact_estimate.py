@@ -4,9 +4,9 @@ The centre of a wheel that rolls without slip moves at its rolling speed along i
 tangent, and the links say how the centres move relative to one another: the wheels of a bogie turn
 about each other at the bogie's rate, the rocker carries bogie and last wheel, the body both
 rockers. That makes ten equations in six contact angles, which an extended Kalman filter solves as
-the rover moves. Where all parts only shift, as on an even slope, the equations cannot tell the angles;
-then what is left is the slope of the lines between neighbouring wheels, towards which the angles
-drift as the rover rolls away from where they were found.
+the rover moves. Where all parts only shift, as on an even slope, the equations cannot tell the
+angles; then what is left is the slope of the lines between neighbouring wheels, towards which the
+angles drift as the rover rolls away from where they were found.
 
 Source: Iagnemma and Dubowsky, "Vehicle wheel-ground contact angle estimation: with application to
 mobile robot traction control", Advances in Robot Kinematics, 2000.

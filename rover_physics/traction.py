@@ -66,8 +66,8 @@ class TractionWeights:
     """Weight of the squared tractions: it decides where several sets have the smallest peak."""
     change: float = 3.0
     """Weight of the squared change since the last answer; smaller ones take OSQP longer."""
-    slack: float = 10.0
-    """Price of a slack."""
+    slack: float = 100.0
+    """Price of a slack: more than a peak can be worth, so that no limit gives way to another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +154,7 @@ def _write_costs(qp: TractionQP, weights: TractionWeights) -> None:
     qp.q[:6] = -weights.change * qp.start[:6]
     qp.q[SHARE : SLOPE + 1] = -weights.change * qp.start[SHARE : SLOPE + 1]
     qp.P[PEAK] = weights.peak
-    qp.P[FRICTION_SLACK:] = weights.slack
+    qp.P[FRICTION_SLACK:] = 0.1 * weights.slack
     qp.q[FRICTION_SLACK:] = weights.slack
 
 

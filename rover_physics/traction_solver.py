@@ -113,7 +113,8 @@ def solve_traction(
         wheel_radius: Wheel radius [m].
         last: (6,) tractions of the last answer [N], near which the search starts; None starts
             from equal torques.
-        most_programmes: Largest number of programmes; fewer where they settle before.
+        most_programmes: Largest number of programmes, fewer where they settle before; 0 asks for
+            equal torques.
         weights: What the objective weighs.
 
     Returns:
@@ -141,7 +142,7 @@ def solve_traction(
             best, best_merit = x, merit
         if np.abs(y[:WHEEL_COUNT] - qp.start[:WHEEL_COUNT]).max() <= SETTLED:
             break
-    fallback = best is None
+    fallback = best is None and most_programmes > 0
     x = rows.complete(np.zeros(WHEEL_COUNT)) if best is None else best
     forces = _describe(rows, friction, x, max_torque, wheel_radius)
     return TractionAnswer(
