@@ -9,6 +9,7 @@ SHELL := bash
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+BENCH_READY := $(VENV)/.bench_ready
 PACKAGES := rover_physics msg_adapters rover_planner
 MAP ?=
 # Tests, demo and nodes talk to this machine only.
@@ -41,14 +42,19 @@ kernels: $(READY) ## compile the numba kernels into their cache
 	$(BIN)/python -m rover_physics.sweep
 
 .PHONY: bench
-bench: kernels ## measure the time of a full evaluation
-	@for file in benchmarks/bench_*.py; do $(BIN)/python "$$file"; done
+bench: $(BENCH_READY) kernels ## measure times and memory, as a table and bench_output/results.json
+	@$(BIN)/python benchmarks/run.py
 
 .PHONY: clean
 clean: ## remove the environment and everything that was made
-	rm -rf "$(VENV)" build dist install log demo_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf "$(VENV)" build dist install log demo_output bench_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find $(PACKAGES) test -name __pycache__ -prune -exec rm -rf {} +
 
 $(READY): setup.py pyproject.toml constraints.txt .ci/make_venv
 	@.ci/make_venv "$(VENV)"
+	touch $@
+
+$(BENCH_READY): $(READY)
+	@echo "== what benchmarks compare with"
+	$(BIN)/python -m pip install -qq --no-input -c "$(VENV)/constraints.txt" --no-build-isolation --editable ".[bench]"
 	touch $@

@@ -1,9 +1,9 @@
 """Elevation map messages: PointCloud2 and OccupancyGrid against Terrain.
 
-A cloud becomes a grid in two steps: the points are read where they stand in the message (no copy
-but the conversion to float64), then each falls into the cell whose centre is nearest. A cloud
-that is itself a regular grid keeps its own cells, so that a terrain published as a cloud comes
-back as it was.
+The points of a cloud are read where they stand in the message. Where they are a regular grid row
+by row, their heights are the terrain; else each point falls into the cell whose centre is nearest.
+A cloud that is a regular grid, in whatever order, keeps its own cells, so that a terrain published
+as a cloud comes back as it was.
 """
 
 import array
@@ -16,17 +16,21 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.errors import MessageError
+from msg_adapters.gridding import (
+    CellGrid,
+    Raster,
+    combine,
+    detect_grid,
+    detect_raster,
+    lay_out_cells,
+    rounding_error,
+    typical_spacing,
+)
 from rover_physics.terrain import Terrain
 
 CELL_HEIGHTS = ("max", "mean")
-MAX_CELLS = 25_000_000
-"""Largest map built from a cloud; one stray point far away must not take the memory."""
-
-_MIN_FILL = 0.05
-"""Least share of a detected grid's cells that have a point; below it the spacing is a chance."""
-
-_MAX_OFF_CENTRE = 0.02
-"""Largest distance of a regular grid's points from their cell centres, in cells."""
+LAYERS = ("friction", "elevation_std")
+"""Fields of a cloud besides x, y and z that become layers of the terrain."""
 
 _FLOATS = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
 _DATATYPE_NAMES = {
@@ -43,6 +47,8 @@ class CloudPoints:
     """(n, 3) coordinates [m]; NaN where the message has NaN."""
     friction: NDArray[np.float64] | None
     """(n,) friction coefficient, where the cloud has such a field."""
+    elevation_std: NDArray[np.float64] | None
+    """(n,) standard deviation of z [m], where the cloud has such a field."""
     precision: float
     """Rounding error of the x and y coordinates [m]."""
 
@@ -51,43 +57,16 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     """Read the points of a cloud, whatever its layout.
 
     Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
-    and the optional `friction` may be FLOAT32 or FLOAT64.
+    and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64.
 
     Raises:
         MessageError: no points, a field missing or of another datatype, or lengths that disagree.
     """
-    row_step = _check_layout(cloud)
-    names = ["x", "y", "z"]
-    fields = {field.name: field for field in cloud.fields}
-    missing = [name for name in names if name not in fields]
-    if missing:
-        has = ", ".join(fields) or "none"
-        raise MessageError(
-            f"cloud has no field {', '.join(missing)}; it needs x, y and z, and has {has}"
-        )
-    if "friction" in fields:
-        names.append("friction")
-    formats = [_field_format(fields[name], cloud) for name in names]
-    point = np.dtype(
-        {
-            "names": names,
-            "formats": formats,
-            "offsets": [fields[name].offset for name in names],
-            "itemsize": cloud.point_step,
-        }
-    )
-    points = np.ndarray(
-        (cloud.height, cloud.width),
-        point,
-        buffer=np.frombuffer(cloud.data, np.uint8),
-        strides=(row_step, cloud.point_step),
-    )
-    columns = {name: points[name].astype(np.float64).ravel() for name in names}
-    single = any(point[name].itemsize == 4 for name in ("x", "y"))
+    points = _view_points(cloud)
+    columns = {name: points[name].astype(np.float64).ravel() for name in points.dtype.names or ()}
     xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
-    extent = np.abs(xyz[np.isfinite(xyz[:, :2]).all(axis=1), :2]).max(initial=1.0)
-    precision = float(np.finfo(np.float32 if single else np.float64).eps * extent)
-    return CloudPoints(xyz, columns.get("friction"), precision)
+    precision = rounding_error(points["x"], points["y"])
+    return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 
 
 def terrain_from_point_cloud(
@@ -117,30 +96,64 @@ def terrain_from_point_cloud(
         raise MessageError(f"cell_height is {cell_height!r}; it must be one of {CELL_HEIGHTS}")
     if not (math.isfinite(resolution) and resolution >= 0.0):
         raise MessageError(f"resolution is {resolution} m; it must be positive, or 0 to detect it")
-    points = read_points(cloud)
+    points = _view_points(cloud)
+    raster = detect_raster(points["x"], points["y"])
+    if raster is not None and _is_wanted(raster.grid, resolution):
+        return _terrain_of_raster(points, raster)
+    return _terrain_of_scatter(read_points(cloud), resolution, cell_height)
+
+
+def _is_wanted(grid: CellGrid, resolution: float) -> bool:
+    """Tell whether a detected grid is what was asked for, 0 asking for any."""
+    return resolution == 0.0 or abs(grid.resolution - resolution) <= 1e-3 * resolution
+
+
+def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
+    """Take the points as they come for cells."""
+    elevation = raster.arrange(points["z"])
+    unknown = ~np.isfinite(elevation)
+    if unknown.all():
+        raise MessageError(f"none of the cloud's {unknown.size} points has finite x, y and z")
+    elevation[unknown] = np.nan
+    friction = None
+    if "friction" in (points.dtype.names or ()):
+        friction = raster.arrange(points["friction"])
+        friction[unknown | ~np.isfinite(friction)] = np.nan
+    std = None
+    if "elevation_std" in (points.dtype.names or ()):
+        std = raster.arrange(points["elevation_std"])
+        std[unknown] = np.nan
+    grid = raster.grid
+    return Terrain(elevation, grid.resolution, grid.origin, friction, elevation_std=std)
+
+
+def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str) -> Terrain:
+    """Let each point fall into the cell whose centre is nearest."""
     placed = np.isfinite(points.xyz[:, :2]).all(axis=1)
     known = placed & np.isfinite(points.xyz[:, 2])
     if not known.any():
         raise MessageError(f"none of the cloud's {len(known)} points has finite x, y and z")
     xy = points.xyz[placed, :2]
-    grid = _detect_grid(xy, points.precision)
-    detected = grid is not None and abs(grid.resolution - resolution) <= 1e-3 * resolution
-    if resolution > 0.0 and not detected:
-        grid = _regular_cells(xy, resolution)
+    grid = detect_grid(xy, points.precision)
+    if resolution > 0.0 and (grid is None or not _is_wanted(grid, resolution)):
+        grid = lay_out_cells(xy, resolution)
     if grid is None:
         raise MessageError(
             "the cloud's points form no regular grid along x and y, so the cell size must be "
-            f"given: set map_resolution, for these points about {_typical_spacing(xy):.2g} m"
+            f"given: set map_resolution, for these points about {typical_spacing(xy):.2g} m"
         )
     columns, rows = grid.cells(points.xyz[known, :2])
     cells = rows * grid.columns + columns
-    elevation = _combine(cells, points.xyz[known, 2], grid, cell_height)
+    elevation = combine(cells, points.xyz[known, 2], grid, cell_height)
     friction = None
     if points.friction is not None:
         # The lowest coefficient of a cell counts; not finite ones say nothing.
         values = np.where(np.isfinite(points.friction), points.friction, np.nan)[known]
-        friction = -_combine(cells, -values, grid, "max")
-    return Terrain(elevation, grid.resolution, grid.origin, friction)
+        friction = -combine(cells, -values, grid, "max")
+    std = None
+    if points.elevation_std is not None:
+        std = combine(cells, points.elevation_std[known], grid, "max")
+    return Terrain(elevation, grid.resolution, grid.origin, friction, elevation_std=std)
 
 
 def terrain_to_point_cloud(
@@ -158,14 +171,15 @@ def terrain_to_point_cloud(
         datatype: PointField.FLOAT32 (what viewers show; heights are rounded to it) or FLOAT64.
     """
     rows, columns = terrain.elevation.shape
-    names = ["x", "y", "z"] + (["friction"] if terrain.friction is not None else [])
+    layers = [name for name in LAYERS if getattr(terrain, name) is not None]
+    names = ["x", "y", "z", *layers]
     kind = np.dtype("<" + _FLOATS[datatype])
     values = np.empty((rows, columns, len(names)), kind)
     values[:, :, 0] = terrain.origin[0] + terrain.resolution * np.arange(columns)
     values[:, :, 1] = (terrain.origin[1] + terrain.resolution * np.arange(rows))[:, None]
     values[:, :, 2] = terrain.elevation
-    if terrain.friction is not None:
-        values[:, :, 3] = terrain.friction
+    for column, name in enumerate(layers, start=3):
+        values[:, :, column] = getattr(terrain, name)
     cloud = PointCloud2(height=rows, width=columns, is_bigendian=False, is_dense=False)
     cloud.header.frame_id = frame_id
     if stamp is not None:
@@ -200,19 +214,32 @@ def terrain_to_occupancy_grid(terrain: Terrain, frame_id: str, stamp) -> Occupan
     return grid
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """Square cells that hold all points of a cloud."""
-
-    resolution: float
-    origin: tuple[float, float]
-    columns: int
-    rows: int
-
-    def cells(self, xy):
-        """Return the column and row of points (n, 2)."""
-        index = np.rint((xy - self.origin) / self.resolution).astype(np.int64)
-        return index[:, 0], index[:, 1]
+def _view_points(cloud: PointCloud2) -> NDArray[np.void]:
+    """Return the points (height, width) where they stand in a cloud, by the names of fields."""
+    row_step = _check_layout(cloud)
+    names = ["x", "y", "z"]
+    fields = {field.name: field for field in cloud.fields}
+    missing = [name for name in names if name not in fields]
+    if missing:
+        has = ", ".join(fields) or "none"
+        raise MessageError(
+            f"cloud has no field {', '.join(missing)}; it needs x, y and z, and has {has}"
+        )
+    names += [name for name in LAYERS if name in fields]
+    point = np.dtype(
+        {
+            "names": names,
+            "formats": [_field_format(fields[name], cloud) for name in names],
+            "offsets": [fields[name].offset for name in names],
+            "itemsize": cloud.point_step,
+        }
+    )
+    return np.ndarray(
+        (cloud.height, cloud.width),
+        point,
+        buffer=np.frombuffer(cloud.data, np.uint8),
+        strides=(row_step, cloud.point_step),
+    )
 
 
 def _check_layout(cloud: PointCloud2) -> int:
@@ -255,91 +282,3 @@ def _field_format(field: PointField, cloud: PointCloud2) -> str:
             f"point_step {cloud.point_step}"
         )
     return (">" if cloud.is_bigendian else "<") + kind
-
-
-def _detect_grid(xy: NDArray[np.float64], precision: float) -> _Grid | None:
-    """Find the regular grid along x and y that the points (n, 2) lie on, or None."""
-    noise = 4.0 * precision
-    along_x, along_y = _detect_axis(xy[:, 0], noise), _detect_axis(xy[:, 1], noise)
-    if along_x is None or along_y is None:
-        return None
-    steps = [step for _, step in (along_x, along_y) if step > 0.0]
-    if not steps:
-        return None
-    spans = np.ptp(xy, axis=0)
-    fitted = steps[0] if spans[0] >= spans[1] else steps[-1]
-    if any(abs(step - fitted) > _MAX_OFF_CENTRE * fitted for step in steps):
-        return None
-    counts = [round(span / fitted) + 1 for span in spans]
-    if len(xy) < _MIN_FILL * counts[0] * counts[1]:
-        return None
-    resolution = _round_within(fitted, noise / max(counts))
-    origin = (_round_within(along_x[0], noise), _round_within(along_y[0], noise))
-    grid = _Grid(resolution, origin, counts[0], counts[1])
-    index = np.rint((xy - origin) / resolution)
-    off_centre = np.abs(xy - (origin + index * resolution)).max()
-    columns, rows = grid.cells(xy)
-    single = np.bincount(rows * grid.columns + columns).max() == 1
-    on_centre = off_centre <= max(_MAX_OFF_CENTRE * resolution, noise)
-    return grid if single and on_centre else None
-
-
-def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, float] | None:
-    """Return the first value and the spacing of equidistant values (0 for one value), or None."""
-    ordered = np.sort(values)
-    starts = np.concatenate([[True], np.diff(ordered) > noise])
-    distinct = ordered[starts]
-    if len(distinct) == 1:
-        return float(distinct[0]), 0.0
-    gaps = np.diff(distinct)
-    smallest = gaps.min()
-    index = np.concatenate([[0.0], np.cumsum(np.rint(gaps / smallest))])
-    step, first = np.polyfit(index, distinct, 1)
-    residual = np.abs(distinct - (first + step * index)).max()
-    if residual > max(_MAX_OFF_CENTRE * step, noise):
-        return None
-    return float(first), float(step)
-
-
-def _regular_cells(xy: NDArray[np.float64], resolution: float) -> _Grid:
-    """Return cells centred on multiples of the resolution that hold the points (n, 2)."""
-    first = np.rint(xy.min(axis=0) / resolution)
-    last = np.rint(xy.max(axis=0) / resolution)
-    counts = last - first + 1.0
-    if counts.prod() > MAX_CELLS:
-        span = np.ptp(xy, axis=0)
-        raise MessageError(
-            f"cloud spans {span[0]:.4g} m x {span[1]:.4g} m, which at {resolution:g} m are "
-            f"{counts.prod():.3g} cells; a map may have {MAX_CELLS}: remove stray points or set "
-            "a coarser map_resolution"
-        )
-    origin = first * resolution
-    return _Grid(resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1]))
-
-
-def _combine(cells, values, grid: _Grid, how: str) -> NDArray[np.float64]:
-    """Combine the values of each cell; NaN where there is none."""
-    size = grid.rows * grid.columns
-    if how == "max":
-        combined = np.full(size, np.nan)
-        np.fmax.at(combined, cells, values)
-    else:
-        counts = np.bincount(cells, minlength=size)
-        sums = np.bincount(cells, weights=values, minlength=size)
-        combined = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
-    return combined.reshape(grid.rows, grid.columns)
-
-
-def _typical_spacing(xy: NDArray[np.float64]) -> float:
-    """Return a cell size [m] at which most cells within the points (n, 2) would have one."""
-    area = float(np.prod(np.ptp(xy, axis=0)))
-    return 2.0 * math.sqrt(area / len(xy))
-
-
-def _round_within(value: float, tolerance: float) -> float:
-    """Return the shortest decimal within a tolerance of a value: 0.0500000003 is 0.05."""
-    for digits in range(13):
-        rounded = round(value, digits)
-        if abs(rounded - value) <= tolerance:
-            return rounded
-    return value

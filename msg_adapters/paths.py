@@ -103,12 +103,13 @@ def quaternions(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> NDArray[np
     )
 
 
-def decimate(poses: ArrayLike, spacing: float) -> NDArray[np.intp]:
+def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArray[np.intp]:
     """Choose poses about `spacing` [m] apart along a path, always the first and the last.
 
     Args:
         poses: (n, 2) or wider; columns 0 and 1 are x and y [m].
         spacing: Distance to keep between chosen poses [m]; 0 keeps all.
+        always: Indices of further poses to choose.
 
     Returns:
         (m,) ascending indices of the chosen poses.
@@ -120,7 +121,8 @@ def decimate(poses: ArrayLike, spacing: float) -> NDArray[np.intp]:
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     marks = np.arange(0.0, travelled[-1], spacing)
     chosen = np.searchsorted(travelled, marks - 1e-9 * spacing)
-    return np.unique(np.concatenate([[0], chosen, [len(xy) - 1]])).astype(np.intp)
+    ends = [0, len(xy) - 1]
+    return np.unique(np.concatenate([ends, chosen, np.asarray(always, np.intp)])).astype(np.intp)
 
 
 def settled_path(

@@ -52,10 +52,10 @@ def verdict_to_diagnostics(
         message=verdict["reason"] or "traversable",
         hardware_id=hardware_id,
     )
+    to_tell = {key: value for key, value in verdict.items() if key not in PER_WAYPOINT}
     status.values = [
         KeyValue(key=key, value=value if isinstance(value, str) else json.dumps(value))
-        for key, value in to_plain(verdict).items()
-        if key not in PER_WAYPOINT
+        for key, value in to_plain(to_tell).items()
     ]
     message = DiagnosticArray(status=[status])
     message.header.frame_id = frame_id

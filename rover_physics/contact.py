@@ -373,7 +373,7 @@ def _refine_circle(grid, samples, placement, wheel, m, touch):
 @kernel
 def _refine_from(grid, samples, placement, wheel, m, s, c, touch):
     """Search circle m near (s, c), keep what is nearer than before, and return the gap found."""
-    gap, s, c = _search_circle(grid, samples, placement, wheel, samples.laterals[m], s, c)
+    gap, s, c = search_circle(grid, samples, placement, wheel, samples.laterals[m], s, c)
     if gap < touch.circle_gap[wheel, m]:
         touch.circle_gap[wheel, m] = gap
         touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
@@ -381,7 +381,7 @@ def _refine_from(grid, samples, placement, wheel, m, s, c, touch):
 
 
 @kernel
-def _search_circle(grid, samples, placement, wheel, across, s, c):
+def search_circle(grid, samples, placement, wheel, across, s, c):
     """Return the smallest gap [m] of a circle near the angle of (s, c), and where: sine, cosine.
 
     On a plane the circle touches in the direction of the plane's normal, so the first trials look

@@ -76,8 +76,8 @@ def find_crossings(
     at = np.flatnonzero(jumps)
     open_ = _Stretches(
         np.column_stack([at, at + 1.0]),
-        np.stack([poses[at], poses[at + 1]], axis=1),
-        np.column_stack([results[at], results[at + 1]]),
+        poses[np.column_stack([at, at + 1])],
+        results[np.column_stack([at, at + 1])],
     )
     found = []
     while len(open_.place):
@@ -133,11 +133,12 @@ class _Stretches:
         k = len(self.place)
 
         def insert(ends: np.ndarray, between: np.ndarray) -> np.ndarray:
-            between = between.reshape(k, PIECES - 1, *between.shape[1:])
-            whole = np.concatenate([ends[:, :1], between, ends[:, 1:]], axis=1)
+            whole = np.empty((k, PIECES + 1, *ends.shape[2:]), ends.dtype)
+            whole[:, 0], whole[:, -1] = ends[:, 0], ends[:, 1]
+            whole[:, 1:-1] = between.reshape(k, PIECES - 1, *between.shape[1:])
             return whole.reshape(k * (PIECES + 1), *whole.shape[2:])
 
-        results = insert(self.results, np.asarray(inner.results))
+        results = insert(self.results, inner.results)
         known = np.flatnonzero(results["status"] != NOT_SETTLED)
         before, after = known[:-1], known[1:]
         same = before // (PIECES + 1) == after // (PIECES + 1)
@@ -153,11 +154,15 @@ def _in_order(found: list[Crossings]) -> Crossings:
     if not found:
         return Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_results(0))
     place = np.concatenate([part.place for part in found])
+    results, end = new_results(len(place)), 0
+    for part in found:
+        end += len(part.place)
+        results[end - len(part.place) : end] = part.results
     together = Crossings(
         place,
         np.concatenate([part.waypoint for part in found]),
         np.concatenate([part.poses for part in found]),
-        np.concatenate([part.results for part in found]).view(np.recarray),
+        results,
     )
     return together.select(np.argsort(place, kind="stable"))
 

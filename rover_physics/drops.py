@@ -122,9 +122,11 @@ def _measure_drops(
     descents[descents < ROUNDING] = 0.0
     sudden = (descents > HEIGHT_JUMP * radius) & (steps[:, None] <= 2.0 * SHORTEST)
     dropping = falling[:-1] | falling[1:] | sudden
-    drops, fallen, last = np.zeros((n, 6)), np.zeros(6), -1
-    for k in np.flatnonzero(dropping.any(axis=1)).tolist():
-        fallen = np.where(dropping[k], descents[k] + (fallen if k == last + 1 else 0.0), 0.0)
-        drops[owner[k + 1]] = np.maximum(drops[owner[k + 1]], fallen)
-        last = k
+    drops = np.zeros((n, 6))
+    for wheel in range(6):
+        fallen, last = 0.0, -1
+        for k in np.flatnonzero(dropping[:, wheel]).tolist():
+            fallen = descents[k, wheel] + (fallen if k == last + 1 else 0.0)
+            drops[owner[k + 1], wheel] = max(drops[owner[k + 1], wheel], fallen)
+            last = k
     return drops

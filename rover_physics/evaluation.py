@@ -8,7 +8,7 @@ from numba import prange
 from rover_physics.clearance import belly_clearance
 from rover_physics.contact import TOUCH
 from rover_physics.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
-from rover_physics.ground import friction_at, heights_of
+from rover_physics.ground import Grid, friction_at
 from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.linkage import PLACEMENT, place_masses
 from rover_physics.records import new_record, record_type
@@ -86,10 +86,10 @@ WORK = record_type(
 
 def new_results(n: int) -> Any:
     """Return the results (n,) of n poses, all NaN."""
-    blank = new_record(RESULT)
-    for name in RESULT.names or ():
-        blank[name] = 0 if name == "status" else np.nan
-    return np.full(n, blank, RESULT).view(np.recarray)
+    numbers = np.full((n, RESULT.itemsize // 8), np.nan)
+    results = numbers.view(RESULT)[:, 0]
+    results["status"] = 0
+    return results.view(np.recarray)
 
 
 def new_work() -> Any:
@@ -135,7 +135,9 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
     for wheel in range(6 if held.shape[0] > 0 else 0):
         touch.held_height[wheel] = held[i, wheel, 0]
         touch.held_angle[wheel] = held[i, wheel, 1]
-    grid = heights_of(ground)
+    grid = Grid(
+        ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution
+    )
     status = settle(
         grid, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
         q, placement, touch, work.J, work.step,
@@ -181,7 +183,9 @@ def _write_forces(ground, linkage, settings, work, result):
         minimise_friction(work.balance, largest, search)
     power = 0.0
     for wheel in range(6):
-        N, T, S = weight * search.N[wheel], weight * search.T[wheel], weight * search.S[wheel]
+        N = weight * search.wheel_loads[wheel]
+        T = weight * search.tangential[wheel]
+        S = weight * search.lateral[wheel]
         mu = search.mu[wheel]
         sinkage, resistance = 0.0, 0.0
         if settings.on_soil:

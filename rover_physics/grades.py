@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.limits import UNNEEDED_IN_A_FALL, Verdict, find_reasons
+from rover_physics.limits import Verdict, find_reasons
 from rover_physics.names import WHEELS
 from rover_physics.prediction import PathPrediction
 from rover_physics.reasons import Check, check_limits
@@ -108,17 +108,21 @@ def deciding_waypoint(grades: Sequence[Grade]) -> int:
     among = [i for i, grade in enumerate(grades) if GRADES.index(grade.grade) == worst]
     if worst == GRADES.index(IMPASSABLE):
         return among[0]
-    return min(among, key=lambda i: np.nan_to_num(grades[i].margin, nan=np.inf))
+    margins = np.array([grades[i].margin for i in among])
+    return among[int(np.argmin(np.where(np.isnan(margins), np.inf, margins)))]
 
 
-@dataclass(frozen=True)
-class _Decision:
+class _Decision(NamedTuple):
     """What decides about a waypoint under one policy; its reason is empty where passable."""
 
     constraint: str
     wheel: int
     margin: float
     reason: str
+
+
+_NOTHING_ASKED = _Decision("", -1, float("nan"), "")
+"""Where a wheel rolls off an edge none of WHEEL_CONSTRAINTS counts: see UNNEEDED_IN_A_FALL."""
 
 
 def _grade(equal: _Decision, optimal: _Decision) -> Grade:
@@ -164,18 +168,21 @@ def _look_between(rover: Rover, prediction: PathPrediction, decisions: list[_Dec
 def _decide_rows(rover: Rover, prediction: PathPrediction) -> Iterator[_Decision]:
     checks = {check.code: check for check in check_limits(rover, prediction)}
     codes, reasons = find_reasons(rover, prediction)
-    falls = np.asarray(prediction.falling.any(axis=1))
-    for i, (code, reason) in enumerate(zip(codes, reasons, strict=True)):
-        if code:
-            wheel, margin = _amount(checks.get(code), i)
-            yield _Decision(code, wheel, margin, reason)
-            continue
-        asked = [c for c in WHEEL_CONSTRAINTS if not (falls[i] and c in UNNEEDED_IN_A_FALL)]
-        if not asked:
-            yield _Decision("", -1, float("nan"), "")
-            continue
-        tightest = min(asked, key=lambda c: checks[c].margin[i])
-        yield _Decision(tightest, *_amount(checks[tightest], i), "")
+    asked = [checks[code] for code in WHEEL_CONSTRAINTS]
+    margins = np.stack([check.margin for check in asked])
+    tightest = np.argmin(margins, axis=0)
+    rows = np.arange(len(codes))
+    wheels = np.stack([check.wheel for check in asked])[tightest, rows].tolist()
+    least = margins[tightest, rows].tolist()
+    falls = np.asarray(prediction.falling.any(axis=1)).tolist()
+    for i, which in enumerate(tightest.tolist()):
+        if codes[i]:
+            wheel, margin = _amount(checks.get(codes[i]), i)
+            yield _Decision(codes[i], wheel, margin, reasons[i])
+        elif falls[i]:
+            yield _NOTHING_ASKED
+        else:
+            yield _Decision(WHEEL_CONSTRAINTS[which], wheels[i], least[i], "")
 
 
 def _amount(check: Check | None, i: int) -> tuple[int, float]:

@@ -10,7 +10,7 @@ from rover_physics.kernels import kernel
 from rover_physics.terrain import Terrain
 
 BLOCK = 4
-"""Cells along the side of a block."""
+"""Cells along the side of a block, a power of 2."""
 
 
 class Grid(NamedTuple):
@@ -51,35 +51,43 @@ class Ground(NamedTuple):
 def pack_ground(terrain: Terrain) -> Ground:
     """Return `terrain` as the kernels read it, with a soil that is none."""
     elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
+    highest = _reduce_blocks(elevation, np.fmax)
+    some_unknown = _reduce_blocks(np.isnan(elevation), np.logical_or)
     friction = np.empty((0, 0)) if terrain.friction is None else terrain.friction
     return Ground(
         elevation,
-        _find_block_ceiling(elevation, np.inf),
+        np.where(some_unknown, np.inf, highest),
         float(terrain.origin[0]),
         float(terrain.origin[1]),
         1.0 / float(terrain.resolution),
-        _find_block_ceiling(elevation, -np.inf),
+        np.where(np.isnan(highest), -np.inf, highest),
         np.ascontiguousarray(friction, dtype=np.float64),
         np.empty((0, 0), np.int32) if terrain.soil is None else terrain.soil + np.int32(1),
         np.zeros((1, 8)),
     )
 
 
-def _find_block_ceiling(elevation: np.ndarray, unknown: float) -> np.ndarray:
-    """Return the highest elevation of each block, unknown cells counting as `unknown`."""
-    ny, nx = elevation.shape
-    rows, columns = -(-ny // BLOCK), -(-nx // BLOCK)
-    padded = np.full((rows * BLOCK, columns * BLOCK), -np.inf)
-    padded[:ny, :nx] = np.where(np.isnan(elevation), unknown, elevation)
-    return padded.reshape(rows, BLOCK, columns, BLOCK).max(axis=(1, 3))
+def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
+    """Reduce each block of cells to one; blocks at the far edges count their last cells twice."""
+    ny, nx = cells.shape
+    missing = (0, -ny % BLOCK), (0, -nx % BLOCK)
+    if missing != ((0, 0), (0, 0)):
+        cells = np.pad(cells, missing, mode="edge")
+    halvings = BLOCK.bit_length() - 1
+    for _ in range(halvings):
+        cells = reduce(cells[0::2], cells[1::2])
+    for _ in range(halvings):
+        cells = reduce(cells[:, 0::2], cells[:, 1::2])
+    return cells
 
 
-@kernel
-def heights_of(ground):
-    """Return the Grid of a Ground; fewer arrays are quicker to hand from kernel to kernel."""
-    return Grid(
-        ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution
-    )
+def heights_of(ground: Ground) -> Grid:
+    """Return the Grid of a Ground.
+
+    Not a kernel: kernels count no references, so none may return an array. In a kernel write
+    ``Grid(...)``; fewer arrays are quicker to hand from kernel to kernel.
+    """
+    return Grid(ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution)
 
 
 @kernel

@@ -26,7 +26,7 @@ COMPILE_OPTIONS = {
 
 
 def kernel(function):
-    """Compile a scalar function that other kernels call; it can't allocate.
+    """Compile a scalar function that other kernels call; it can't allocate, nor return an array.
 
     Arrays are not reference-counted in it: counting every array of every argument at every call
     took most of the time of a settled pose.

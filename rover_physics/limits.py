@@ -1,6 +1,6 @@
 """Safety limits held against a prediction: whether each waypoint is passable, and if not, why."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -73,10 +73,22 @@ class Verdict:
     """Largest drop of a wheel that rolled off an edge [m]."""
     max_sinkage: float
     """Largest sinkage of a wheel on the settled part [m]; 0 on ground that does not yield."""
+    map_sigmas: float = 0.0
+    """Standard deviations by which the heights of the map may be wrong; 0 where it is exact."""
+    tip_over_ratio_bound: float = float("nan")
+    """Smallest tip-over ratio that is possible then, NaN where the map is exact."""
+    friction_utilisation_bound: float = float("nan")
+    """Largest possible friction utilisation."""
+    torque_saturation_bound: float = float("nan")
+    """Largest possible torque saturation."""
+    tilt_bound: float = float("nan")
+    """Largest possible tilt of the body [rad]."""
+    belly_clearance_bound: float = float("nan")
+    """Smallest possible belly clearance [m]."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as JSON can hold it: lists for tuples, None for NaN and infinity."""
-        return to_plain(asdict(self))
+        return to_plain({field.name: getattr(self, field.name) for field in fields(self)})
 
 
 def judge(rover: Rover, prediction: PathPrediction) -> Verdict:

@@ -6,9 +6,13 @@ from typing import Any
 
 import numpy as np
 
+_PLAIN = (str, int, bool, type(None))
+
 
 def to_plain(value: Any) -> Any:
     """Return a value of JSON's own types: numpy unwrapped, numbers that are not finite as None."""
+    if type(value) in _PLAIN:
+        return value
     if isinstance(value, Mapping):
         return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):

@@ -1,9 +1,13 @@
 """What the model predicts along a path: one frozen record of arrays, a row per waypoint."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from rover_physics.uncertainty import PathBounds
 
 Floats = NDArray[np.float64]
 
@@ -80,3 +84,5 @@ class PathPrediction:
     """(n,) index of the waypoint a row belongs to: its own, or the next if in between."""
     policy: str
     """Torque policy: "equal" or "optimal"."""
+    bounds: "PathBounds | None" = None
+    """Bounds on all this where the map is uncertain, added by `judge_path`."""

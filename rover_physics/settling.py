@@ -71,7 +71,8 @@ def settle(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
         _touch_all(grid, samples, placement, EXACT, touch)
         if attempt > 0:
             relaxed = RELAXED * linkage.radius * RELAXED_FURTHER ** (attempt - 1)
-            _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+            scope = EXACT if attempt == RECOVERIES - 1 else QUICK
+            _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
         _newton(grid, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
         status, worst = _touch_all(grid, samples, placement, EXACT, touch)
     if status != TOUCHING:
@@ -130,7 +131,7 @@ def _newton(grid, linkage, samples, x, y, yaw, q, placement, scope, touch, J, st
 
 
 @kernel
-def _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Let the wheels fall or rise by part of their gaps until none is above `relaxed` [m].
 
     Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
@@ -139,9 +140,10 @@ def _relax(relaxed, grid, linkage, samples, x, y, yaw, q, placement, touch, J, s
     for _ in range(RELAXATION_STEPS):
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
-        status, worst = _touch_all(grid, samples, placement, EXACT, touch)
+        status, worst = _touch_all(grid, samples, placement, scope, touch)
         if not worst > relaxed:
-            return
+            break
+    _touch_all(grid, samples, placement, EXACT, touch)
 
 
 @kernel
@@ -165,6 +167,15 @@ def _limit_step(step):
 @kernel
 def _find_step(linkage, placement, touch, ground_is, J, step):
     """Solve J step = gaps; the ground counts as SLOPED as it is, or as LEVEL under each wheel."""
+    write_gap_rates(linkage, placement, touch, ground_is, J)
+    for i in range(6):
+        step[i, 0] = touch.gap[i]
+    return solve_in_place(J, step, 6, 1)
+
+
+@kernel
+def write_gap_rates(linkage, placement, touch, ground_is, J):
+    """Write the derivatives of the gaps by q into J (6, 6); the ground is as in `_find_step`."""
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
     rocker_pivots, bogie_pivots = placement.rocker_pivots, placement.bogie_pivots
@@ -190,8 +201,6 @@ def _find_step(linkage, placement, touch, ground_is, J, step):
             dy = point[i, 1] - bogie_pivots[side, 1]
             dz = point[i, 2] - bogie_pivots[side, 2]
             J[i, 4 + side] = _gap_rate(R[0, 1], R[1, 1], R[2, 1], dx, dy, dz, nx, ny)
-        step[i, 0] = touch.gap[i]
-    return solve_in_place(J, step, 6, 1)
 
 
 @kernel

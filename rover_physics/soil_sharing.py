@@ -36,15 +36,15 @@ def share_forces_on_soil(ground, linkage, settings, work):
             least = needed
             _copy(search, best)
     for wheel in range(6):
-        search.N[wheel], search.T[wheel] = best[0, wheel], best[1, wheel]
-        search.S[wheel] = best[2, wheel]
+        search.wheel_loads[wheel], search.tangential[wheel] = best[0, wheel], best[1, wheel]
+        search.lateral[wheel] = best[2, wheel]
 
 
 @kernel
 def _copy(search, best):
     for wheel in range(6):
-        best[0, wheel], best[1, wheel] = search.N[wheel], search.T[wheel]
-        best[2, wheel] = search.S[wheel]
+        best[0, wheel], best[1, wheel] = search.wheel_loads[wheel], search.tangential[wheel]
+        best[2, wheel] = search.lateral[wheel]
 
 
 @kernel
@@ -54,7 +54,7 @@ def _write_grip(ground, linkage, settings, work):
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         soil = ground.soils[work.soil_rows[wheel]]
-        N, mu = weight * search.N[wheel], search.mu[wheel]
+        N, mu = weight * search.wheel_loads[wheel], search.mu[wheel]
         solved = solve_wheel(soil, mu, linkage.radius, linkage.width, N, 0.0, 0.0)
         search.mu[wheel] = effective_friction(soil, mu, linkage.radius, linkage.width, N)
         search.resistance[wheel] = settings.direction * solved[2] / weight
@@ -73,9 +73,9 @@ def _needed(ground, linkage, settings, work):
             search.mu[wheel],
             linkage.radius,
             linkage.width,
-            weight * search.N[wheel],
-            settings.direction * weight * search.T[wheel],
-            weight * search.S[wheel],
+            weight * search.wheel_loads[wheel],
+            settings.direction * weight * search.tangential[wheel],
+            weight * search.lateral[wheel],
         )
         saturation = abs(solved[4]) / settings.allowed_torque
         worst = max(worst, solved[5], saturation if saturation > 1.0 else 0.0)

@@ -65,14 +65,15 @@ def tip_over_angles(corners, centre, force, moment):
     smallest_measure = np.inf
     count = corners.shape[0]
     for edge in range(count):
-        angle, measure = _edge_measure(corners, edge, (edge + 1) % count, centre, force, moment)
+        angle, measure = measure_edge(corners, edge, (edge + 1) % count, centre, force, moment)
         smallest_angle = min(smallest_angle, angle)
         smallest_measure = min(smallest_measure, measure)
     return smallest_angle, smallest_measure
 
 
 @kernel
-def _edge_measure(corners, start, end, centre, force, moment):
+def measure_edge(corners, start, end, centre, force, moment):
+    """Return tip-over angle [rad] and force-angle measure [N m] of one edge of the polygon."""
     ax, ay, az = (
         corners[end, 0] - corners[start, 0],
         corners[end, 1] - corners[start, 1],

@@ -170,10 +170,13 @@ def _accumulate(increments: np.ndarray, settled: np.ndarray) -> np.ndarray:
 
 def warm_up() -> None:
     """Compile the kernels, or load them from the cache, by sweeping a level patch."""
+    from rover_physics.uncertainty import bound_path  # it asks for sweeps itself
+
     rover = load_rover("lsr1")
     patch = Terrain(np.zeros((64, 64)), 0.05, (-1.6, -1.6))
     for layer in (None, np.ones((64, 64))):
-        sweep_path(rover, replace(patch, friction=layer), np.zeros((1, 3)))
+        ground = replace(patch, friction=layer, elevation_std=layer)
+        bound_path(rover, ground, sweep_path(rover, ground, np.zeros((1, 3))))
 
 
 if __name__ == "__main__":

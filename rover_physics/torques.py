@@ -24,19 +24,21 @@ LOAD, TORQUE, FRICTION = np.arange(3)
 FOUND, LIFTS, SATURATES = np.arange(3)
 LEVELS = 60
 NEWTON_STEPS = 12
-STAY = 0.1
+STAY = 0.25
 """Share of the old level kept above what the centre needs, so that the centre stays inside."""
 LOAD_KEPT = 1e-4
 """Wheel load, in weights, that counts as on the ground."""
-PRECISION = 1e-5
+CENTRED = 0.1
+"""Newton decrement at which a centre is near enough."""
+PRECISION = 5e-5
 """Relative precision of the smallest level."""
 
 
 TORQUE_SEARCH = record_type(
     ("y", float, (FREE_FORCES,)),  # the free degrees, in the order of the columns of BALANCE
-    ("N", float, (6,)),  # wheel loads at y
-    ("T", float, (6,)),  # tractions at y
-    ("S", float, (6,)),  # lateral forces at y
+    ("wheel_loads", float, (6,)),  # N at y
+    ("tangential", float, (6,)),  # T at y
+    ("lateral", float, (6,)),  # S at y
     ("mu", float, (6,)),  # friction coefficients
     ("resistance", float, (6,)),  # motion resistances, against the forward way, beside T
     ("H", float, (FREE_FORCES, FREE_FORCES)),  # Hessian of the barrier
@@ -56,16 +58,16 @@ def apply_torques(balance, free, search):
             N += balance.normal[i, 1 + k] * y[k]
             T += balance.tangential[i, 1 + k] * y[k]
             S += balance.lateral[i, 1 + k] * y[k]
-        search.N[i], search.T[i], search.S[i] = N, T, S
+        search.wheel_loads[i], search.tangential[i], search.lateral[i] = N, T, S
 
 
 @kernel
 def take_equal_torques(balance, search):
     """Write the wheel forces of equal torques into the search."""
     for wheel in range(6):
-        search.N[wheel] = balance.normal[wheel, 0]
-        search.T[wheel] = balance.tangential[wheel, 0]
-        search.S[wheel] = balance.lateral[wheel, 0]
+        search.wheel_loads[wheel] = balance.normal[wheel, 0]
+        search.tangential[wheel] = balance.tangential[wheel, 0]
+        search.lateral[wheel] = balance.lateral[wheel, 0]
 
 
 @kernel
@@ -106,12 +108,12 @@ def _needed(search, goal):
     worst = -np.inf
     for i in range(6):
         if goal == LOAD:
-            level = -search.N[i]
+            level = -search.wheel_loads[i]
         elif goal == TORQUE:
-            level = abs(search.T[i] + search.resistance[i])
+            level = abs(search.tangential[i] + search.resistance[i])
         else:
-            across = np.sqrt(search.T[i] * search.T[i] + search.S[i] * search.S[i])
-            level = across / (search.mu[i] * search.N[i])
+            T, S = search.tangential[i], search.lateral[i]
+            level = np.sqrt(T * T + S * S) / (search.mu[i] * search.wheel_loads[i])
         worst = max(worst, level)
     return worst
 
@@ -146,7 +148,7 @@ def _take_newton_step(balance, free, search):
     for k in range(free):
         decrement += search.gradient[k] * search.g[k, 0]
     decrement = np.sqrt(max(decrement, 0.0))
-    if not decrement > 1e-3:
+    if not decrement > CENTRED:
         return False
     for k in range(free):
         search.y[k] -= search.g[k, 0] / (1.0 + decrement)
@@ -164,36 +166,40 @@ def _write_barrier(balance, free, goal, level, max_traction, search):
         if goal == FRICTION:
             _add_cone(balance, free, i, level * search.mu[i], search)
         else:
-            room = search.N[i] + (level if goal == LOAD else 0.0)
+            room = search.wheel_loads[i] + (level if goal == LOAD else 0.0)
             _add_log(free, balance.normal, i, 1.0 / room, 1.0 / (room * room), search)
         if traction < np.inf:
-            thrust = search.T[i] + search.resistance[i]
+            thrust = search.tangential[i] + search.resistance[i]
             above, below = traction - thrust, traction + thrust
             slope = 1.0 / below - 1.0 / above
             curvature = 1.0 / (below * below) + 1.0 / (above * above)
             _add_log(free, balance.tangential, i, slope, curvature, search)
 
+    for j in range(free):
+        for k in range(j):
+            search.H[k, j] = search.H[j, k]
+
 
 @kernel
 def _add_log(free, rows, i, slope, curvature, search):
-    """Add -log of a linear function's room: rows[i] is its gradient."""
+    """Add -log of a linear function's room, rows[i] its gradient; of H the lower half."""
     for j in range(free):
         search.g[j, 0] -= slope * rows[i, 1 + j]
-        for k in range(free):
+        for k in range(j + 1):
             search.H[j, k] += curvature * rows[i, 1 + j] * rows[i, 1 + k]
 
 
 @kernel
 def _add_cone(balance, free, i, mu, search):
-    """Add -log((mu N)^2 - T^2 - S^2) of wheel i."""
+    """Add -log((mu N)^2 - T^2 - S^2) of wheel i; of H the lower half."""
     n, t, s = balance.normal, balance.tangential, balance.lateral
-    N, T, S = search.N[i], search.T[i], search.S[i]
+    N, T, S = search.wheel_loads[i], search.tangential[i], search.lateral[i]
     room = mu * mu * N * N - T * T - S * S
     for j in range(free):
         nj, tj, sj = mu * mu * n[i, 1 + j], t[i, 1 + j], s[i, 1 + j]
         gj = 2.0 * (N * nj - T * tj - S * sj) / room
         search.g[j, 0] -= gj
-        for k in range(free):
+        for k in range(j + 1):
             nk, tk, sk = n[i, 1 + k], t[i, 1 + k], s[i, 1 + k]
             gk = 2.0 * (mu * mu * N * nk - T * tk - S * sk) / room
             search.H[j, k] += gj * gk - 2.0 * (nj * nk - tj * tk - sj * sk) / room

@@ -25,6 +25,7 @@ from rover_physics.rover import Rover
 from rover_physics.soil import use_of_shear
 from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain
+from rover_physics.uncertainty import SIGMAS, bound_path, check_sigmas, judge_bounds
 
 LOOK_AHEAD = 1.5
 """Wheelbases that the way on is looked at beyond as much way as the rover went in."""
@@ -41,14 +42,24 @@ UNKNOWN = ("off_map", "unknown_ground")
 
 
 def judge_path(
-    rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: Any
+    rover: Rover,
+    terrain: Terrain,
+    poses: ArrayLike,
+    *,
+    sigmas: float | None = SIGMAS,
+    **arguments: Any,
 ) -> tuple[PathPrediction, Verdict]:
     """Predict a path and judge it, with the question whether the rover would be trapped on it.
+
+    On a terrain with a layer `elevation_std` the prediction has bounds, and the verdict also
+    refuses what the heights of the map make possible. It passes nothing that it would refuse
+    without the layer.
 
     Args:
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) waypoints, x, y [m] and yaw [rad].
+        sigmas: Standard deviations of the map to allow for; 0 or None takes it as exact.
         **arguments: Those of `sweep_path`.
 
     Raises:
@@ -56,6 +67,19 @@ def judge_path(
         ModelError: an argument that makes no sense.
         SoilError: a soil that is not among the presets.
     """
+    check_sigmas(sigmas)
+    prediction, verdict = _judge_as_mapped(rover, terrain, poses, arguments)
+    bounds = bound_path(rover, terrain, prediction, sigmas, **arguments)
+    if bounds is None:
+        return prediction, verdict
+    verdict = judge_bounds(rover, prediction, bounds, verdict)
+    return replace(prediction, bounds=bounds), verdict
+
+
+def _judge_as_mapped(
+    rover: Rover, terrain: Terrain, poses: ArrayLike, arguments: dict[str, Any]
+) -> tuple[PathPrediction, Verdict]:
+    """Predict and judge a path on the heights of the map as they are."""
     prediction = sweep_path(rover, terrain, poses, **arguments)
     verdict = judge(rover, prediction)
     if verdict.code == "wheel_drop":

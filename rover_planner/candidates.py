@@ -9,8 +9,6 @@ and lines of Dubins (1957) take over; they connect any two poses with the smalle
 is always a candidate.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
@@ -29,10 +27,12 @@ MAX_WAYPOINTS = 100_000
 
 _SAME_PLACE = 1e-9
 _LONG_WAY_ROUND = 1.5
-_FINE_SAMPLES = 2001
+_FINE_SAMPLES = 501
+_FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
+"""Parameters of the fine samples, and half-way between them."""
+_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)[:, None]
+"""First derivative there of a bump of one metre."""
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
-
-Curve = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def generate_candidates(
@@ -96,13 +96,13 @@ def path_length(poses: np.ndarray) -> float:
 
 def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:
     """Sample the direct curve and its neighbours; nothing where the direct one is too tight."""
-    scale = next(
-        (s for s in _TANGENT_SCALES if _drivable(_connect(start, goal, s), min_radius)), None
-    )
-    if scale is None:
-        return []
-    curves = [_connect(start, goal, scale, offset) for offset in lateral_offsets(count, spacing)]
-    return [_sample(curve, waypoint_spacing) for curve in curves if _drivable(curve, min_radius)]
+    for scale in _TANGENT_SCALES:
+        fan = _Fan(start, goal, scale)
+        if fan.is_drivable(0.0, min_radius):
+            offsets = lateral_offsets(count, spacing)
+            drivable = [one for one in offsets if fan.is_drivable(one, min_radius)]
+            return [fan.sample(offset, waypoint_spacing) for offset in drivable]
+    return []
 
 
 def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
@@ -113,56 +113,63 @@ def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.nda
     return [path for path in paths if path_length(path) <= longest]
 
 
-def _connect(start, goal, scale: float, offset: float = 0.0) -> Curve:
-    """Return a curve of its parameter in 0 to 1: the Hermite cubic plus a bump of `offset` metres.
+class _Fan:
+    """Curves of a parameter in 0 to 1: the Hermite cubic, and beside it with bumps of some metres.
 
-    `scale` times the chord is the length of the end tangents. The curve returns positions and
-    first derivatives, each (n, 2).
+    `scale` times the chord is the length of the end tangents. Slopes at the fine samples, and
+    half-way between them, are what all curves of a fan have in common but for their bump.
     """
-    chord = goal[:2] - start[:2]
-    length = np.hypot(*chord)
-    left = np.array([-chord[1], chord[0]]) / length
-    m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
-    m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
 
-    def curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def __init__(self, start: np.ndarray, goal: np.ndarray, scale: float):
+        self._start, self._chord = start[:2], goal[:2] - start[:2]
+        length = np.hypot(*self._chord)
+        self._left = np.array([-self._chord[1], self._chord[0]]) / length
+        self._m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
+        self._m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
+        self._fine = self._slope(_FINE, 0.0)
+
+    def is_drivable(self, offset: float, min_radius: float) -> bool:
+        """Tell whether the tightest place of a curve is no tighter than `min_radius` [m]."""
+        slope = self._fine_slope(offset)[::2]
+        speed = np.hypot(slope[:, 0], slope[:, 1])
+        if speed.min() <= 1e-6 * speed.max():
+            return False
+        before, after = slope[:-1], slope[1:]
+        across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+        along = before[:, 0] * after[:, 0] + before[:, 1] * after[:, 1]
+        turned = np.abs(np.arctan2(across, along))
+        driven = 0.5 * (speed[1:] + speed[:-1]) / (len(speed) - 1)
+        return bool(np.all(turned * min_radius <= driven * (1 + 1e-9)))
+
+    def sample(self, offset: float, waypoint_spacing: float) -> np.ndarray:
+        """Sample poses (n, 3) equally far apart along a curve."""
+        slope = self._fine_slope(offset)
+        speed = np.hypot(slope[:, 0], slope[:, 1])
+        ends, middles = speed[::2], speed[1::2]
+        pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
+        driven = np.concatenate([[0.0], np.cumsum(pieces)])
+        steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
+        marks = np.linspace(0.0, driven[-1], steps + 1)
+        t = CubicHermiteSpline(driven, _FINE[::2], 1 / ends)(marks)
+        place, slope = self._place(t, offset), self._slope(t, offset)
+        return np.column_stack([place, np.arctan2(slope[:, 1], slope[:, 0])])
+
+    def _fine_slope(self, offset: float) -> np.ndarray:
+        """Return the first derivative of a curve at the fine samples and between them, (n, 2)."""
+        return self._fine + _FINE_BUMP * (offset * self._left)
+
+    def _place(self, t: np.ndarray, offset: float) -> np.ndarray:
         t = t[:, None]
         h = t * t * (3 - 2 * t)
-        dh = 6 * t * (1 - t)
-        place = start[:2] + h * chord + t * (1 - t) ** 2 * m0 - t * t * (1 - t) * m1
-        slope = dh * chord + (1 - t) * (1 - 3 * t) * m0 + t * (3 * t - 2) * m1
-        bump = 0.5 * offset * (1 - np.cos(2 * np.pi * t))
-        dbump = np.pi * offset * np.sin(2 * np.pi * t)
-        return place + bump * left, slope + dbump * left
+        place = self._start + h * self._chord
+        place = place + t * (1 - t) ** 2 * self._m0 - t * t * (1 - t) * self._m1
+        return place + 0.5 * offset * (1 - np.cos(2 * np.pi * t)) * self._left
 
-    return curve
-
-
-def _drivable(curve: Curve, min_radius: float) -> bool:
-    """Tell whether the tightest place of a curve is no tighter than `min_radius` [m]."""
-    _, slope = curve(np.linspace(0.0, 1.0, _FINE_SAMPLES))
-    speed = np.hypot(slope[:, 0], slope[:, 1])
-    if speed.min() <= 1e-6 * speed.max():
-        return False
-    yaw = np.unwrap(np.arctan2(slope[:, 1], slope[:, 0]))
-    turned = np.abs(np.diff(yaw))
-    driven = 0.5 * (speed[1:] + speed[:-1]) / (_FINE_SAMPLES - 1)
-    return bool(np.all(turned * min_radius <= driven * (1 + 1e-9)))
-
-
-def _sample(curve: Curve, waypoint_spacing: float) -> np.ndarray:
-    """Sample poses (n, 3) equally far apart along a curve."""
-    t = np.linspace(0.0, 1.0, _FINE_SAMPLES)
-    _, slope = curve(t)
-    speed = np.hypot(slope[:, 0], slope[:, 1])
-    middle = np.hypot(*curve(0.5 * (t[1:] + t[:-1]))[1].T)
-    driven = np.concatenate(
-        [[0.0], np.cumsum((speed[1:] + 4 * middle + speed[:-1]) / 6 / (_FINE_SAMPLES - 1))]
-    )
-    steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
-    parameter = CubicHermiteSpline(driven, t, 1 / speed)(np.linspace(0.0, driven[-1], steps + 1))
-    place, slope = curve(parameter)
-    return np.column_stack([place, np.arctan2(slope[:, 1], slope[:, 0])])
+    def _slope(self, t: np.ndarray, offset: float) -> np.ndarray:
+        t = t[:, None]
+        slope = 6 * t * (1 - t) * self._chord
+        slope = slope + (1 - t) * (1 - 3 * t) * self._m0 + t * (3 * t - 2) * self._m1
+        return slope + np.pi * offset * np.sin(2 * np.pi * t) * self._left
 
 
 def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:

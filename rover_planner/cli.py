@@ -69,6 +69,13 @@ def predict(
         Vector | None,
         typer.Option(metavar="MX MY MZ", help="Moment on the arm's tip in N m, body frame."),
     ] = None,
+    sigmas: Annotated[
+        float,
+        typer.Option(
+            metavar="K",
+            help="Standard deviations to allow for where the map has elevation_std; 0: none.",
+        ),
+    ] = 3.0,
     grade: Annotated[
         bool,
         typer.Option("--grade", help="Add the grade of each waypoint, by both torque policies."),
@@ -105,10 +112,12 @@ def predict(
     }
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
-        judged = judge_path(model, ground, path, policy=policy, **options)
+        judged = judge_path(model, ground, path, policy=policy, sigmas=sigmas, **options)
         if grade:
             progress("grade the waypoints")
-        grades = grade_judged(model, ground, *judged, **options) if grade else None
+        grades = (
+            grade_judged(model, ground, *judged, sigmas=sigmas, **options) if grade else None
+        )
         if torque_ranges:
             progress("find the ranges of the torques")
         ranges = find_torque_ranges(model, ground, path, **options) if torque_ranges else None

@@ -19,6 +19,7 @@ from msg_adapters.elevation import CELL_HEIGHTS
 from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
+from rover_physics.uncertainty import SIGMAS
 from rover_planner.errors import PlanningError
 from rover_planner.qos import MAP_DURABILITIES
 
@@ -146,8 +147,9 @@ TRAVERSE_SERVER = (
     ),
     ParameterSpec(
         "plan_spacing",
-        0.2,
-        "Distance between poses of a plan; 0 returns every waypoint.",
+        0.1,
+        "Distance between poses of a plan, which has those where the grade changes too; "
+        "0 returns every waypoint.",
         "m",
         bounds=(0.0, 100.0),
     ),
@@ -185,6 +187,13 @@ TRAVERSE_SERVER = (
     ),
     ParameterSpec(
         "max_gap", 0.2, "Widest unknown region that is interpolated.", "m", bounds=(0.0, 100.0)
+    ),
+    ParameterSpec(
+        "map_sigmas",
+        SIGMAS,
+        "Standard deviations by which heights may be wrong where the map has elevation_std; "
+        "0 takes them as exact.",
+        bounds=(0.0, 10.0),
     ),
     ParameterSpec(
         "terrain_file", "", "Terrain file to start with; empty waits for a map.", read_only=True

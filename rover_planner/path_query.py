@@ -12,6 +12,7 @@ from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover
 from rover_physics.terrain import Terrain
 from rover_physics.trap import judge_path
+from rover_physics.uncertainty import SIGMAS
 from rover_planner.candidates import generate_candidates, path_length
 
 RISK_STEP = 0.05
@@ -38,6 +39,8 @@ class PathQueryOptions:
     """Preset soil where the terrain names none; None: Coulomb friction."""
     payload: float | None = None
     """Mass at the tip of the manipulator [kg]; None: that of the rover file."""
+    map_sigmas: float = SIGMAS
+    """Standard deviations of an uncertain map to allow for; 0 takes its heights as exact."""
 
     def ground_and_load(self) -> dict[str, Any]:
         """Return the arguments of `sweep_path` that these options set, but for the policy."""
@@ -176,6 +179,7 @@ def check_path(
         poses,
         policy=options.policy,
         joint_angles=joint_angles,
+        sigmas=options.map_sigmas,
         **options.ground_and_load(),
     )
     return Candidate(prediction.poses, prediction, verdict, path_cost(rover, prediction, verdict))
@@ -203,15 +207,21 @@ def path_risk(rover: Rover, verdict: Verdict) -> float:
     """Return how much of a safety limit the path uses up, of the limit it comes closest to.
 
     Friction utilisation, torque saturation and tilt count as value over limit; the tip-over ratio
-    and the belly clearance, which must not fall short, as limit over value. 1 is at a limit.
+    and the belly clearance, which must not fall short, as limit over value. 1 is at a limit. On an
+    uncertain map the values are the bounds.
     """
     limits = rover.limits
+    friction = np.fmax(verdict.max_friction_utilisation, verdict.friction_utilisation_bound)
+    torque = np.fmax(verdict.max_torque_saturation, verdict.torque_saturation_bound)
+    tilt = np.fmax(verdict.max_tilt, verdict.tilt_bound)
+    tip_over = np.fmin(verdict.min_tip_over_ratio, verdict.tip_over_ratio_bound)
+    belly = np.fmin(verdict.min_belly_clearance, verdict.belly_clearance_bound)
     return max(
-        verdict.max_friction_utilisation / limits.friction_utilisation,
-        verdict.max_torque_saturation / limits.torque_saturation,
-        verdict.max_tilt / limits.tilt,
-        limits.tip_over_ratio / max(verdict.min_tip_over_ratio, 1e-9),
-        limits.belly_clearance / max(verdict.min_belly_clearance, 1e-9),
+        friction / limits.friction_utilisation,
+        torque / limits.torque_saturation,
+        tilt / limits.tilt,
+        limits.tip_over_ratio / max(tip_over, 1e-9),
+        limits.belly_clearance / max(belly, 1e-9),
     )
 
 

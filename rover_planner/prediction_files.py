@@ -13,6 +13,7 @@ from rover_physics.grades import Grade
 from rover_physics.limits import Verdict
 from rover_physics.prediction import PathPrediction
 from rover_physics.torque_ranges import TorqueRanges
+from rover_physics.uncertainty import BOUNDED_VALUES
 from rover_planner.errors import PlanningError
 
 ARRAYS = (
@@ -80,7 +81,8 @@ def write_prediction(
     """Write a prediction and its verdict to an .npz file of exactly that name.
 
     Beside the ARRAYS it holds `reason` (n,) text, empty where passable, `traversable` () bool and
-    `first_failure` () int, -1 if there is none.
+    `first_failure` () int, -1 if there is none; on an uncertain map `map_sigmas` () and for each
+    of BOUNDED_VALUES its `..._bounds`, smallest and largest in the last axis.
 
     Args:
         path: The file; it is overwritten.
@@ -99,6 +101,10 @@ def write_prediction(
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
     arrays["traversable"] = np.array(verdict.traversable, dtype=np.bool_)
     arrays["first_failure"] = np.array(verdict.first_failure, dtype=np.int64)
+    if prediction.bounds is not None:
+        arrays["map_sigmas"] = np.array(prediction.bounds.sigmas)
+        for name in BOUNDED_VALUES:
+            arrays[f"{name}_bounds"] = getattr(prediction.bounds, name)
     if grades is not None:
         for name, field in (("", "grade"), ("_constraint", "constraint"), ("_wheel", "wheel")):
             texts = [getattr(grade, field) for grade in grades]

@@ -56,7 +56,7 @@ class ReachQuery:
         """
         want = service.refuse_for_want()
         if want is not None:
-            return refuse_reach(want.verdict["code"], want.verdict["reason"])
+            return refuse_reach(want.code, want.reason)
         if self._target is None:
             return refuse_reach("no_target", self._target_refusal)
         if self._wrench_refusal:

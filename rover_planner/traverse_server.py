@@ -1,8 +1,10 @@
 """The node /traverse_server: asks and answers over ROS 2 whether the rover can traverse."""
 
+import gc
 import sys
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 from urllib.parse import unquote, urlparse
@@ -10,60 +12,35 @@ from urllib.parse import unquote, urlparse
 import numpy as np
 import rclpy
 import rclpy.logging
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan, LoadMap
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState, PointCloud2
-from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_occupancy_grid
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
 from msg_adapters.joints import joint_positions
-from msg_adapters.markers import cleared_markers, path_markers
 from msg_adapters.paths import (
-    decimate,
-    empty_path,
     path_to_poses,
-    settled_path,
     stamped_pose_to_array,
 )
-from msg_adapters.predictions import (
-    MEASURES,
-    empty_trajectory,
-    joint_trajectory,
-    tip_over_array,
-    waypoint_array,
-)
-from msg_adapters.verdicts import verdict_to_diagnostics, verdict_to_json
-from rover_physics.names import WHEELS
+from msg_adapters.verdicts import verdict_to_json
 from rover_physics.sweep import warm_up
 from rover_physics.terrain import Terrain, load_terrain
+from rover_planner.afterwards import Afterwards
+from rover_planner.judgement import Judgement, refusal
 from rover_planner.parameters import TRAVERSE_SERVER, check_changes, declare_parameters
-from rover_planner.qos import map_subscriptions_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.reach_topics import ReachTopics
 from rover_planner.refusals import BAD_INPUT, answer_or_refuse
-from rover_planner.traverse_service import (
-    Judgement,
-    TraverseService,
-    refusal,
-    settings_from_parameters,
-)
+from rover_planner.result_topics import ResultTopics
+from rover_planner.traverse_service import TraverseService, settings_from_parameters
 
 NODE_NAME = "traverse_server"
-WHEEL_TOPICS = {
-    "wheel_loads": "wheel_loads",
-    "slip_ratios": "slip_ratio",
-    "friction_utilisation": "friction_utilisation",
-    "torque_saturation": "torque_saturation",
-}
-"""Topics of one value per waypoint and wheel, and the field of the prediction each carries."""
 
 
 class TraverseServer(Node):
@@ -75,7 +52,8 @@ class TraverseServer(Node):
         self._service = TraverseService(settings_from_parameters(self._values))
         self._map_frame: str = self._values["map_frame"]
         self._seen_maps: deque[int] = deque(maxlen=8)
-        self._create_publishers()
+        self._afterwards = Afterwards(self)
+        self._results = ResultTopics(self, self._afterwards, self._map_frame)
         self._load_first_map()
         self._create_subscriptions()
         self.create_service(GetPlan, "~/can_traverse", self._can_traverse)
@@ -97,18 +75,6 @@ class TraverseServer(Node):
     def reach(self) -> ReachTopics:
         """What the node knows of the arm's tool."""
         return self._reach
-
-    def _create_publishers(self) -> None:
-        qos = result_qos()
-        self._plan = self.create_publisher(Path, "~/plan", qos)
-        self._joints = self.create_publisher(JointTrajectory, "~/predicted_joints", qos)
-        self._wheels = {
-            topic: self.create_publisher(Float64MultiArray, f"~/{topic}", qos)
-            for topic in WHEEL_TOPICS
-        }
-        self._tip_over = self.create_publisher(Float64MultiArray, "~/tip_over_margin", qos)
-        self._verdict = self.create_publisher(DiagnosticArray, "~/verdict", qos)
-        self._markers = self.create_publisher(MarkerArray, "~/markers", qos)
 
     def _create_subscriptions(self) -> None:
         profiles = map_subscriptions_qos(self._values["map_durability"])
@@ -198,9 +164,12 @@ class TraverseServer(Node):
         def answer() -> Judgement:
             start = stamped_pose_to_array(request.start, self._map_frame, "start")
             goal = stamped_pose_to_array(request.goal, self._map_frame, "goal")
-            return self._service.answer(start, goal, request.tolerance)
+            judgement = self._service.answer(start, goal, request.tolerance)
+            if judgement.traversable:
+                judgement.changes()  # worked out here, where a fault makes a refusal
+            return judgement
 
-        response.plan = self._publish(self._judge("can_traverse", answer))
+        _, response.plan = self._judge("can_traverse", answer)
         return response
 
     def _check_path(
@@ -208,8 +177,12 @@ class TraverseServer(Node):
         _request: Trigger.Request,
         response: Trigger.Response,
     ) -> Trigger.Response:
-        judgement = self._judge("check_path", self._service.check_last_path)
-        self._publish(judgement)
+        def answer() -> Judgement:
+            judgement = self._service.check_last_path()
+            _ = judgement.verdict  # worked out here, where a fault makes a refusal
+            return judgement
+
+        judgement, _ = self._judge("check_path", answer)
         response.success = judgement.traversable
         response.message = verdict_to_json(judgement.verdict)
         return response
@@ -236,64 +209,23 @@ class TraverseServer(Node):
         response.result = LoadMap.Response.RESULT_SUCCESS
         return response
 
-    def _judge(self, request: str, judge: Callable[[], Judgement]) -> Judgement:
-        """Answer a request and log it; whatever is wrong with it makes a refused verdict."""
+    def _judge(self, request: str, judge: Callable[[], Judgement]) -> tuple[Judgement, Path]:
+        """Answer a request; whatever is wrong with it makes a refusal. Return the plan too.
+
+        Results and a line in the log follow when the answer has been sent.
+        """
         judgement = answer_or_refuse(self.get_logger(), request, judge, refusal)
-        verdict = judgement.verdict
+        rover, spacing = self._service.settings.rover, self._values["plan_spacing"]
+        plan = self._results.take(judgement, rover, spacing)
+        self._afterwards.do(partial(self._log, request, judgement))
+        return judgement, plan
+
+    def _log(self, request: str, judgement: Judgement) -> None:
+        text = f"{request}: {judgement.summary()}"
         if judgement.traversable:
-            self.get_logger().info(
-                f"{request}: traversable, {verdict['length']:.2f} m, {verdict['time']:.0f} s, "
-                f"{verdict['energy']:.1f} J"
-            )
+            self.get_logger().info(text)
         else:
-            self.get_logger().warning(
-                f"{request}: refused ({verdict['code']}): {verdict['reason']}"
-            )
-        return judgement
-
-    def _publish(self, judgement: Judgement) -> Path:
-        """Publish a judgement on all topics with one stamp; return the plan."""
-        stamp, frame = self.get_clock().now().to_msg(), self._map_frame
-        plan = self._publish_path(judgement, frame, stamp)
-        for topic, field in WHEEL_TOPICS.items():
-            self._wheels[topic].publish(
-                waypoint_array(np.empty((0, len(WHEELS))))
-                if judgement.candidate is None
-                else waypoint_array(getattr(judgement.candidate.prediction, field))
-            )
-        self._verdict.publish(
-            verdict_to_diagnostics(
-                judgement.verdict,
-                self._service.settings.rover.name,
-                frame,
-                stamp,
-                warn=not judgement.verdict.get("suspension_agrees", True),
-            )
-        )
-        return plan
-
-    def _publish_path(self, judgement: Judgement, frame: str, stamp) -> Path:
-        """Publish what there is of a path, empty messages where none was judged."""
-        plan = empty_path(frame, stamp)
-        if judgement.candidate is None:
-            joints, markers = empty_trajectory(frame, stamp), cleared_markers(frame, stamp)
-            tip_over = waypoint_array(np.empty((0, len(MEASURES))), "measure")
-        else:
-            prediction = judgement.candidate.prediction
-            rows = decimate(prediction.poses, self._values["plan_spacing"])
-            if judgement.traversable:
-                plan = settled_path(prediction, rows, frame, stamp)
-            radius = self._service.settings.rover.wheel.radius
-            joints = joint_trajectory(prediction, radius, frame, stamp)
-            tip_over = tip_over_array(prediction)
-            reasons = judgement.candidate.verdict.reasons
-            grades = judgement.verdict["grades"]
-            markers = path_markers(prediction, reasons, rows, frame, stamp, grades)
-        self._plan.publish(plan)
-        self._joints.publish(joints)
-        self._tip_over.publish(tip_over)
-        self._markers.publish(markers)
-        return plan
+            self.get_logger().warning(text)
 
 
 def _file_of_url(url: str) -> FilePath | None:
@@ -329,6 +261,8 @@ def _run(make_node: Callable[[], Node]) -> None:
         executor = SingleThreadedExecutor()
         node = make_node()
         executor.add_node(node)
+        gc.collect()
+        gc.freeze()  # what lives as long as the node need not be looked through again and again
         executor.spin()
     except Exception as error:
         # Whoever is told to stop half-way through the start fails on a context that has ended.

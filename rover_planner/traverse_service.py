@@ -4,18 +4,21 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.grades import Grade, grade_judged
+from rover_physics.grades import grade_judged
+from rover_physics.ground import pack_ground
 from rover_physics.manipulator import body_mass_and_com
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover import Rover, load_rover
 from rover_physics.soil_file import soil_named
 from rover_physics.terrain import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.judgement import Judgement, refusal
 from rover_planner.path_geometry import densify, rings_within
 from rover_planner.path_query import (
     Candidate,
@@ -24,7 +27,6 @@ from rover_planner.path_query import (
     answer_path_query,
     check_path,
 )
-from rover_planner.path_report import describe_grades, describe_path
 
 OWN_PAYLOAD = -1.0
 """Value of the parameter payload that takes what the rover file has."""
@@ -45,21 +47,6 @@ class ServiceSettings:
     """Widest region that is [m]."""
     suspension_tolerance: float
     """Difference of measured and predicted suspension angles that is still agreement [rad]."""
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """The answer to one request."""
-
-    verdict: dict[str, Any]
-    """traversable, code, reason and what else there is to say, of JSON's types or numpy's."""
-    candidate: Candidate | None = None
-    """The path that was judged; None where the request was refused before."""
-
-    @property
-    def traversable(self) -> bool:
-        """Whether the rover may drive."""
-        return bool(self.verdict["traversable"])
 
 
 def settings_from_parameters(values: Mapping[str, Any]) -> ServiceSettings:
@@ -94,6 +81,7 @@ def settings_from_parameters(values: Mapping[str, Any]) -> ServiceSettings:
             max_torque=values["max_torque"] or None,
             soil=soil or None,
             payload=None if payload == OWN_PAYLOAD else payload,
+            map_sigmas=values["map_sigmas"],
         ),
         interpolate=values["unknown_cells"] == "interpolate",
         max_gap=values["max_gap"],
@@ -149,6 +137,7 @@ class TraverseService:
             terrain.fill_gaps(self._settings.max_gap) if self._settings.interpolate else terrain
         )
         self._received = terrain
+        pack_ground(self._terrain)  # now, so that the first question does not wait for it
 
     def take_path(self, poses: NDArray[np.float64]) -> None:
         """Keep a path of poses (n, 3), x, y [m], yaw [rad], to be checked."""
@@ -217,7 +206,7 @@ class TraverseService:
             self._settings.query,
             self._manipulator_angles(),
         )
-        return Judgement(self._describe(candidate), candidate)
+        return self._judgement(candidate)
 
     def _query(self, start, goal) -> PathAnswer:
         """Ask for the candidates between two poses on the map."""
@@ -259,37 +248,35 @@ class TraverseService:
         reached: NDArray[np.float64],
         tried: int,
     ) -> Judgement:
-        """Describe the answer to a query, and which goal it is for."""
-        verdict = self._describe(answer.chosen)
-        verdict["candidates"] = len(answer.candidates)
-        verdict["traversable_candidates"] = sum(
-            candidate.verdict.traversable for candidate in answer.candidates
+        """Make a judgement of the answer to a query, which says which goal it is for."""
+        passable = sum(candidate.verdict.traversable for candidate in answer.candidates)
+        return self._judgement(
+            answer.chosen,
+            candidates=len(answer.candidates),
+            traversable_candidates=passable,
+            chosen_candidate=answer.nearest,
+            goal=reached.tolist(),
+            goal_offset=float(np.hypot(*(reached - goal)[:2])),
+            alternative_goals_tried=tried,
+            explanation=answer.explain(),
         )
-        verdict["chosen_candidate"] = answer.nearest
-        verdict["goal"] = reached.tolist()
-        verdict["goal_offset"] = float(np.hypot(*(reached - goal)[:2]))
-        verdict["alternative_goals_tried"] = tried
-        verdict["explanation"] = answer.explain()
-        return Judgement(verdict, answer.chosen)
 
-    def _describe(self, candidate: Candidate) -> dict[str, Any]:
-        """Say about a judged path what a program or an operator wants to know."""
-        verdict = describe_path(candidate)
-        verdict.update(describe_grades(self._grade(candidate)))
-        verdict.update(self._compare_suspension(candidate))
-        return verdict
-
-    def _grade(self, candidate: Candidate) -> tuple[Grade, ...]:
-        """Grade a judged path by what both torque policies make of it."""
+    def _judgement(self, candidate: Candidate, **notes: Any) -> Judgement:
+        """Make a judgement of a judged path, with all that describing it later takes."""
         assert self._terrain is not None
-        return grade_judged(
+        grade = partial(
+            grade_judged,
             self._settings.rover,
             self._terrain,
             candidate.prediction,
             candidate.verdict,
             joint_angles=self._manipulator_angles(),
+            sigmas=self._settings.query.map_sigmas,
             **self._settings.query.ground_and_load(),
         )
+        verdict = candidate.verdict
+        notes = {**self._compare_suspension(candidate), **notes}
+        return Judgement(verdict.code, verdict.reason, candidate, grade, notes)
 
     def _compare_suspension(self, candidate: Candidate) -> dict[str, Any]:
         """Compare the measured suspension with the predicted one at the path's start."""
@@ -334,8 +321,3 @@ class TraverseService:
         return refusal(
             "no_map", "no map was received yet; publish one on elevation_cloud or call ~/load_map"
         )
-
-
-def refusal(code: str, reason: str) -> Judgement:
-    """Refuse a request that no path could be judged for."""
-    return Judgement({"traversable": False, "code": code, "reason": reason, "first_failure": -1})

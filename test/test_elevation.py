@@ -16,6 +16,7 @@ from msg_adapters.elevation import (
     terrain_to_point_cloud,
 )
 from msg_adapters.errors import MessageError
+from msg_adapters.gridding import detect_raster
 from rover_physics.errors import TerrainError
 from rover_physics.terrain import Terrain, load_terrain
 
@@ -132,6 +133,42 @@ def test_order_of_points_and_fields_does_not_change_the_terrain():
     mixed = np.column_stack([points[:, 2], np.ones(len(points)), points[:, 1], points[:, 0]])
     cloud = cloud_of(mixed, ("z", "intensity", "y", "x"))
     assert_same(terrain_from_point_cloud(cloud), terrain)
+
+
+@pytest.mark.parametrize("height", [1, 7])
+@pytest.mark.parametrize("x_step", [1, -1])
+@pytest.mark.parametrize("y_step", [1, -1])
+def test_a_map_is_taken_as_it_comes_whichever_way_its_rows_run(height, x_step, y_step):
+    terrain = rough_terrain()
+    rows = points_of(terrain).reshape(7, 11, 3)[::y_step, ::x_step]
+    assert detect_raster(rows[:, :, 0], rows[:, :, 1]) is not None
+    assert_same(terrain_from_point_cloud(cloud_of(rows.reshape(-1, 3), height=height)), terrain)
+    columns = rows.transpose(1, 0, 2)
+    assert detect_raster(columns[:, :, 0], columns[:, :, 1]) is not None
+    assert_same(terrain_from_point_cloud(cloud_of(columns.reshape(-1, 3))), terrain)
+
+
+def test_what_is_no_complete_map_is_not_taken_for_one():
+    rows = points_of(rough_terrain()).reshape(7, 11, 3)
+    shifted, unplaced = rows.copy(), rows.copy()
+    shifted[3, 4, 0] += 0.01
+    unplaced[3, 4, :2] = np.nan
+    twice = np.repeat(rows, 2, axis=1)
+    gap = np.delete(rows, 3, axis=1)
+    uneven = rows + np.array([0.02, 0.0, 0.0]) * (np.arange(11) > 5)[:, None]
+    for points in (shifted, unplaced, twice, gap, uneven):
+        assert detect_raster(points[:, :, 0], points[:, :, 1]) is None
+    expected = rough_terrain().elevation
+    expected[3, 4] = np.nan
+    terrain = terrain_from_point_cloud(cloud_of(unplaced.reshape(-1, 3), height=7))
+    np.testing.assert_array_equal(terrain.elevation, expected)
+
+
+def test_a_map_without_any_height_is_refused():
+    rows = points_of(rough_terrain())
+    rows[:, 2] = np.nan
+    with pytest.raises(MessageError, match="none of the cloud's 77 points"):
+        terrain_from_point_cloud(cloud_of(rows, height=7))
 
 
 def test_missing_points_are_unknown_ground():

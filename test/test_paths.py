@@ -134,5 +134,10 @@ def test_decimation_keeps_the_ends_and_the_spacing():
     np.testing.assert_array_equal(decimate(poses[:1], 0.1), [0])
 
 
+def test_decimation_keeps_what_it_is_told_to():
+    poses = np.column_stack([np.linspace(0.0, 1.0, 51), np.zeros(51)])
+    np.testing.assert_array_equal(decimate(poses, 0.5, [7, 25, 8]), [0, 7, 8, 25, 50])
+
+
 def test_decimation_copes_with_standing_still():
     np.testing.assert_array_equal(decimate(np.zeros((5, 3)), 0.1), [0, 4])

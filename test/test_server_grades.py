@@ -39,6 +39,19 @@ def test_traction_control_is_named_whichever_policy_is_assumed(
     assert set(verdict["grades"]) == {WITH_TRACTION_CONTROL}
 
 
+def test_a_plan_has_a_pose_where_the_grade_changes(server, client):
+    client.send_terrain(make_terrain(lambda x, y: 0.45 * np.maximum(x - 0.13, 0.0)))
+    for name, value in {"policy": "optimal", "plan_spacing": 50.0, "candidate_count": 1}.items():
+        assert client.set_parameter(name, value)[0]
+    plan = client.can_traverse((-1.5, 0.0, 0.0), (1.5, 0.0, 0.0))
+    verdict = check(client, server, [[-1.5, 0.0, 0.0], [1.5, 0.0, 0.0]])
+    grades = np.array(verdict["grades"])
+    changes = np.flatnonzero(grades[1:] != grades[:-1]) + 1
+    assert len(changes) and len(plan.poses) == 2 + len(changes)
+    found = [pose.pose.position.x for pose in plan.poses[1:-1]]
+    np.testing.assert_allclose(found, -1.5 + 0.02 * changes, atol=1e-9)
+
+
 def test_the_drawn_path_is_coloured_by_grade(server, client):
     client.send_terrain(make_terrain(slope))
     _, results = client.next_results(lambda: client.check_poses(server, PATH))

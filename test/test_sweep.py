@@ -18,7 +18,7 @@ LEVEL = plane(0.0, 0.0)
 POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
 GROWING = {"energy", "time", "distance"}
-ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint"}
+ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint", "bounds"}
 few = settings(max_examples=20, deadline=None)
 
 

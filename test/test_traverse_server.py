@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from grounds import gap, make_terrain, wall_at, waves
-from planner_client import GOAL, START, ask
+from planner_client import GOAL, START, ask, verdict_of
 from rclpy.qos import DurabilityPolicy
 from ros_fixtures import wait_until
 from sensor_msgs.msg import PointCloud2, PointField
@@ -18,7 +18,7 @@ from msg_adapters.paths import path_to_poses
 from msg_adapters.predictions import JOINTS, MEASURES, array_values
 from rover_physics.terrain import load_terrain, save_terrain
 from rover_planner.qos import map_qos
-from rover_planner.traverse_server import WHEEL_TOPICS
+from rover_planner.result_topics import WHEEL_TOPICS
 
 
 def test_a_passable_goal_gets_a_plan_of_settled_poses(mapped, client):
@@ -28,10 +28,20 @@ def test_a_passable_goal_gets_a_plan_of_settled_poses(mapped, client):
     np.testing.assert_allclose(poses[0], START, atol=1e-9)
     np.testing.assert_allclose(poses[-1], GOAL, atol=1e-9)
     spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    assert spacing.max() <= 0.23 and spacing[:-1].min() >= 0.17
+    assert spacing.max() <= 0.12 and spacing[:-1].min() >= 0.08
     heights = [pose.pose.position.z for pose in plan.poses]
     ground = mapped.service.terrain.elevation_at(poses[:, 0], poses[:, 1])
     assert np.all(np.abs(heights - ground - 0.3) < 0.1)
+
+
+def test_results_come_in_the_order_of_the_questions(mapped, client):
+    ends = [(2.0, 0.3, 0.0), (1.0, 0.3, 0.0), (9.0, 0.0, 0.0)]
+    for end in ends:
+        client.can_traverse(START, end)
+    told = client.heard["verdict"]
+    wait_until(lambda: len(told) == len(ends), "the verdicts")
+    goals = [json.loads(verdict_of({"verdict": one})["goal"]) for one in told]
+    assert goals == [pytest.approx(end) for end in ends]
 
 
 def test_all_results_of_a_path_share_stamp_frame_and_waypoints(mapped, client):
@@ -184,7 +194,7 @@ def test_check_path_answers_in_json_with_all_results(mapped, client):
     verdict = json.loads(answer.message)
     assert answer.success and verdict["traversable"] and verdict["first_failure"] == -1
     assert verdict["length"] == pytest.approx(2.0) and verdict["waypoints"] == 101
-    assert len(results["plan"].poses) == 11
+    assert len(results["plan"].poses) == 21
     assert results["verdict"].status[0].level == DiagnosticStatus.OK
 
 

@@ -65,7 +65,7 @@ def test_another_process_gets_an_answer(start_process, tmp_path):
         plan, results = client.next_results(
             lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
         )
-        assert len(plan.poses) == 11 and len(results["plan"].poses) == 11
+        assert len(plan.poses) == 21 and len(results["plan"].poses) == 21
     finally:
         run.close()
 

@@ -1,0 +1,76 @@
+"""How the cost of a path grows with its length, the candidates, the map and the samples."""
+
+import numba
+import numpy as np
+from measure import Figure, median_time
+
+from rover_physics.evaluation import evaluate
+from rover_physics.model_setup import set_up
+from rover_physics.rover import load_rover
+from rover_physics.sweep import sweep_path
+from rover_physics.terrain import Terrain
+from rover_planner.mars_terrain import make_mars_terrain
+from rover_planner.path_query import PathQueryOptions, answer_path_query
+
+
+def straight(length: float) -> np.ndarray:
+    """Return poses 2 cm apart, straight ahead through the middle of a map."""
+    x = np.arange(-0.5 * length, 0.5 * length, 0.02)
+    return np.column_stack([x, 0.0 * x, 0.0 * x])
+
+
+def measure() -> list[Figure]:
+    """Measure the growth; ratios are of times per pose, so 1 is linear."""
+    numba.set_num_threads(1)
+    rover = load_rover("lsr1")
+    ground = make_mars_terrain(1, 24.0, 0.05)
+    per_pose = {}
+    for length in (2.5, 5.0, 10.0, 20.0):
+        poses = straight(length)
+        taken = median_time(lambda: sweep_path(rover, ground, poses))  # noqa: B023
+        per_pose[length] = taken / len(poses) * 1e6
+    figures = [
+        Figure("growth", f"path of {length:g} m, with what lies between", value, "us/pose")
+        for length, value in per_pose.items()
+    ]
+    return figures + _candidates(rover, ground) + _maps(rover) + _samples(rover)
+
+
+def _candidates(rover, ground: Terrain) -> list[Figure]:
+    figures = []
+    for count in (1, 3, 9):
+        options = PathQueryOptions(count=count)
+        taken = median_time(
+            lambda: answer_path_query(rover, ground, (-5, 0, 0), (5, 0, 0), options)  # noqa: B023
+        )
+        figures.append(Figure("growth", f"10 m query, {count} candidates", taken * 1e3, "ms"))
+    return figures
+
+
+def _maps(rover) -> list[Figure]:
+    """The same poses on the same ground, cut out of maps of different size."""
+    whole = make_mars_terrain(3, 48.0, 0.05)
+    poses, times = straight(8.0), []
+    sizes = (240, 480, 960)
+    for cells in sizes:
+        first = (whole.elevation.shape[0] - cells) // 2
+        corner = whole.origin[0] + first * whole.resolution
+        part = whole.elevation[first : first + cells, first : first + cells]
+        setup = set_up(rover, Terrain(part, whole.resolution, (corner, corner)))
+        times.append(median_time(lambda: evaluate(*setup, poses), 21))  # noqa: B023
+    return [
+        Figure("growth", f"map of {cells} x {cells} cells", value / len(poses) * 1e6, "us/pose")
+        for cells, value in zip(sizes, times, strict=True)
+    ]
+
+
+def _samples(rover) -> list[Figure]:
+    """The same ground with finer cells: a wheel is sampled as finely as the map."""
+    figures = []
+    for resolution in (0.05, 0.02, 0.01):
+        setup = set_up(rover, make_mars_terrain(1, 10.0, resolution))
+        poses = straight(6.0)
+        taken = median_time(lambda: evaluate(*setup, poses), 11) / len(poses) * 1e6  # noqa: B023
+        count = int(setup.samples.rows * setup.samples.circles)
+        figures.append(Figure("growth", f"{count} samples a wheel", taken, "us/pose"))
+    return figures

@@ -1,0 +1,81 @@
+"""The same poses by MuJoCo: how long it takes to drop a rover and let it settle there."""
+
+import statistics
+import time
+from functools import lru_cache
+
+import numba
+import numpy as np
+from bench_poses import run_settling
+from grounds import random_poses, reference_ground
+from measure import Figure, median_time
+from mujoco_rover import DroppedRover, Settled
+
+from rover_physics.evaluation import evaluate
+from rover_physics.model_setup import set_up
+from rover_physics.rover import load_rover
+from rover_physics.settling import SETTLED
+
+POSES = 15
+"""Poses on each ground."""
+MANY = 4_000
+"""Poses over which ours is timed; 15 take too little."""
+
+
+@lru_cache(maxsize=1)
+def rover():
+    """Return the rover that is dropped."""
+    return load_rover("lsr1")
+
+
+def drop(ground, poses: np.ndarray) -> tuple[list[Settled], list[float]]:
+    """Return where the rover comes to rest, and the time each settled pose took [s]."""
+    dropped = DroppedRover(rover(), ground)
+    settled, times = [], []
+    for pose in poses:
+        start = time.process_time()
+        rest = dropped.settle(*pose)
+        taken = time.process_time() - start
+        if rest is not None:
+            settled.append(rest)
+            times.append(taken)
+    return settled, times
+
+
+def compare(ground, settled: list[Settled]) -> float:
+    """Return the median over poses of how far the worst wheel centre is from ours [mm]."""
+    poses = np.array([rest.pose for rest in settled])
+    ours = evaluate(*set_up(rover(), ground), poses)
+    off = [
+        np.linalg.norm(one.wheel_centres - rest.wheel_centres, axis=1).max()
+        for one, rest in zip(ours, settled, strict=True)
+        if one.status == SETTLED
+    ]
+    return 1e3 * float(np.median(off))
+
+
+def measure() -> list[Figure]:
+    """Measure both on three grounds; at the poses where MuJoCo's rover came to rest."""
+    numba.set_num_threads(1)
+    figures = []
+    for name in ("flat", "rocks", "fractal"):
+        ground = reference_ground(name)
+        setup = set_up(rover(), ground)
+        settled, times = drop(ground, random_poses(ground, POSES))
+        rests = np.array([rest.pose for rest in settled])
+        poses = np.tile(rests, (MANY // len(rests), 1))
+        ours = median_time(lambda: run_settling(setup, poses)) / len(poses)  # noqa: B023
+        theirs, count = statistics.median(times), len(times)
+        against = "the same pose by MuJoCo"
+        figures += [
+            Figure("MuJoCo", f"{name}: drop and settle", 1e3 * theirs, "ms", repeats=count),
+            Figure(
+                "MuJoCo", f"{name}: time over ours, settling alone", theirs / ours, "x", 20_000.0,
+                True, "ours at the same poses", count,
+            ),
+            Figure(
+                "MuJoCo", f"{name}: worst wheel centre of a pose", compare(ground, settled), "mm",
+                1.0, False, against, count,
+            ),
+        ]  # fmt: skip
+    return figures

@@ -1,0 +1,117 @@
+"""Time of a pose on one core: settling alone, both torque policies, and the look-up floor."""
+
+import numba
+import numpy as np
+from grounds import all_grounds, random_poses, reference_ground
+from measure import Figure, median_time
+
+from rover_physics.evaluation import WORK, evaluate, new_results, new_work
+from rover_physics.ground import find_roof, height_inside, heights_of
+from rover_physics.linkage import place
+from rover_physics.model_setup import Setup, set_up
+from rover_physics.rover import load_rover
+from rover_physics.settling import SETTLED, settle
+
+POSES = 4_000
+FLOOR_POSES = 400
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
+def settle_all(grid, linkages, samplings, poses, works, results):
+    """Settle the rover at poses (n, 3) and do nothing else."""
+    work = works[0]
+    for i in range(len(poses)):
+        results[i].status = settle(
+            grid, linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
+            results[i].q, work.placement, work.touch, work.J, work.step,
+        )  # fmt: skip
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
+def look_up_all(elevation, cells):
+    """Look up the heights at `cells` (n, 2) and return the highest."""
+    highest = -np.inf
+    for k in range(len(cells)):
+        highest = max(highest, height_inside(elevation, cells[k, 0], cells[k, 1]))
+    return highest
+
+
+def run_settling(setup: Setup, poses: np.ndarray) -> None:
+    """Settle at all poses."""
+    records = [np.array([record]) for record in (setup.linkage, setup.samples)]
+    works, results = np.full(1, new_work(), WORK), new_results(len(poses))
+    settle_all(heights_of(setup.ground), *records, poses, works, results)
+
+
+def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return the cells (n, 2) at which heights must be known to tell that settled wheels touch.
+
+    Of each wheel these are all samples of its rim but those that even the highest ground around
+    it stays below: whatever finds the pose, it has to look there once. Also returns the number
+    of settled poses.
+    """
+    results = evaluate(*setup, poses)
+    grid, samples = heights_of(setup.ground), setup.samples
+    sines, cosines = samples.sines[: samples.rows], samples.cosines[: samples.rows]
+    laterals, radius, scale = samples.laterals[: samples.circles], samples.radius, grid[4]
+    cells = []
+    settled = results[results.status == SETTLED]
+    work = new_work()
+    for i in np.flatnonzero(results.status == SETTLED):
+        place(setup.linkage, *poses[i], results[i].q, work.placement)
+        placed = work.placement
+        axis = placed.R[:, 1]
+        rim = radius * (sines[:, None] * placed.forward - cosines[:, None] * placed.up)
+        for centre in placed.centres:
+            points = centre + rim[:, None] + laterals[:, None] * axis
+            at = (points[..., :2] - [grid[2], grid[3]]) * scale
+            middle = (centre[:2] - [grid[2], grid[3]]) * scale
+            roof = find_roof(grid, middle[0], middle[1], samples.reach * scale)
+            if np.isfinite(roof):
+                cells.append(at[points[..., 2] <= roof])
+    return np.concatenate(cells), len(settled)
+
+
+def measure() -> list[Figure]:
+    """Measure settling, full evaluation and the floor."""
+    numba.set_num_threads(1)
+    rover = load_rover("lsr1")
+    figures = []
+    for name, ground in all_grounds().items():
+        poses = random_poses(ground, POSES)
+        equal, optimal = (set_up(rover, ground, policy=p) for p in ("equal", "optimal"))
+        times = {
+            "settling": median_time(lambda: run_settling(equal, poses)),  # noqa: B023
+            "equal": median_time(lambda: evaluate(*equal, poses)),  # noqa: B023
+            "optimal": median_time(lambda: evaluate(*optimal, poses)),  # noqa: B023
+        }
+        pose = {key: value / POSES * 1e6 for key, value in times.items()}
+        figures += [
+            Figure("pose", f"{name}: settling alone", pose["settling"], "us", 4.0),
+            Figure("pose", f"{name}: full, equal torques", pose["equal"], "us", 8.0),
+            Figure(
+                "pose",
+                f"{name}: what optimal torques add",
+                pose["optimal"] - pose["equal"],
+                "us",
+                100.0,
+            ),
+        ]
+    return figures + measure_floor(rover)
+
+
+def measure_floor(rover) -> list[Figure]:
+    """Measure a full evaluation against the look-ups that it can't do without."""
+    figures = []
+    for name in ("flat", "rocks"):
+        setup = set_up(rover, reference_ground(name))
+        poses = random_poses(reference_ground(name), FLOOR_POSES)
+        cells, settled = cells_looked_up(setup, poses)
+        floor = median_time(lambda: look_up_all(setup.ground.elevation, cells), 21)  # noqa: B023
+        full = median_time(lambda: evaluate(*setup, poses), 21)  # noqa: B023
+        figures += [
+            Figure("floor", f"{name}: look-ups per pose", len(cells) / settled, ""),
+            Figure("floor", f"{name}: time of the look-ups", floor / settled * 1e6, "us"),
+            Figure("floor", f"{name}: full evaluation / look-ups", full / floor, "x", 4.0),
+        ]
+    return figures

@@ -1,0 +1,45 @@
+"""From starting the server to its first answer, with nothing compiled and with all in the cache.
+
+The caller finds the service by DDS discovery, which is part of the time. The cold start compiles
+into a folder of its own, so the kernels that are in use stay cached.
+"""
+
+import statistics
+import tempfile
+import time
+
+from bench_service import GOAL, START
+from measure import Figure
+from planner_process import SERVER, memory_of, planner_and_processes
+
+from rover_planner.mars_terrain import make_mars_terrain
+
+STARTS = 5
+
+
+def start_and_ask(**environment: str) -> tuple[float, float]:
+    """Return the time from starting a server to its first answer [s], and its memory [MB]."""
+    ground = make_mars_terrain(1, 24.0, 0.05)
+    with planner_and_processes(**environment) as (planner, processes):
+        began = time.perf_counter()
+        server = processes.start_server(ground)
+        planner.ask(SERVER, START, GOAL)
+        taken = time.perf_counter() - began
+        for _ in range(20):
+            planner.ask(SERVER, START, GOAL)
+        time.sleep(0.5)
+        return taken, memory_of(server)
+
+
+def measure() -> list[Figure]:
+    """Measure one cold start, and warm ones after one that does not count."""
+    start_and_ask()
+    starts = [start_and_ask() for _ in range(STARTS)]
+    warm, memory = (statistics.median(values) for values in zip(*starts, strict=True))
+    with tempfile.TemporaryDirectory() as cache:
+        cold, _ = start_and_ask(NUMBA_CACHE_DIR=cache)
+    return [
+        Figure("start", "to the first answer, kernels cached", warm, "s", 2.0, repeats=STARTS),
+        Figure("start", "to the first answer, nothing compiled", cold, "s", repeats=1),
+        Figure("start", "peak memory of the server", memory, "MB", 400.0, repeats=STARTS),
+    ]

@@ -1,0 +1,48 @@
+"""Run all benchmarks, print one table and write it as JSON: `make bench`.
+
+Run from the repository: python benchmarks/run.py [topic ...]; the topics are the files bench_*.py.
+Each runs in a process of its own, so that none disturbs another's memory or threads.
+"""
+
+import importlib
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from measure import Figure, show, write
+from rich.console import Console
+
+HERE = Path(__file__).resolve().parent
+RESULTS = HERE.parent / "bench_output" / "results.json"
+
+
+def run_topic(name: str) -> list[Figure]:
+    """Run one benchmark in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "figures.json"
+        subprocess.run([sys.executable, __file__, "--only", name, str(out)], check=True)
+        rows = json.loads(out.read_text())
+    return [Figure(**{k: v for k, v in row.items() if k != "met"}) for row in rows]
+
+
+def main(arguments: list[str]) -> int:
+    """Run what is asked for, or everything."""
+    if arguments[:1] == ["--only"]:
+        write(importlib.import_module(arguments[1]).measure(), Path(arguments[2]))
+        return 0
+    names = [f"bench_{name.removeprefix('bench_')}" for name in arguments]
+    names = names or sorted(path.stem for path in HERE.glob("bench_*.py"))
+    figures, console = [], Console(stderr=True)
+    for name in names:
+        console.print(f"measuring: {name.removeprefix('bench_')}")
+        figures += run_topic(name)
+    show(figures)
+    write(figures, RESULTS)
+    console.print(f"written to {RESULTS.relative_to(Path.cwd())}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

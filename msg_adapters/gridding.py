@@ -1,0 +1,201 @@
+"""Square cells for the points of a cloud: found where they are a regular grid, else laid out.
+
+Points that come row by row, as most maps do, are recognised as they stand in the message; for
+points in any other order all of them are sorted along x and along y.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msg_adapters.errors import MessageError
+
+MAX_CELLS = 25_000_000
+"""Largest map built from a cloud; one stray point far away must not take the memory."""
+
+_MIN_FILL = 0.05
+"""Least share of a detected grid's cells that have a point; below it the spacing is a chance."""
+
+_MAX_OFF_CENTRE = 0.02
+"""Largest distance of a regular grid's points from their cell centres, in cells."""
+
+
+@dataclass(frozen=True)
+class CellGrid:
+    """Square cells that hold all points of a cloud."""
+
+    resolution: float
+    origin: tuple[float, float]
+    columns: int
+    rows: int
+
+    def cells(self, xy):
+        """Return the column and row of points (n, 2)."""
+        index = np.rint((xy - self.origin) / self.resolution).astype(np.int64)
+        return index[:, 0], index[:, 1]
+
+
+@dataclass(frozen=True)
+class Raster:
+    """A regular grid whose points come row by row, or column by column."""
+
+    grid: CellGrid
+    """The cells, of which each has one point."""
+    shape: tuple[int, int]
+    """Shape (h, w) of the points as they come."""
+    by_columns: bool
+    """Whether y, not x, changes from one point to the next."""
+    falling: tuple[bool, bool]
+    """Whether x and y fall along the points."""
+
+    def arrange(self, values: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the values of the points as (rows, columns), both ascending."""
+        values = values.reshape(self.shape)
+        values = values.T if self.by_columns else values
+        x_step, y_step = (-1 if falls else 1 for falls in self.falling)
+        return np.array(values[::y_step, ::x_step], dtype=np.float64, order="C")
+
+
+def detect_raster(x: NDArray[Any], y: NDArray[Any]) -> Raster | None:
+    """Find the regular grid that points (h, w) are, as they stand row by row, or None."""
+    by_columns = x.size > 1 and y.flat[0] != y.flat[1]
+    inner, outer = (y, x) if by_columns else (x, y)
+    if inner.shape[0] == 1:
+        changes = outer[0] != outer[0, 0]
+        width = int(np.argmax(changes)) or outer.size
+        if outer.size % width:
+            return None
+        inner, outer = inner.reshape(-1, width), outer.reshape(-1, width)
+    if not ((inner == inner[:1]).all() and (outer == outer[:, :1]).all()):
+        return None
+    x_axis, y_axis = (outer[:, 0], inner[0]) if by_columns else (inner[0], outer[:, 0])
+    noise = 4.0 * rounding_error(x_axis, y_axis)
+    x_axis, y_axis = x_axis.astype(np.float64), y_axis.astype(np.float64)
+    grid = _fit_grid(x_axis, y_axis, inner.size, noise)
+    if grid is None or (grid.columns, grid.rows) != (len(x_axis), len(y_axis)):
+        return None
+    falling = bool(x_axis[0] > x_axis[-1]), bool(y_axis[0] > y_axis[-1])
+    for axis, falls, origin in zip((x_axis, y_axis), falling, grid.origin, strict=True):
+        centres = origin + grid.resolution * np.arange(len(axis))
+        off_centre = np.abs(axis[:: -1 if falls else 1] - centres).max()
+        if not off_centre <= _tolerance(grid.resolution, noise):
+            return None
+    return Raster(grid, inner.shape, by_columns, falling)
+
+
+def detect_grid(xy: NDArray[np.float64], precision: float) -> CellGrid | None:
+    """Find the regular grid along x and y that the points (n, 2) lie on, or None.
+
+    Args:
+        xy: Points in any order [m].
+        precision: Their rounding error [m].
+    """
+    noise = 4.0 * precision
+    grid = _fit_grid(xy[:, 0], xy[:, 1], len(xy), noise)
+    if grid is None:
+        return None
+    index = np.rint((xy - grid.origin) / grid.resolution)
+    off_centre = np.abs(xy - (grid.origin + index * grid.resolution)).max()
+    columns, rows = grid.cells(xy)
+    single = np.bincount(rows * grid.columns + columns).max() == 1
+    return grid if single and off_centre <= _tolerance(grid.resolution, noise) else None
+
+
+def rounding_error(*coordinates: NDArray[Any]) -> float:
+    """Return the rounding error [m] of coordinates, in their own type; others than finite pass."""
+    extent = 1.0
+    for values in coordinates:
+        extent = max(extent, float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))
+    single = any(values.dtype.itemsize == 4 for values in coordinates)
+    return float(np.finfo(np.float32 if single else np.float64).eps * extent)
+
+
+def _fit_grid(x, y, points: int, noise: float) -> CellGrid | None:
+    """Fit cells to the values that x and y of a number of points take, or None."""
+    along_x, along_y = _detect_axis(x, noise), _detect_axis(y, noise)
+    if along_x is None or along_y is None:
+        return None
+    steps = [step for _, step in (along_x, along_y) if step > 0.0]
+    if not steps:
+        return None
+    spans = np.ptp(x), np.ptp(y)
+    fitted = steps[0] if spans[0] >= spans[1] else steps[-1]
+    if any(abs(step - fitted) > _MAX_OFF_CENTRE * fitted for step in steps):
+        return None
+    counts = [round(span / fitted) + 1 for span in spans]
+    if points < _MIN_FILL * counts[0] * counts[1]:
+        return None
+    resolution = _round_within(fitted, noise / max(counts))
+    origin = (_round_within(along_x[0], noise), _round_within(along_y[0], noise))
+    return CellGrid(resolution, origin, counts[0], counts[1])
+
+
+def _tolerance(resolution: float, noise: float) -> float:
+    """Return how far from the cell centres the points of a regular grid may be [m]."""
+    return max(_MAX_OFF_CENTRE * resolution, noise)
+
+
+def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, float] | None:
+    """Return the first value and the spacing of equidistant values (0 for one value), or None."""
+    ordered = np.sort(values)
+    starts = np.concatenate([[True], np.diff(ordered) > noise])
+    distinct = ordered[starts]
+    if len(distinct) == 1:
+        return float(distinct[0]), 0.0
+    gaps = np.diff(distinct)
+    smallest = gaps.min()
+    index = np.concatenate([[0.0], np.cumsum(np.rint(gaps / smallest))])
+    step, first = np.polyfit(index, distinct, 1)
+    residual = np.abs(distinct - (first + step * index)).max()
+    if residual > max(_MAX_OFF_CENTRE * step, noise):
+        return None
+    return float(first), float(step)
+
+
+def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CellGrid:
+    """Return cells centred on multiples of the resolution that hold the points (n, 2)."""
+    first = np.rint(xy.min(axis=0) / resolution)
+    last = np.rint(xy.max(axis=0) / resolution)
+    counts = last - first + 1.0
+    if counts.prod() > MAX_CELLS:
+        span = np.ptp(xy, axis=0)
+        raise MessageError(
+            f"cloud spans {span[0]:.4g} m x {span[1]:.4g} m, which at {resolution:g} m are "
+            f"{counts.prod():.3g} cells; a map may have {MAX_CELLS}: remove stray points or set "
+            "a coarser map_resolution"
+        )
+    origin = first * resolution
+    return CellGrid(
+        resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1])
+    )
+
+
+def combine(cells, values, grid: CellGrid, how: str) -> NDArray[np.float64]:
+    """Combine the values of each cell; NaN where there is none."""
+    size = grid.rows * grid.columns
+    if how == "max":
+        combined = np.full(size, np.nan)
+        np.fmax.at(combined, cells, values)
+    else:
+        counts = np.bincount(cells, minlength=size)
+        sums = np.bincount(cells, weights=values, minlength=size)
+        combined = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+    return combined.reshape(grid.rows, grid.columns)
+
+
+def typical_spacing(xy: NDArray[np.float64]) -> float:
+    """Return a cell size [m] at which most cells within the points (n, 2) would have one."""
+    area = float(np.prod(np.ptp(xy, axis=0)))
+    return 2.0 * math.sqrt(area / len(xy))
+
+
+def _round_within(value: float, tolerance: float) -> float:
+    """Return the shortest decimal within a tolerance of a value: 0.0500000003 is 0.05."""
+    for digits in range(13):
+        rounded = round(value, digits)
+        if abs(rounded - value) <= tolerance:
+            return rounded
+    return value
