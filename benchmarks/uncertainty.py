@@ -21,6 +21,7 @@ from uncertain_grounds import (
     Outcome,
     draw_path,
     path_across,
+    step,
     uncertain_grounds,
     with_std,
 )
@@ -28,6 +29,8 @@ from uncertain_grounds import (
 MAPS = 40
 STDS = (0.001, 0.005)
 """Standard deviations of the heights [m]."""
+FACES = (0.3, 0.8, 1.0, 1.15, 1.3, 1.6)
+"""Heights of faces in wheel radii."""
 REPEATS = 5
 
 
@@ -98,6 +101,31 @@ def show_by_value(outcomes: dict[tuple[str, ...], Outcome]) -> Table:
     return table
 
 
+def show_faces(maps: int) -> Table:
+    """Return how often waypoints leave their bounds on the way over faces, and lack bounds."""
+    table = Table(title="Straight over a face, waypoints every 3 cm, by its height in wheel radii")
+    headings = ("rover", "height", "std", "waypoints", "outside", "per 1000", "without bounds")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "rover" else "right")
+    x = np.arange(-1.2, 2.0, 0.03)
+    poses = np.column_stack([x, np.full_like(x, 0.05), np.full_like(x, 0.03)])
+    for name in ("lsr1", "m2020"):
+        rover = load_rover(name)
+        for height in FACES:
+            terrain = step(height * rover.wheel.radius)
+            for std in STDS:
+                outcomes = [
+                    draw_path(rover, with_std(terrain, std), poses, length, maps, seed)
+                    for seed, length in enumerate(correlation_lengths(rover).values())
+                ]
+                waypoints = sum(outcome.waypoints for outcome in outcomes)
+                outside = sum(outcome.outside["any"] for outcome in outcomes)
+                numbers = f"{waypoints}", f"{outside}", f"{1e3 * outside / waypoints:.2f}"
+                unbounded = f"{outcomes[0].unbounded} of {len(x)}"
+                table.add_row(name, f"{height}", f"{1e3 * std:g} mm", *numbers, unbounded)
+    return table
+
+
 def show_times() -> Table:
     """Return the time of the bounds per waypoint on one core."""
     numba.set_num_threads(1)
@@ -134,7 +162,8 @@ def main() -> None:
     maps = int(sys.argv[1]) if len(sys.argv) > 1 else MAPS
     outcomes = draw_all(Console(stderr=True), maps)
     console = Console()
-    for table in (show_by_case(outcomes), show_by_value(outcomes), show_times()):
+    faces = show_faces(max(1, maps // 4))
+    for table in (show_by_case(outcomes), show_by_value(outcomes), faces, show_times()):
         console.print(table)
 
 

@@ -8,10 +8,12 @@ counts that the wheel moves along as the others rise and fall, which changes gap
 
 import numpy as np
 
-from rover_physics.contact import COMPLIANCE, MOST_ANGLES, MOST_CIRCLES, search_circle
+from rover_physics.circle_search import search_circle
+from rover_physics.contact import COMPLIANCE
 from rover_physics.ground import height_at_cell, is_cell_on_map
 from rover_physics.kernels import kernel
 from rover_physics.records import record_type
+from rover_physics.wheel_samples import MOST_ANGLES, MOST_CIRCLES
 
 RUNGS = 4
 """Places between a point and the nearest one that it is held against."""

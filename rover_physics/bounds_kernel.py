@@ -23,7 +23,11 @@ from rover_physics.linkage import place
 from rover_physics.records import new_record, record_type
 from rover_physics.soil import solve_wheel
 from rover_physics.stability import CORNERS
+from rover_physics.threads import threads_worth
 from rover_physics.torques import EQUAL
+
+BOUNDS_EFFORT = 50
+"""Time to bound a pose, in that to predict it under equal torques."""
 
 NOMINAL = record_type(
     ("settled", np.bool_),  # whether the pose was settled
@@ -76,7 +80,8 @@ def find_bounds(setup, low, high, error, poses, nominal) -> Any:
     for name in ("held_height", "held_angle"):
         works["spread"]["model"]["touch"][name] = np.nan
     records = (np.array([record]) for record in setup[1:])
-    bound_poses(setup.ground, low, high, error, *records, poses, nominal, works, bounds)
+    with threads_worth(BOUNDS_EFFORT * len(poses)):
+        bound_poses(setup.ground, low, high, error, *records, poses, nominal, works, bounds)
     return bounds
 
 

@@ -13,13 +13,14 @@ Robotics 37(5), 2020.
 
 import numpy as np
 
-from rover_physics.contact import FULL, OFF_MAP, QUICK, TOUCHING, find_touch
+from rover_physics.contact import find_touch
 from rover_physics.evaluation import WORK
 from rover_physics.kernels import kernel
 from rover_physics.linear import solve_in_place
 from rover_physics.linkage import place, rocker_sign
 from rover_physics.records import record_type
 from rover_physics.settling import LEVEL, SLOPED, write_gap_rates
+from rover_physics.touch import FULL, OFF_MAP, QUICK, TOUCHING
 
 BOUNDED, NOT_SETTLED, ON_EDGE, UNKNOWN_NEAR, OFF_MAP_NEAR, SINGULAR = 0, 1, 2, 3, 4, 5
 """What becomes of a pose: bounded; not settled to begin with; a wheel may climb or fall off an
@@ -137,6 +138,7 @@ def _may_change_level(low, high, linkage, samples, spread):
         slope = -touch.normal[wheel, 0] * fx - touch.normal[wheel, 1] * fy
         along, reach = _find_moves(linkage, wheel, spread)
         spread.reach[wheel] = reach
+        ahead, arm = _find_arm(linkage, wheel, placement)
         for way in range(2):
             surface, sign = high if way == 0 else low, 1.0 - 2.0 * way
             margin = spread.high[wheel] if way == 0 else -spread.low[wheel]
@@ -148,10 +150,28 @@ def _may_change_level(low, high, linkage, samples, spread):
                 for level in LEVELS:
                     needed = level * linkage.radius
                     move = along * sign * needed + shift
+                    if ahead * shift <= 0.0:
+                        move -= np.copysign(0.5 * needed * needed / arm, ahead)
                     rise = sign * _rise_at(surface, samples, placement, wheel, move, touch)
                     if rise - margin > needed:
                         return True
     return False
+
+
+@kernel
+def _find_arm(linkage, wheel, placement):
+    """Return how far a wheel is ahead of the pivot that it hangs on, and from it [m].
+
+    A wheel that rises or falls far is drawn towards its pivot, by the square of the way over
+    twice the arm: the second order that `_find_moves` leaves out.
+    """
+    pivots = placement.bogie_pivots if linkage.on_bogie[wheel] else placement.rocker_pivots
+    forward, centre, pivot = placement.forward, placement.centres[wheel], pivots[wheel // 3]
+    ahead, square = 0.0, 0.0
+    for k in range(3):
+        ahead += forward[k] * (centre[k] - pivot[k])
+        square += (centre[k] - pivot[k]) ** 2
+    return ahead, np.sqrt(square)
 
 
 @kernel

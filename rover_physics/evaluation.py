@@ -6,7 +6,6 @@ import numpy as np
 from numba import prange
 
 from rover_physics.clearance import belly_clearance
-from rover_physics.contact import TOUCH
 from rover_physics.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
 from rover_physics.ground import Grid, friction_at
 from rover_physics.kernels import kernel, sweep_kernel
@@ -16,16 +15,20 @@ from rover_physics.settling import SETTLED, settle
 from rover_physics.soil import coulomb_slip, effective_friction, solve_wheel
 from rover_physics.soil_sharing import share_forces_on_soil
 from rover_physics.stability import CORNERS, find_support, tip_over_angles
+from rover_physics.threads import threads_worth
 from rover_physics.torques import (
     EQUAL,
     TORQUE_SEARCH,
     minimise_friction,
     take_equal_torques,
 )
+from rover_physics.touch import TOUCH
 
 NO_EQUILIBRIUM = 4
 CHUNK, MOST_CHUNKS = 16, 64
 """Poses that share one work space at least, and most such chunks: enough to keep cores busy."""
+OPTIMAL_EFFORT = 5
+"""Time of a pose under optimal torques, in that of one under equal ones."""
 NONE_HELD = np.empty((0, 6, 2))
 """No wheel climbs a face."""
 
@@ -108,7 +111,9 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     results = new_results(len(poses))
     works = np.full(min(MOST_CHUNKS, -(-len(poses) // CHUNK)), new_work(), WORK)
     records = (np.array([record]) for record in (linkage, samples, settings))
-    evaluate_poses(ground, *records, poses, held, works, results)
+    effort = 1 if settings.policy == EQUAL else OPTIMAL_EFFORT
+    with threads_worth(effort * len(poses)):
+        evaluate_poses(ground, *records, poses, held, works, results)
     return results
 
 
@@ -135,9 +140,7 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
     for wheel in range(6 if held.shape[0] > 0 else 0):
         touch.held_height[wheel] = held[i, wheel, 0]
         touch.held_angle[wheel] = held[i, wheel, 1]
-    grid = Grid(
-        ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution
-    )
+    grid = Grid(ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution)
     status = settle(
         grid, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
         q, placement, touch, work.J, work.step,

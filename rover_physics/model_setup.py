@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.contact import sample_wheel
 from rover_physics.errors import ModelError
 from rover_physics.evaluation import SETTINGS, find_tip_over, new_work
 from rover_physics.ground import Ground, pack_ground
@@ -18,6 +17,7 @@ from rover_physics.rover import Rover
 from rover_physics.soil import pack_soils
 from rover_physics.terrain import Terrain
 from rover_physics.torques import EQUAL, OPTIMAL
+from rover_physics.wheel_samples import sample_wheel
 
 POLICIES = {"equal": EQUAL, "optimal": OPTIMAL}
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.limits import Verdict, judge
@@ -192,4 +191,6 @@ def _describe_limits(arm: Manipulator, local: np.ndarray) -> str:
 
 def _attitude(standing: PathPrediction) -> np.ndarray:
     angles = [standing.poses[0, 2], standing.pitch[0], standing.roll[0]]
+    from scipy.spatial.transform import Rotation  # long to import
+
     return Rotation.from_euler("ZYX", angles).as_matrix()

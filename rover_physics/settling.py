@@ -7,20 +7,11 @@ small angles.
 
 import numpy as np
 
-from rover_physics.contact import (
-    AGAIN,
-    COARSE,
-    EXACT,
-    FULL,
-    NEAR,
-    QUICK,
-    TOUCHING,
-    find_contact,
-    find_touch,
-)
+from rover_physics.contact import find_contact, find_touch
 from rover_physics.kernels import kernel
 from rover_physics.linear import solve_in_place
 from rover_physics.linkage import place, rocker_sign
+from rover_physics.touch import AGAIN, COARSE, EXACT, FULL, NEAR, QUICK, TOUCHING
 
 SETTLED, OFF_MAP, UNKNOWN_GROUND, NOT_SETTLED = 0, 1, 2, 3
 GAP_TOLERANCE = 3e-5

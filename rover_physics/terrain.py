@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage, sparse
-from scipy.sparse import linalg
 
 from rover_physics.errors import TerrainError
 from rover_physics.terrain_checks import (
@@ -249,6 +247,8 @@ def _read_npz(path: Path) -> dict[str, Any]:
 
 def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:
     """Select the unknown regions in the map's inside that are at most max_cells wide."""
+    from scipy import ndimage  # takes as long to import as the rest of the package
+
     labels, count = ndimage.label(unknown)
     small = np.ones(count + 1, dtype=bool)
     small[0] = False
@@ -267,6 +267,9 @@ def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]
 
 def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Solve for heights in the gaps that are the mean of their four neighbours each."""
+    from scipy import sparse
+    from scipy.sparse import linalg
+
     count = int(gaps.sum())
     index = np.full(gaps.shape, -1)
     index[gaps] = np.arange(count)
@@ -288,6 +291,8 @@ def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> N
 
 def _fill_with_largest(std: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Give the cells of each gap the largest standard deviation around it."""
+    from scipy import ndimage
+
     filled = std.copy()
     labels, _ = ndimage.label(gaps)
     for label, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):

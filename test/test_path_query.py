@@ -139,6 +139,24 @@ def test_risk_is_one_at_a_limit(rover):
     assert path_risk(rover, at_limit) == pytest.approx(1.0)
 
 
+def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):
+    ground = flat(4.0)
+    uncertain = dataclasses.replace(ground, elevation_std=np.full(ground.elevation.shape, 0.003))
+    pose = np.array([[0.0, 0.0, 0.0]])
+    sure = path_risk(rover, check_path(rover, ground, pose, COARSE).verdict)
+    risks = [
+        path_risk(
+            rover,
+            check_path(
+                rover, uncertain, pose, dataclasses.replace(COARSE, map_sigmas=sigmas)
+            ).verdict,
+        )
+        for sigmas in (0.0, 1.0, 3.0)
+    ]
+    assert risks[0] == sure
+    assert sure < risks[1] < risks[2] < 1.0
+
+
 def test_the_smallest_radius_is_the_wheelbase(rover):
     assert smallest_radius(rover) == pytest.approx(0.8)
     assert smallest_radius(load_rover("m2020")) == pytest.approx(2.26)

@@ -7,12 +7,12 @@ import pytest
 from rough_grounds import bouldered, fractal, random_poses
 from rover_geometry import wheel_gaps
 
-from rover_physics.contact import sample_wheel
 from rover_physics.limits import judge
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import load_rover
 from rover_physics.sweep import NOT_SETTLED, SETTLED, sweep_path
 from rover_physics.terrain import Terrain
+from rover_physics.wheel_samples import sample_wheel
 
 LSR1 = load_rover("lsr1")
 SEEDS = range(10)

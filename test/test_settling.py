@@ -8,10 +8,10 @@ from reference_cases import reference_grounds, reference_predictions
 from rough_grounds import fractal, mirrored, plane, quarter_turn, random_poses, smooth
 from rover_geometry import attitude_of, place_rover, wheel_gaps
 
-from rover_physics.contact import sample_wheel
 from rover_physics.rover import load_rover
 from rover_physics.sweep import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND, sweep_path
 from rover_physics.terrain import Terrain
+from rover_physics.wheel_samples import sample_wheel
 
 LSR1 = load_rover("lsr1")
 GAP = 3e-5  # what a settled pose may leave open [m]

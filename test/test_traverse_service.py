@@ -1,6 +1,7 @@
 """The service knows a map, a path and joint angles, and answers from them without ROS."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,24 @@ def test_settings_change_the_answer():
     service.settings = settings_from_parameters(DEFAULTS | {"friction": 0.01})
     refused = service.answer(start, goal)
     assert not refused.traversable and refused.verdict["code"] == "friction"
+
+
+def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
+    certain = make_terrain(waves)
+    uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
+    start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
+    service = make_service(uncertain)
+    refused = service.answer(start, goal).verdict
+    assert not refused["traversable"]
+    assert refused["reason"].endswith("at worst within 3 sigma of the map")
+    assert refused["map_sigmas"] == 3.0
+    assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
+    service.settings = settings_from_parameters(DEFAULTS | {"map_sigmas": 0.0})
+    passed = service.answer(start, goal).verdict
+    assert passed["traversable"]
+    assert passed["map_sigmas"] == 0.0
+    assert passed["friction_utilisation_bound"] is None
+    assert passed == make_service(certain).answer(start, goal).verdict
 
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():

@@ -1,0 +1,158 @@
+"""The place of a circle of a wheel that is nearest to the ground, between the samples."""
+
+import numpy as np
+
+from rover_physics.ground import look_up
+from rover_physics.kernels import kernel
+from rover_physics.touch import CIRCLE_REACH
+
+REFINEMENTS = 9
+GAP_PRECISION = 1e-5
+"""How far the gap of a circle may be from its smallest, in wheel radii."""
+TURN_TOLERANCE = 3e-3
+"""Error of the contact angle [rad] at which the search along the circle stops."""
+BESIDE_REACH = 5e-3
+"""How far above the nearest circle, in wheel radii, another is looked at between its samples."""
+BESIDE_SHARE = 0.8
+"""Share of the circle's own rise from which on the ground counts as no plane."""
+
+
+@kernel
+def search_circle(grid, samples, placement, wheel, across, s, c):
+    """Return the smallest gap [m] of a circle near the angle of (s, c), and where: sine, cosine.
+
+    On a plane the circle touches in the direction of the plane's normal, so the first trials look
+    in the direction of the normal found last. On an edge that leads to and fro: then the next
+    trial is where the tangents of the gap from both sides meet, which is also where the gap can't
+    be smaller. Infinite over unknown ground.
+    """
+    R, centres, radius = placement.R, placement.centres, samples.radius
+    x = centres[wheel, 0] + across * R[0, 1]
+    y = centres[wheel, 1] + across * R[1, 1]
+    z = centres[wheel, 2] + across * R[2, 1]
+    ahead_x, ahead_y = placement.forward[0], placement.forward[1]
+    up_x, up_y, up_z = placement.up[0], placement.up[1], placement.up[2]
+    best, best_s, best_c = np.inf, s, c
+    turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
+    back_s, back_c = s * turn_c - c * turn_s, c * turn_c + s * turn_s
+    ahead_s, ahead_c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
+    if back_c < 0.0:
+        back_s, back_c = -1.0, 0.0
+    if ahead_c < 0.0:
+        ahead_s, ahead_c = 1.0, 0.0
+    back_gap, ahead_gap, back_rate, ahead_rate = np.inf, np.inf, 0.0, 0.0
+    for trial in range(REFINEMENTS):
+        height, slope_x, slope_y = look_up(
+            grid, x + radius * (s * ahead_x - c * up_x), y + radius * (s * ahead_y - c * up_y)
+        )
+        gap = z - radius * c * up_z - height
+        rise = slope_x * ahead_x + slope_y * ahead_y
+        fall = up_z - slope_x * up_x - slope_y * up_y
+        turn = s * fall - c * rise
+        length_squared = rise * rise + fall * fall
+        converged = not turn * turn > TURN_TOLERANCE * TURN_TOLERANCE * length_squared
+        if gap < best:
+            best, best_s, best_c = gap, s, c
+            if converged:
+                length = np.sqrt(length_squared)
+                best += radius * (s * rise + c * fall - length)
+                best_s, best_c = rise / length, fall / length
+        if converged:
+            break
+        if turn > 0.0:
+            ahead_s, ahead_c, ahead_gap, ahead_rate = s, c, gap, radius * turn
+        else:
+            back_s, back_c, back_gap, back_rate = s, c, gap, radius * turn
+        share = 0.5
+        if back_gap < np.inf and ahead_gap < np.inf:
+            between = ahead_s * back_c - ahead_c * back_s
+            share = (ahead_gap - back_gap - ahead_rate * between) / (
+                (back_rate - ahead_rate) * between
+            )
+            if best - (back_gap + back_rate * share * between) < GAP_PRECISION * radius:
+                break
+        if trial < 2:
+            inverse = 1.0 / np.sqrt(length_squared)
+            s, c = rise * inverse, fall * inverse
+        if trial > 1 or not (s * back_c > c * back_s and s * ahead_c < c * ahead_s):
+            share = min(max(share, 0.05), 0.95)
+            s, c = back_s + share * (ahead_s - back_s), back_c + share * (ahead_c - back_c)
+            inverse = 1.0 / np.sqrt(s * s + c * c)
+            s, c = s * inverse, c * inverse
+    return best, best_s, best_c
+
+
+@kernel
+def refine_from(grid, samples, placement, wheel, m, s, c, touch):
+    """Search circle m near (s, c), keep what is nearer than before, and return the gap found."""
+    gap, s, c = search_circle(grid, samples, placement, wheel, samples.laterals[m], s, c)
+    if gap < touch.circle_gap[wheel, m]:
+        touch.circle_gap[wheel, m] = gap
+        touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
+    return gap
+
+
+@kernel
+def refine_circle(grid, samples, placement, wheel, m, touch):
+    """Search circle m anew from where it was nearest."""
+    s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+    touch.circle_gap[wheel, m] = np.inf
+    refine_from(grid, samples, placement, wheel, m, s, c, touch)
+    if touch.circle_gap[wheel, m] == np.inf:
+        touch.circle_gap[wheel, m] = np.nan
+
+
+@kernel
+def refine_others(grid, samples, placement, wheel, touch):
+    """Look closer at the circles with samples that come near to the smallest gap."""
+    reach = touch.noted_gap[wheel] + CIRCLE_REACH * samples.radius
+    nearest = touch.nearest[wheel]
+    s0, c0 = touch.circle_sine[wheel, nearest], touch.circle_cosine[wheel, nearest]
+    for m in range(samples.circles):
+        if m != nearest:
+            touch.circle_gap[wheel, m] = np.inf
+        if touch.first_gap[wheel, m] <= reach:
+            k = touch.first_row[wheel, m]
+            s, c = samples.sines[k], samples.cosines[k]
+            lower = m == nearest and touch.first_gap[wheel, m] < touch.circle_gap[wheel, m]
+            if abs(s * c0 - c * s0) < samples.spacing_sine and not lower:
+                s, c = s0, c0
+            if m != nearest or s != s0:
+                refine_from(grid, samples, placement, wheel, m, s, c, touch)
+        if touch.second_gap[wheel, m] <= reach:
+            k = touch.second_row[wheel, m]
+            s, c = samples.sines[k], samples.cosines[k]
+            refine_from(grid, samples, placement, wheel, m, s, c, touch)
+        if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
+            touch.nearest[wheel] = m
+    reach = touch.circle_gap[wheel, touch.nearest[wheel]] + BESIDE_REACH * samples.radius
+    for m in range(samples.circles):
+        if touch.circle_gap[wheel, m] <= reach:
+            _look_beside(grid, samples, placement, wheel, m, touch)
+            if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
+                touch.nearest[wheel] = m
+
+
+@kernel
+def _look_beside(grid, samples, placement, wheel, m, touch):
+    """Search circle m from between the samples, too, where the ground comes nearer there.
+
+    Over a plane the gap grows away from the smallest with the rise of the circle; where it grows
+    less, a wheel that bridges a hollow may come nearer to the hollow's other side.
+    """
+    R, forward, up = placement.R, placement.forward, placement.up
+    centres, radius, across = placement.centres, samples.radius, samples.laterals[m]
+    gap, s0, c0 = (
+        touch.circle_gap[wheel, m], touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+    )  # fmt: skip
+    limit = gap + BESIDE_SHARE * radius * (1.0 - samples.beside_cosine)
+    for side in range(-1, 2, 2):
+        turn = side * samples.beside_sine
+        s, c = s0 * samples.beside_cosine + c0 * turn, c0 * samples.beside_cosine - s0 * turn
+        if c < 0.0:
+            continue
+        x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
+        y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
+        z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+        if z - look_up(grid, x, y)[0] < limit:
+            refine_from(grid, samples, placement, wheel, m, s, c, touch)

@@ -1,0 +1,146 @@
+"""All samples of a wheel's rim held against the ground: which of them are near."""
+
+import numpy as np
+
+from rover_physics.circle_search import refine_from
+from rover_physics.ground import find_roof, height_at_cell, height_inside, is_cell_on_map
+from rover_physics.kernels import kernel
+from rover_physics.touch import (
+    CIRCLE_REACH,
+    COARSE,
+    EXACT,
+    FAR_ROW,
+    FULL,
+    OFF_MAP,
+    TOUCHING,
+    UNKNOWN_GROUND,
+)
+
+EXACT_REACH = 0.5
+"""How far above the nearest sample, in wheel radii, an exact search still refines others: beside
+a face much can lie between two samples."""
+
+
+@kernel
+def scan_rim(grid, samples, placement, wheel, scope, touch):
+    """Sample the rim; write the nearest samples into `touch` and return the worst status."""
+    first, last, stride = 0, samples.circles - 1, 1
+    if scope == COARSE:
+        first = last = last // 2
+        stride = 2
+    for m in range(samples.circles):
+        touch.first_row[wheel, m] = touch.second_row[wheel, m] = FAR_ROW
+        touch.first_gap[wheel, m] = touch.second_gap[wheel, m] = np.inf
+    if scope != EXACT:
+        scale = grid.inverse_resolution
+        centre_x = (placement.centres[wheel, 0] - grid.x0) * scale
+        centre_y = (placement.centres[wheel, 1] - grid.y0) * scale
+        roof = find_roof(grid, centre_x, centre_y, samples.reach * scale)
+        if roof < np.inf:
+            reach = CIRCLE_REACH * samples.radius if scope == FULL else 0.0
+            _scan_inside(
+                grid, samples, placement, wheel, roof, reach,
+                first, last, stride, touch,
+            )  # fmt: skip
+            return TOUCHING
+    return _scan_carefully(
+        grid, samples, placement, wheel, scope == EXACT,
+        first, last, stride, touch,
+    )  # fmt: skip
+
+
+@kernel
+def _scan_inside(grid, samples, placement, wheel, roof, reach, first, last, stride, touch):
+    """Sample a rim that is well over known ground, none of it higher than `roof` [m].
+
+    Rows of samples at one angle are visited from the lowest upwards, until even the roof is
+    farther below than the nearest sample by `reach`. What the loop reads is in local variables:
+    the compiler must take it that anything written may lie anywhere.
+    """
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    elevation, scale, radius = grid.elevation, grid.inverse_resolution, samples.radius
+    laterals = samples.laterals
+    rows, middle = (samples.rows - 1) // stride + 1, samples.rows // 2
+    ahead_x, ahead_y = scale * radius * forward[0], scale * radius * forward[1]
+    down_x, down_y, down_z = scale * radius * up[0], scale * radius * up[1], radius * up[2]
+    across = laterals[first]
+    x = (centres[wheel, 0] - grid.x0 + across * R[0, 1]) * scale
+    y = (centres[wheel, 1] - grid.y0 + across * R[1, 1]) * scale
+    z = centres[wheel, 2] + across * R[2, 1]
+    width = 0.0
+    if last > first:
+        width = (laterals[last] - across) / (last - first)
+    step_x, step_y, step_z = width * R[0, 1] * scale, width * R[1, 1] * scale, width * R[2, 1]
+    rim = abs(laterals[samples.circles - 1] * R[2, 1])
+    floor = roof + rim - centres[wheel, 2]
+    best, best_m = np.inf, first
+    for visit in range(rows):
+        k = middle + stride * ((visit + 1) // 2) * (1 - 2 * (visit % 2))
+        s, c = samples.sines[k], samples.cosines[k]
+        if -c * down_z - floor > best + reach:
+            break
+        gx = x + s * ahead_x - c * down_x
+        gy = y + s * ahead_y - c * down_y
+        gz = z - c * down_z
+        for m in range(first, last + 1):
+            gap = gz - height_inside(elevation, gx, gy)
+            gx += step_x
+            gy += step_y
+            gz += step_z
+            if gap < best + reach:
+                _note_sample(wheel, m, k, stride, gap, touch)
+                if gap < best:
+                    best, best_m = gap, m
+    touch.noted_gap[wheel], touch.noted_circle[wheel] = best, best_m
+
+
+@kernel
+def _note_sample(wheel, m, k, stride, gap, touch):
+    """Note a near sample of row k on circle m: the nearest, or the nearest away from that."""
+    if gap < touch.first_gap[wheel, m]:
+        if abs(k - touch.first_row[wheel, m]) > stride:
+            touch.second_gap[wheel, m] = touch.first_gap[wheel, m]
+            touch.second_row[wheel, m] = touch.first_row[wheel, m]
+        touch.first_gap[wheel, m], touch.first_row[wheel, m] = gap, k
+    elif gap < touch.second_gap[wheel, m] and abs(k - touch.first_row[wheel, m]) > stride:
+        touch.second_gap[wheel, m], touch.second_row[wheel, m] = gap, k
+
+
+@kernel
+def _scan_carefully(grid, samples, placement, wheel, exact, first, last, stride, touch):
+    """Sample a rim that may be over unknown ground, beyond the map or beside a face.
+
+    Where `exact`, each sample that may be near is refined at once. Returns the worst status.
+    """
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    elevation, scale, radius = grid.elevation, grid.inverse_resolution, samples.radius
+    status, best, best_m = TOUCHING, np.inf, first
+    if exact:
+        touch.circle_gap[wheel, :] = np.inf
+    middle = samples.rows // 2
+    for visit in range((samples.rows - 1) // stride + 1):
+        k = middle + stride * ((visit + 1) // 2) * (1 - 2 * (visit % 2))
+        s, c = samples.sines[k], samples.cosines[k]
+        for m in range(first, last + 1):
+            across = samples.laterals[m]
+            x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
+            y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
+            gx, gy = (x - grid.x0) * scale, (y - grid.y0) * scale
+            if not is_cell_on_map(elevation, gx, gy):
+                status = OFF_MAP
+                continue
+            gap = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+            gap -= height_at_cell(elevation, gx, gy)
+            if gap != gap:
+                if status == TOUCHING:
+                    status = UNKNOWN_GROUND
+                continue
+            _note_sample(wheel, m, k, stride, gap, touch)
+            if exact and gap < best + EXACT_REACH * radius:
+                gap = refine_from(grid, samples, placement, wheel, m, s, c, touch)
+            if gap < best:
+                best, best_m = gap, m
+    touch.noted_gap[wheel], touch.noted_circle[wheel] = best, best_m
+    if exact:
+        touch.nearest[wheel] = best_m
+    return status

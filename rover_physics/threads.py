@@ -1,0 +1,20 @@
+"""How many threads a sweep is worth: to wake them takes longer than a short sweep takes alone."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numba
+
+ALONE = 2000
+"""Poses under equal torques, or what takes as long, up to which one thread works alone."""
+
+
+@contextmanager
+def threads_worth(poses: int) -> Iterator[None]:
+    """Let kernels use as many threads as they may, or one if there are few `poses`."""
+    allowed = numba.get_num_threads()
+    numba.set_num_threads(allowed if poses > ALONE else 1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(allowed)
