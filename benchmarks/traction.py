@@ -4,11 +4,9 @@ Run from the repository: python benchmarks/traction.py [--quick] [--out FOLDER]
 It needs the extra `bench`. docs/traction.md has what it says.
 """
 
-import argparse
-import json
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np

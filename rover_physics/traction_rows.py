@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.contact import TOUCH
 from rover_physics.equilibrium import BALANCE, FREE_TORQUES, balance_forces
 from rover_physics.errors import ModelError
 from rover_physics.kernels import kernel
@@ -20,6 +19,7 @@ from rover_physics.linkage import PLACEMENT, pack_linkage, place, place_masses
 from rover_physics.manipulator import body_mass_and_com
 from rover_physics.records import new_record, record_type
 from rover_physics.rover import Rover
+from rover_physics.touch import TOUCH
 
 WHEEL_COUNT = 6
 FORCES = 2 * WHEEL_COUNT + 2

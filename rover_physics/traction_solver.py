@@ -7,7 +7,6 @@ import osqp
 from scipy import sparse
 
 from rover_physics.traction import (
-    FORCES,
     LEAST_LOAD,
     ROWS,
     VARIABLES,
@@ -16,7 +15,7 @@ from rover_physics.traction import (
     TractionWeights,
     build_traction_qp,
 )
-from rover_physics.traction_rows import WHEEL_COUNT, BalanceRows
+from rover_physics.traction_rows import FORCES, WHEEL_COUNT, BalanceRows
 
 TOLERANCE = 1e-5
 """Of OSQP, absolute and relative. Its default of 1e-3 leaves rows 1e-2 of the weight open."""

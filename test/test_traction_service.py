@@ -1,4 +1,4 @@
-"""Torques from measurements: zero when anything is missing, at once, and again when it is there."""
+"""Torques from measurements: zero at once when anything is missing, back when it is there."""
 
 from dataclasses import replace
 
