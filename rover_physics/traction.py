@@ -122,8 +122,7 @@ def build_traction_qp(
         ModelError: A friction coefficient or largest pull that is not above 0.
     """
     weights = weights or TractionWeights()
-    if not (np.min(friction) > 0.0 and most_pull > 0.0):
-        raise ModelError(f"friction {friction} and largest pull {most_pull} must all be above 0")
+    check_limits(friction, most_pull)
     qp = TractionQP(
         P=np.full(VARIABLES, REGULARISATION),
         q=np.zeros(VARIABLES),
@@ -146,6 +145,12 @@ def build_traction_qp(
     qp.start[PEAK] = 1.0
     _write_costs(qp, weights)
     return qp
+
+
+def check_limits(friction: np.ndarray, most_pull: float) -> None:
+    """Raise ModelError where a friction coefficient (6,) or the largest pull is not above 0."""
+    if not (np.min(friction) > 0.0 and most_pull > 0.0):
+        raise ModelError(f"friction {friction} and largest pull {most_pull} must all be above 0")
 
 
 def _write_costs(qp: TractionQP, weights: TractionWeights) -> None:

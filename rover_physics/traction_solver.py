@@ -14,6 +14,7 @@ from rover_physics.traction import (
     TractionQP,
     TractionWeights,
     build_traction_qp,
+    check_limits,
 )
 from rover_physics.traction_rows import FORCES, WHEEL_COUNT, BalanceRows
 
@@ -123,6 +124,7 @@ def solve_traction(
         ModelError: A friction coefficient or largest torque that is not above 0.
     """
     most_pull = max_torque / (wheel_radius * rows.force_unit)
+    check_limits(friction, most_pull)
     pulls = np.zeros(WHEEL_COUNT) if last is None else last / rows.force_unit
     x = rows.complete(pulls)
     peak = measure_peak(rows, friction, x)
