@@ -82,6 +82,7 @@ setup(
         "console_scripts": [
             "rover_planner = rover_planner.cli:main",
             "traverse_server = rover_planner.traverse_server:main",
+            "traction_controller = rover_planner.traction_controller:main",
             "mission_planner = rover_planner.mission_planner:main",
         ],
     },

@@ -1,11 +1,13 @@
-"""Joint state messages: measured joint angles by name."""
+"""Joint state messages: measured joint angles and their rates by name."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from sensor_msgs.msg import JointState
 
 from msg_adapters.errors import MessageError
+
+_PLURALS = {"position": "positions", "velocity": "velocities"}
 
 
 def joint_positions(state: JointState, wanted: Collection[str]) -> dict[str, float]:
@@ -18,22 +20,37 @@ def joint_positions(state: JointState, wanted: Collection[str]) -> dict[str, flo
         MessageError: position has another length than name, a wanted joint is named twice, or
             its position is not finite.
     """
-    if not state.position:
+    return _read_by_name(state, state.position, "position", "angle in rad", wanted)
+
+
+def joint_velocities(state: JointState, wanted: Collection[str]) -> dict[str, float]:
+    """Return the velocities [rad/s] of the wanted joints that a message carries, by name.
+
+    Raises:
+        MessageError: as `joint_positions`, of velocity.
+    """
+    return _read_by_name(state, state.velocity, "velocity", "rate in rad/s", wanted)
+
+
+def _read_by_name(
+    state: JointState, values: Sequence[float], field: str, right: str, wanted: Collection[str]
+) -> dict[str, float]:
+    if not values:
         return {}
-    if len(state.position) != len(state.name):
+    if len(values) != len(state.name):
         raise MessageError(
-            f"joint_states has {len(state.position)} positions for {len(state.name)} names; "
+            f"joint_states has {len(values)} {_PLURALS[field]} for {len(state.name)} names; "
             "there must be one for each, or none at all"
         )
-    positions: dict[str, float] = {}
-    for name, position in zip(state.name, state.position, strict=True):
+    found: dict[str, float] = {}
+    for name, value in zip(state.name, values, strict=True):
         if name not in wanted:
             continue
-        if name in positions:
+        if name in found:
             raise MessageError(f"joint_states names {name} twice")
-        if not math.isfinite(position):
+        if not math.isfinite(value):
             raise MessageError(
-                f"joint_states has position {position} of {name}; it must be a finite angle in rad"
+                f"joint_states has {field} {value} of {name}; it must be a finite {right}"
             )
-        positions[name] = float(position)
-    return positions
+        found[name] = float(value)
+    return found

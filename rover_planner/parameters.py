@@ -18,11 +18,18 @@ from rclpy.parameter import Parameter
 from msg_adapters.elevation import CELL_HEIGHTS
 from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
+from rover_physics.names import WHEEL_JOINTS
 from rover_physics.uncertainty import SIGMAS
 from rover_planner.errors import PlanningError
 from rover_planner.qos import MAP_DURABILITIES
 
-_TYPE_NAMES: dict[type, str] = {str: "string", float: "double", int: "integer", bool: "bool"}
+_TYPE_NAMES: dict[type, str] = {
+    str: "string",
+    float: "double",
+    int: "integer",
+    bool: "bool",
+    list: "string array",
+}
 
 
 class ParameterError(PlanningError):
@@ -63,6 +70,10 @@ class ParameterSpec:
             raise ParameterError(
                 f"parameter {self.name} is {value!r}; it must be of "
                 f"type {self.type_name}, such as {self.default!r}"
+            )
+        if isinstance(value, list) and not all(isinstance(text, str) and text for text in value):
+            raise ParameterError(
+                f"parameter {self.name} is {value!r}; it must hold texts, none of them empty"
             )
         if value == "" != self.default:
             raise ParameterError(
@@ -197,6 +208,105 @@ TRAVERSE_SERVER = (
 )
 """Parameters of `/traverse_server`."""
 
+TRACTION_CONTROLLER = (
+    ParameterSpec("rover", "lsr1", "Rover that is driven: a preset's name or a rover file."),
+    ParameterSpec(
+        "joints",
+        list(WHEEL_JOINTS),
+        "Wheel joints in the order of the values of ~/commands.",
+        read_only=True,
+    ),
+    ParameterSpec(
+        "rate", 50.0, "Updates per second.", "1/s", bounds=(10.0, 500.0), read_only=True
+    ),
+    ParameterSpec(
+        "timeout",
+        0.08,
+        "Age from which joint states, attitude and cmd_vel are stale; torques are then zero.",
+        "s",
+        bounds=(0.01, 1.0),
+    ),
+    ParameterSpec(
+        "odometry_timeout",
+        0.5,
+        "Age from which odometry is not used.",
+        "s",
+        bounds=(0.01, 10.0),
+    ),
+    ParameterSpec(
+        "friction",
+        0.0,
+        "Coulomb friction that is counted on; 0 takes the rover file's.",
+        bounds=(0.0, 10.0),
+    ),
+    ParameterSpec(
+        "max_torque",
+        0.0,
+        "Largest torque of a wheel; 0 takes the rover file's.",
+        "N m",
+        bounds=(0.0, 1e6),
+    ),
+    ParameterSpec(
+        "payload",
+        -1.0,
+        "Mass at the tip of the manipulator; -1 takes the rover file's.",
+        "kg",
+        bounds=(-1.0, 1e6),
+    ),
+    ParameterSpec(
+        "policy",
+        "optimal",
+        "How the wheels share the traction: smallest peak friction utilisation, or equal torques.",
+        choices=("equal", "optimal"),
+    ),
+    ParameterSpec("torque_rate", 20.0, "Largest change of a torque.", "N m/s", bounds=(0.1, 1e6)),
+    ParameterSpec("speed_gain", 6.0, "Acceleration per error of speed.", "1/s", bounds=(0.0, 1e3)),
+    ParameterSpec(
+        "travel_gain", 12.0, "Acceleration per error of way.", "1/s^2", bounds=(0.0, 1e4)
+    ),
+    ParameterSpec(
+        "heading_gain",
+        2.0,
+        "Angular acceleration per error of yaw rate.",
+        "1/s",
+        bounds=(0.0, 1e3),
+    ),
+    ParameterSpec(
+        "slip_gain",
+        1.0,
+        "Torque against a wheel that leaves its rolling speed, in weights times radius squared.",
+        "s/m",
+        bounds=(0.0, 1e3),
+    ),
+    ParameterSpec(
+        "map_frame",
+        "map",
+        "Frame of map and odometry; what comes in another frame is refused.",
+        read_only=True,
+    ),
+    ParameterSpec(
+        "map_resolution",
+        0.0,
+        "Cell size for clouds; 0 takes their spacing where they are a regular grid.",
+        "m",
+        bounds=(0.0, 10.0),
+    ),
+    ParameterSpec(
+        "cell_height",
+        "max",
+        "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
+        choices=CELL_HEIGHTS,
+    ),
+    ParameterSpec(
+        "map_durability",
+        "either",
+        "Publishers of the map that are heard, by their durability.",
+        choices=MAP_DURABILITIES,
+        read_only=True,
+    ),
+)
+"""Parameters of `/traction_controller`."""
+
 
 def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> dict[str, Any]:
     """Declare parameters with their descriptors and return their checked values by name.
@@ -262,6 +372,10 @@ def parameters_document() -> str:
             "## /traverse_server",
             "",
             *_table(TRAVERSE_SERVER),
+            "",
+            "## /traction_controller",
+            "",
+            *_table(TRACTION_CONTROLLER),
             "",
             "Read-only parameters are set at start, the others at any time "
             "(`ros2 param set /traverse_server friction 0.6`).",

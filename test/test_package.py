@@ -87,6 +87,7 @@ def test_every_console_script_is_a_function_that_exists(setup_arguments):
         "rover_planner",
         "traverse_server",
         "mission_planner",
+        "traction_controller",
     }
     for line in scripts:
         module, function = line.split(" = ")[1].split(":")

@@ -1,0 +1,62 @@
+"""Commands: the wanted speed of the rover in, joint efforts and values per wheel out."""
+
+import array
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from geometry_msgs.msg import TwistStamped
+from numpy.typing import NDArray
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+from msg_adapters.errors import MessageError
+from rover_physics.names import WHEEL_JOINTS, WHEELS
+
+
+def twist_to_speeds(twist: TwistStamped) -> tuple[float, float]:
+    """Return forward speed [m/s] and yaw rate [rad/s]; other components are not looked at.
+
+    Raises:
+        MessageError: one of them is not finite.
+    """
+    forward, yaw = twist.twist.linear.x, twist.twist.angular.z
+    if not (math.isfinite(forward) and math.isfinite(yaw)):
+        raise MessageError(
+            f"cmd_vel has linear.x {forward} and angular.z {yaw}; both must be finite"
+        )
+    return forward, yaw
+
+
+def joint_order(joints: Sequence[str]) -> NDArray[np.int64]:
+    """Return for each of the named joints the wheel (6,) that it drives.
+
+    Raises:
+        MessageError: the names are not those of the six wheel joints, each once.
+    """
+    if sorted(joints) != sorted(WHEEL_JOINTS):
+        raise MessageError(
+            f"joints are {', '.join(joints)}; they must be {', '.join(WHEEL_JOINTS)} in any order"
+        )
+    return np.array([WHEEL_JOINTS.index(joint) for joint in joints])
+
+
+def effort_commands(torques: NDArray[np.float64], order: NDArray[np.int64]) -> Float64MultiArray:
+    """Write torques (6,) [N m] in wheel order as efforts in the order of `joint_order`."""
+    return Float64MultiArray(data=_doubles(torques[order]))
+
+
+def wheel_values(values: NDArray[np.float64], rows: str = "") -> Float64MultiArray:
+    """Write values (6,), or (k, 6) with a name for its rows, as an array with labelled dims."""
+    message = Float64MultiArray(data=_doubles(values))
+    dims = [MultiArrayDimension(label="wheel", size=len(WHEELS), stride=len(WHEELS))]
+    if rows:
+        dims.insert(0, MultiArrayDimension(label=rows, size=len(values), stride=values.size))
+    message.layout.dim = dims
+    return message
+
+
+def _doubles(values: NDArray[np.float64]) -> array.array:
+    """Copy values into the array type that message fields take without a check per element."""
+    data = array.array("d")
+    data.frombytes(np.ascontiguousarray(values, dtype=np.float64).tobytes())
+    return data

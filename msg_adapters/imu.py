@@ -1,0 +1,55 @@
+"""Inertial measurements: the attitude and the turning rates of the body."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import Imu
+
+from msg_adapters.errors import MessageError
+
+NOT_MEASURED = -1.0
+"""First element of a covariance of what the sensor does not measure."""
+
+
+@dataclass(frozen=True, eq=False)
+class Attitude:
+    """What an inertial unit, mounted along the body's axes, says of the body."""
+
+    roll: float
+    """[rad]"""
+    pitch: float
+    """[rad], positive with the nose down."""
+    rates: NDArray[np.float64] | None
+    """(3,) angular velocity, body frame [rad/s]; None where it is not measured."""
+
+
+def imu_to_attitude(imu: Imu) -> Attitude:
+    """Read attitude and turning rates; the yaw of the orientation is not used.
+
+    Raises:
+        MessageError: no orientation, one that is no rotation, or values that are not finite.
+    """
+    if imu.orientation_covariance[0] == NOT_MEASURED:
+        raise MessageError(
+            "imu has no orientation (orientation_covariance[0] is -1); roll and pitch are needed"
+        )
+    q = imu.orientation
+    x, y, z, w = q.x, q.y, q.z, q.w
+    norm = math.sqrt(x * x + y * y + z * z + w * w)
+    if not 0.99 < norm < 1.01:
+        raise MessageError(
+            f"imu has orientation {[x, y, z, w]} of norm {norm:g}; it must be a quaternion of "
+            "norm 1"
+        )
+    roll = math.atan2(2.0 * (w * x + y * z), norm**2 - 2.0 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x) / norm**2)))
+    if imu.angular_velocity_covariance[0] == NOT_MEASURED:
+        return Attitude(roll, pitch, None)
+    rate = imu.angular_velocity
+    if not math.isfinite(rate.x + rate.y + rate.z):
+        raise MessageError(
+            f"imu has angular velocity {[rate.x, rate.y, rate.z]}; it must be finite, in rad/s"
+        )
+    return Attitude(roll, pitch, np.array([rate.x, rate.y, rate.z]))

@@ -1,0 +1,35 @@
+"""Odometry messages: where the rover is on the map, and how well that is known."""
+
+import math
+
+import numpy as np
+from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
+
+from msg_adapters.errors import MessageError
+from msg_adapters.frames import check_frame
+
+
+def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.float64], float]:
+    """Return (4,) x, y, z [m] and yaw [rad] of the body, and the deviation of x and y [m].
+
+    Raises:
+        MessageError: another frame, values that are not finite, or no rotation.
+    """
+    check_frame(odometry.header.frame_id, map_frame, "odometry")
+    place, q = odometry.pose.pose.position, odometry.pose.pose.orientation
+    norm = math.sqrt(q.x**2 + q.y**2 + q.z**2 + q.w**2)
+    if not 0.99 < norm < 1.01:
+        raise MessageError(
+            f"odometry has orientation {[q.x, q.y, q.z, q.w]} of norm {norm:g}; it must be a "
+            "quaternion of norm 1"
+        )
+    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), norm**2 - 2.0 * (q.y**2 + q.z**2))
+    pose = np.array([place.x, place.y, place.z, yaw])
+    covariance = odometry.pose.covariance
+    variance = max(float(covariance[0]), float(covariance[7]), 0.0)
+    if not (np.isfinite(pose).all() and math.isfinite(variance)):
+        raise MessageError(
+            f"odometry has pose {pose.tolist()} and variance {variance}; all must be finite"
+        )
+    return pose, math.sqrt(variance)

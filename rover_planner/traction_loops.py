@@ -1,0 +1,105 @@
+"""The loops around the shared torques: speed, heading, wheels that slip, and rate of change."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+OVERSPEED = 1.3
+"""Mean rate of the wheels, over the wanted one, that is still taken for rolling."""
+STALLED = 0.3
+"""Share of the wanted rate below which the rover does not get on."""
+STALL_TIME, STALL_DELAY, RECOVERY_TIME = 1.0, 0.5, 1.5
+"""Time in which servos take over, in which they wait before (in the same), and let go [s]."""
+
+
+@dataclass(frozen=True)
+class LoopGains:
+    """How hard the loops pull."""
+
+    speed: float
+    """Acceleration per error of speed [1/s]."""
+    travel: float
+    """Acceleration per error of way [1/s^2]."""
+    heading: float
+    """Angular acceleration per error of yaw rate [1/s]; that of the angle is a half of it."""
+    slip: float
+    """Torque per difference of a wheel's speed from that of rolling [N m s/rad]."""
+    torque_rate: float
+    """Largest change of a torque [N m/s]."""
+
+
+class PushLoop:
+    """Turns an error of speed into a push: proportional to it, and to the way it adds up to."""
+
+    def __init__(self, gain: float, integral_gain: float, most: float):
+        """Start at rest; `most` is the largest push and its largest integral part."""
+        self._gain, self._integral_gain, self._most = gain, integral_gain, most
+        self._integral = 0.0
+
+    def reset(self) -> None:
+        """Forget the way."""
+        self._integral = 0.0
+
+    def update(self, error: float, duration: float, limited: bool) -> float:
+        """Return the push.
+
+        Args:
+            error: Wanted minus measured speed.
+            duration: Since the last call [s].
+            limited: Whether the last push could not be given; then it does not grow.
+        """
+        step = self._integral_gain * error * duration
+        if not (limited and step * self._integral > 0.0):
+            self._integral = float(np.clip(self._integral + step, -self._most, self._most))
+        return float(np.clip(self._gain * error + self._integral, -self._most, self._most))
+
+
+class StallWatch:
+    """Tells how far to give way to speed servos where the rover does not get on.
+
+    A wheel that is stopped by a face it has not felt yet looks like one on level ground, and
+    shares torque as such. Speed servos need not know: each pulls until its wheel turns.
+    """
+
+    def __init__(self) -> None:
+        """Start with a rover that gets on."""
+        self.share = 0.0
+
+    def update(self, rate: float, wanted: float, duration: float) -> float:
+        """Return the share of the servos, 0 to 1.
+
+        Args:
+            rate: Mean rate of the wheels [rad/s].
+            wanted: The rate that is wanted of it [rad/s].
+            duration: Since the last call [s].
+        """
+        stalled = wanted != 0.0 and rate / wanted < STALLED
+        change = duration / (STALL_TIME if stalled else -RECOVERY_TIME)
+        self.share = min(max(self.share + change, -STALL_DELAY), 1.0)
+        return max(self.share, 0.0)
+
+
+def rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:
+    """Return the rates (6,) at which wheels roll without slip, with the mean of those measured.
+
+    Args:
+        wheel_rates: (6,) measured [rad/s].
+        wanted: Mean that is wanted [rad/s]; a mean far beyond it is that of wheels that slip.
+        ratios: (6,) speeds of the wheels' centres, relative to their mean; a wheel that has to
+            go backwards or far ahead is more likely one whose contact angle is wrong.
+    """
+    ratios = np.clip(ratios, 0.2, 2.0)
+    most = OVERSPEED * abs(wanted)
+    return ratios * (np.clip(wheel_rates.mean(), -most, most) / ratios.mean())
+
+
+def limit_rate(torques: Floats, last: Floats, most: float) -> Floats:
+    """Return torques (6,) that differ from the last by at most `most`, in the same direction.
+
+    All changes are scaled alike, so that what the wheels share stays shared.
+    """
+    change = torques - last
+    largest = float(np.abs(change).max())
+    return torques if largest <= most else last + change * (most / largest)
