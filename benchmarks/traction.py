@@ -4,12 +4,19 @@ Run from the repository: python benchmarks/traction.py [--quick] [--out FOLDER]
 It needs the extra `bench`. docs/traction.md has what it says.
 """
 
+import argparse
+import json
+import multiprocessing
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
 
 from rover_physics.rover import Rover, load_rover
 from rover_physics.terrain import Terrain
@@ -20,6 +27,7 @@ from rover_planner.traction_service import TractionService, settings_from_parame
 TESTS = Path(__file__).resolve().parents[1] / "test"
 sys.path.insert(0, str(TESTS))
 from reference_drives import drive_ground  # noqa: E402
+from rough_grounds import bouldered, fractal  # noqa: E402
 
 PERIOD = 0.02
 SPEED = 0.06
@@ -37,9 +45,9 @@ class Obstacle:
     """One ground to drive over along +x."""
 
     kind: str
-    """step, bump_one_side, ditch, slope or rocks."""
+    """step, bump_one_side, ditch, slope, rocks or relief."""
     size: float
-    """Height or width [m], angle [deg], or seed of the rocks."""
+    """Height or width [m], angle [deg], or seed of rocks and relief."""
     friction: float
     """Friction coefficient."""
 
@@ -120,6 +128,8 @@ def drive(obstacle: Obstacle, name: str, trace: list | None = None) -> Drive:
         peaks.append(float(used.max(initial=0.0)))
         if trace is not None:
             trace.append((plant.time, plant.pose[0], *contacts.loads, *torques, peaks[-1]))
+    if not peaks:
+        raise ValueError(f"the rover cannot stand at the start of {obstacle.label}")
     return Drive(
         passed=bool(plant.pose[0] >= END),
         end=float(plant.pose[0]),
@@ -135,8 +145,144 @@ def drive(obstacle: Obstacle, name: str, trace: list | None = None) -> Drive:
 
 def make_ground(obstacle: Obstacle) -> Terrain:
     """Return the ground of an obstacle."""
-    if obstacle.kind != "rocks":
-        return drive_ground(obstacle.kind, obstacle.size)
-    from rough_grounds import rocky
+    if obstacle.kind == "rocks":
+        return bouldered(int(obstacle.size), highest=0.08)
+    if obstacle.kind == "relief":
+        return fractal(int(obstacle.size), roughness=0.09)
+    return drive_ground(obstacle.kind, obstacle.size)
 
-    return rocky(int(obstacle.size))
+
+OBSTACLES = (
+    *(Obstacle("step", size, mu) for size, mu in ((0.08, 0.6), (0.10, 0.8), (0.13, 0.8))),
+    Obstacle("step", 0.16, 1.0),
+    *(Obstacle("bump_one_side", size, mu) for size, mu in ((0.06, 0.4), (0.10, 0.6), (0.14, 0.8))),
+    *(Obstacle("ditch", size, mu) for size, mu in ((0.12, 0.6), (0.30, 0.8), (0.60, 1.0))),
+    *(Obstacle("slope", size, mu) for size, mu in ((15.0, 0.4), (20.0, 0.6), (25.0, 0.8))),
+    *(Obstacle("rocks", seed, mu) for seed, mu in ((1, 0.4), (2, 0.6), (3, 0.8), (4, 1.0))),
+    *(Obstacle("relief", seed, mu) for seed, mu in ((1, 0.4), (2, 0.6), (3, 0.8))),
+)  # fmt: skip
+"""What is driven over: frictions from 0.4 to 1.0."""
+ROUGH = ("rocks", "relief")
+QUICK = 5
+"""Every so many obstacles with --quick."""
+
+
+def drive_all(obstacles: Sequence[Obstacle]) -> dict[tuple[Obstacle, str], Drive]:
+    """Drive over all obstacles under all controllers, a process per core."""
+    jobs = [(obstacle, name) for obstacle in obstacles for name in CONTROLLERS]
+    context = multiprocessing.get_context("spawn")
+    with (
+        ProcessPoolExecutor(mp_context=context) as pool,
+        Progress(console=Console(stderr=True)) as progress,
+    ):
+        task = progress.add_task("drive", total=len(jobs))
+        futures = [pool.submit(drive, *job) for job in jobs]
+        for _ in as_completed(futures):
+            progress.advance(task)
+        return {job: future.result() for job, future in zip(jobs, futures, strict=True)}
+
+
+def compare(drives: dict[tuple[Obstacle, str], Drive], kinds: Sequence[str]) -> dict[str, dict]:
+    """Return for each controller sums over the obstacles that all of them got over."""
+    obstacles = [obstacle for obstacle, name in drives if name == SERVO and obstacle.kind in kinds]
+    common = [o for o in obstacles if all(drives[o, name].passed for name in CONTROLLERS)]
+    sums = {}
+    for name in CONTROLLERS:
+        rows = [drives[obstacle, name] for obstacle in common]
+        lost = [
+            o.label for o in obstacles if drives[o, SERVO].passed and not drives[o, name].passed
+        ]
+        sums[name] = {
+            "passed": sum(drives[obstacle, name].passed for obstacle in obstacles),
+            "of": len(obstacles),
+            "lost": lost,
+            "slip": sum(row.slip for row in rows),
+            "torque": float(np.mean([row.torque for row in rows])) if rows else float("nan"),
+            "energy": sum(row.energy for row in rows),
+            "utilisation": float(np.mean([row.mean_utilisation for row in rows])) if rows else 0.0,
+        }
+    return sums
+
+
+def show_drives(drives: dict[tuple[Obstacle, str], Drive]) -> Table:
+    """Return a row for each drive."""
+    table = Table(title="LSR-1 in MuJoCo, 2.4 m at 6 cm/s")
+    headings = ("obstacle", "controller", "end [m]", "utilisation mean", "95 %", "slip [m]",
+                "torque [N m]", "energy [J]")  # fmt: skip
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in headings[:2] else "right")
+    for (obstacle, name), row in drives.items():
+        table.add_row(
+            obstacle.label if name == SERVO else "", name,
+            "passed" if row.passed else f"{row.end:.2f}", f"{row.mean_utilisation:.2f}",
+            f"{row.peak_utilisation:.2f}", f"{row.slip:.3f}", f"{row.torque:.3f}",
+            f"{row.energy:.1f}",
+        )  # fmt: skip
+    return table
+
+
+def show_sums(sums: dict[str, dict], title: str) -> Table:
+    """Return a row for each controller, with what it saves against the servos."""
+    table = Table(title=title)
+    headings = ("controller", "passed", "lost", "slip [m]", "torque [N m]", "energy [J]",
+                "utilisation")  # fmt: skip
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in ("controller", "lost") else "right")
+    base = sums[SERVO]
+
+    def against(row: dict, key: str, digits: int) -> str:
+        change = 100.0 * (row[key] / base[key] - 1.0) if base[key] else 0.0
+        return f"{row[key]:.{digits}f} ({change:+.0f} %)"
+
+    for name, row in sums.items():
+        table.add_row(
+            name, f"{row['passed']} of {row['of']}", ", ".join(row["lost"]),
+            against(row, "slip", 3), against(row, "torque", 3), against(row, "energy", 1),
+            against(row, "utilisation", 2),
+        )  # fmt: skip
+    return table
+
+
+def draw_sums(sums: dict[str, dict], picture: Path) -> None:
+    """Draw slip, torque, energy and utilisation of the controllers, in shares of the servos'."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    keys = ("slip", "torque", "energy", "utilisation")
+    figure, axes = pyplot.subplots(figsize=(7.0, 3.2), layout="constrained")
+    width = 0.8 / len(CONTROLLERS)
+    colours = ("#999999", "#e69f00", "#56b4e9", "#0072b2")
+    for k, (name, colour) in enumerate(zip(CONTROLLERS, colours, strict=True)):
+        shares = [sums[name][key] / sums[SERVO][key] for key in keys]
+        axes.bar(np.arange(len(keys)) + k * width, shares, width, label=name, color=colour)
+    axes.set_xticks(np.arange(len(keys)) + 1.5 * width)
+    axes.set_xticklabels(("slip distance", "torque effort", "energy", "utilisation"))
+    axes.set_ylabel("share of the speed servos'")
+    axes.legend(frameon=False)
+    figure.savefig(picture, dpi=150)
+
+
+def main() -> None:
+    """Drive, print tables, and write JSON and a picture."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th obstacle only")
+    parser.add_argument("--out", type=Path, default=Path("bench_output"))
+    arguments = parser.parse_args()
+    drives = drive_all(OBSTACLES[::QUICK] if arguments.quick else OBSTACLES)
+    kinds = tuple(dict.fromkeys(obstacle.kind for obstacle, _ in drives))
+    everything, rough = compare(drives, kinds), compare(drives, ROUGH)
+    console = Console()
+    console.print(show_drives(drives))
+    console.print(show_sums(everything, "All obstacles that all controllers got over"))
+    console.print(show_sums(rough, "Rocks and relief that all controllers got over"))
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    rows = [asdict(o) | {"controller": name} | asdict(row) for (o, name), row in drives.items()]
+    result = {"drives": rows, "all": everything, "rough": rough}
+    (arguments.out / "traction.json").write_text(json.dumps(result, indent=1))
+    draw_sums(everything, arguments.out / "traction.png")
+
+
+if __name__ == "__main__":
+    main()

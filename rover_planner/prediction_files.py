@@ -1,10 +1,11 @@
-"""The files of the `predict` command: poses in, the model's predictions out."""
+"""The files of the `predict` command: poses in, the model's predictions out, and back again."""
 
 import io
 import zipfile
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,21 @@ ARRAYS = (
     "time",
 )
 """The arrays of a prediction that the output file holds, under the same names."""
+REPLAY_ARRAYS = (
+    "poses",
+    "status",
+    "contact_points",
+    "contact_angle",
+    "torque",
+    "friction",
+    "sinkage",
+    "motion_resistance",
+    "power",
+    "distance",
+    "wheel_drop",
+    "falling",
+)
+"""What it holds besides, so that `rover_planner view` can replay it."""
 SOIL_ARRAYS = ("sinkage", "motion_resistance")
 """Those that it holds besides where soil was asked for, or the terrain names soils."""
 
@@ -47,19 +63,7 @@ def read_poses(path: Path) -> NDArray[np.float64]:
     Raises:
         PlanningError: No such file, no .npz file, no such array, or not numbers of that shape.
     """
-    try:
-        archive = np.load(path, allow_pickle=False)
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise PlanningError(f"{path} holds one bare array; it must be an .npz file")
-        with archive:
-            if "poses" not in archive:
-                names = ", ".join(archive.files) or "nothing"
-                raise PlanningError(f"{path} has no array 'poses'; it has {names}")
-            poses = archive["poses"]
-    except FileNotFoundError:
-        raise PlanningError(f"no poses file {path}") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise PlanningError(f"{path} is no readable .npz file of poses: {error}") from None
+    poses = _read_arrays(path, ("poses",), "poses")["poses"]
     if poses.dtype.kind not in "fiu":
         raise PlanningError(f"poses in {path} are of type {poses.dtype}; they must be numbers")
     if poses.ndim != 2 or poses.shape[1] != 3 or len(poses) == 0:
@@ -67,6 +71,42 @@ def read_poses(path: Path) -> NDArray[np.float64]:
             f"poses in {path} have shape {poses.shape}; they must be (n, 3): x, y, yaw"
         )
     return poses.astype(np.float64)
+
+
+def _read_arrays(path: Path, names: Sequence[str], what: str) -> dict[str, Any]:
+    """Read arrays by name from an .npz file of `what`."""
+    try:
+        archive = np.load(path, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise PlanningError(f"{path} holds one bare array; it must be an .npz file")
+        with archive:
+            for name in names:
+                if name not in archive:
+                    there = ", ".join(archive.files) or "nothing"
+                    raise PlanningError(f"{path} has no array {name!r}; it has {there}")
+            return {name: archive[name] for name in names}
+    except FileNotFoundError:
+        raise PlanningError(f"no {what} file {path}") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise PlanningError(f"{path} is no readable .npz file of {what}: {error}") from None
+
+
+def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
+    """Read what `write_prediction` wrote, without what lies between waypoints and bounds.
+
+    Returns:
+        The prediction of n waypoints, and for each the reason why it is not passable, or "".
+
+    Raises:
+        PlanningError: No such file, or not one of predictions.
+    """
+    arrays = _read_arrays(path, (*ARRAYS, *REPLAY_ARRAYS, "reason"), "predictions")
+    reasons = tuple(arrays.pop("reason").tolist())
+    lengths = {name: len(values) for name, values in arrays.items()}
+    if set(lengths.values()) != {len(reasons)}:
+        raise PlanningError(f"the arrays of {path} differ in length: {lengths}")
+    rest: dict[str, Any] = {"between": None, "policy": "recorded"}
+    return PathPrediction(**arrays, waypoint=np.arange(len(reasons)), **rest), reasons
 
 
 def write_prediction(
@@ -96,7 +136,7 @@ def write_prediction(
     Raises:
         PlanningError: The file cannot be written.
     """
-    names = ARRAYS + SOIL_ARRAYS if on_soil else ARRAYS
+    names = dict.fromkeys(ARRAYS + REPLAY_ARRAYS + (SOIL_ARRAYS if on_soil else ()))
     arrays = {name: getattr(prediction, name) for name in names}
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
     arrays["traversable"] = np.array(verdict.traversable, dtype=np.bool_)

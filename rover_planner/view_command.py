@@ -33,6 +33,13 @@ def view(
         tuple[float, float, float] | None,
         typer.Option(metavar="X Y YAW", help="Goal in m and rad, map frame."),
     ] = None,
+    prediction: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT", help="Replay what `predict` wrote, instead of planning."),
+    ] = None,
+    follow: Annotated[
+        bool, typer.Option("--follow", help="Follow a live ROS graph instead of planning.")
+    ] = False,
     host: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to serve on; 0 takes a free one.")] = 8080,
 ) -> None:
@@ -43,13 +50,20 @@ def view(
     if importlib.util.find_spec("viser") is None:
         raise PlanningError("the page needs viser: pip install 'rover_planner[view]'")
     from rover_physics.rover import load_rover
+    from rover_planner.prediction_files import read_prediction
     from rover_planner.viewer.page import Page
     from rover_planner.viewer.session import ViewSession
 
     ground = _load_or_make(terrain)
     low, high = choose_ends(ground)
     session = ViewSession(load_rover(rover), ground, start or low, goal or high)
+    if prediction is not None:
+        session.replay(*read_prediction(prediction))
     page = Page(session, host, port)
+    if follow:
+        from rover_planner.viewer.live import following
+
+        following(page)
     typer.echo(f"open {page.url} in a browser; Ctrl-C ends it")
     try:
         page.wait()

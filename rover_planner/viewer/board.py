@@ -124,7 +124,7 @@ def _numbers(frame: Frame, state: str) -> str:
         ("Distance", f"{100.0 * frame.distance:.1f} cm"),
         ("Energy", f"{frame.energy:.2f} J"),
         ("Speed", f"{100.0 * frame.speed:.1f} cm/s"),
-        ("Belly clearance", f"{100.0 * frame.belly_clearance:.1f} cm"),
+        ("Belly clearance", _centimetres(frame.belly_clearance)),
         ("Tilt", f"{math.degrees(_tilt(frame)):.1f} deg"),
     )
     cells = "".join(
@@ -136,13 +136,17 @@ def _numbers(frame: Frame, state: str) -> str:
     )
 
 
+def _centimetres(length: float) -> str:
+    return f"{100.0 * length:.1f} cm" if math.isfinite(length) else "not known"
+
+
 def _tilt(frame: Frame) -> float:
     roll, pitch, _ = frame.attitude
     return math.acos(min(max(math.cos(roll) * math.cos(pitch), -1.0), 1.0))
 
 
-def describe_verdict(traversable: bool, reason: str, refusal: str, judged_in: float) -> str:
-    """Return verdict, its reason and what was refused last as HTML."""
+def describe_verdict(traversable: bool, reason: str, refusal: str, judged_in: float | None) -> str:
+    """Return verdict, its reason, what was refused last and the time it took [s] as HTML."""
     colour = css(PASSABLE if traversable else REFUSED)
     word = "traversable" if traversable else "not traversable"
     text = f"<b>{word}</b>" + (f": {html.escape(reason)}" if reason else "")
@@ -152,7 +156,7 @@ def describe_verdict(traversable: bool, reason: str, refusal: str, judged_in: fl
             f'<div id="refusal" style="border-left:5px solid {css(PULL)};padding-left:.5em">'
             f"refused: {html.escape(refusal)}</div>"
         )
-    lines.append(
-        f'<div style="opacity:.7;font-size:11px">judged in {1e3 * judged_in:.0f} ms</div>'
-    )
+    if judged_in is not None:
+        took = f"judged in {1e3 * judged_in:.0f} ms"
+        lines.append(f'<div style="opacity:.7;font-size:11px">{took}</div>')
     return f'<div id="verdict" style="font-size:13px">{"".join(lines)}</div>'

@@ -63,6 +63,11 @@ class Charts:
                 legend=uplot.Legend(show=False),
                 scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
             )
+        keys = "".join(
+            f'<span style="color:{colour}">&#9632;</span> {name.replace("_", " ")}&ensp;'
+            for name, colour in zip(WHEELS, WHEEL_COLOURS, strict=True)
+        )
+        gui.add_html(f'<div style="font-size:11px">{keys}</div>')
         self._curves: dict[str, tuple[Floats, Floats]] = {}
         self._limits: dict[str, float] = {}
 

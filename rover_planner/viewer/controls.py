@@ -78,7 +78,7 @@ class RoverSliders:
             self.folders.append(folder)
             with folder:
                 for value in values:
-                    self._add(gui, value, get_value(data, value.key), change)
+                    self._add(gui, value, get_value(data, value.keys[0]), change)
 
     def _add(
         self, gui: Any, value: RoverValue, now: float, change: Callable[[RoverValue, float], None]
@@ -95,4 +95,4 @@ class RoverSliders:
         data = rover_to_dict(rover)
         for values in self._values.values():
             for value in values:
-                self._sliders[value.label].value = get_value(data, value.key)
+                self._sliders[value.label].value = get_value(data, value.keys[0])

@@ -34,25 +34,27 @@ class PathOverlay:
         for k, candidate in enumerate([*others, shown]):
             colour = PASSABLE if candidate.verdict.traversable else REFUSED
             wide = candidate is shown
-            self._draw_path(
-                f"/paths/{k}", terrain, candidate, CHOSEN if wide else colour, lift, wide
-            )
+            colour = CHOSEN if wide else colour
+            self._draw_line(f"/paths/{k}", terrain, candidate.poses, colour, lift, wide)
         refused = [c for c in [shown, *others] if not c.verdict.traversable]
         for k, candidate in enumerate(refused[:MOST_GHOSTS]):
             self._draw_ghost(f"/ghosts/{k}", rover, terrain, candidate)
         for name, pose in (("start", shown.poses[0]), ("goal", shown.poses[-1])):
             self._draw_flag(name, terrain, pose, rover.wheel.radius)
 
-    def _draw_path(
-        self,
-        name: str,
-        terrain: Terrain,
-        candidate: Candidate,
-        colour: Any,
-        lift: float,
-        wide: bool,
+    def show_plan(self, rover: Rover, terrain: Terrain, plan: Floats | None) -> None:
+        """Draw one path (n, 3) that somebody else planned, or nothing."""
+        for node in self._nodes:
+            node.remove()
+        self._nodes.clear()
+        if plan is not None:
+            self._draw_line("/paths/plan", terrain, plan, CHOSEN, 0.15 * rover.wheel.radius, True)
+            self._draw_flag("goal", terrain, plan[-1], rover.wheel.radius)
+
+    def _draw_line(
+        self, name: str, terrain: Terrain, poses: Floats, colour: Any, lift: float, wide: bool
     ) -> None:
-        places = candidate.poses[:: max(1, len(candidate.poses) // 200), :2]
+        places = poses[:: max(1, len(poses) // 200), :2]
         heights = terrain.elevation_at(places[:, 0], places[:, 1])
         points = np.column_stack([places, heights + lift])
         points = points[np.isfinite(heights)]

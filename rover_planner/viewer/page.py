@@ -14,6 +14,7 @@ from rover_planner.viewer.board import describe_verdict, draw_board
 from rover_planner.viewer.charts import Charts
 from rover_planner.viewer.controls import NO_SOIL, Player, PlayerActions, RoverSliders
 from rover_planner.viewer.ground_mesh import LAYERS, ground_mesh, hit_ground
+from rover_planner.viewer.live_frame import LiveFigure
 from rover_planner.viewer.overlays import ForceArrows, PathOverlay
 from rover_planner.viewer.playback import Playback
 from rover_planner.viewer.rover_figure import RoverFigure
@@ -41,11 +42,16 @@ class Page:
         self._ended = threading.Event()
         self._changed_at: float | None = None
         self._clicks = "goal"
+        self._moved = True
+        self._listener: Any = None
+        self._live: LiveFigure | None = None
+        self._told: tuple[Any, ...] = ()
         self._layer = "height"
         self.server = viser.ViserServer(host, port, label="rover_planner", verbose=False)
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.server.scene.set_up_direction("+z")
         self.server.scene.configure_default_lights(cast_shadow=False)
+        self.server.scene.configure_environment_map(environment_intensity=0.25)
         self.server.on_client_connect(self._look_at_start)
         self._build()
         self._take_all()
@@ -57,6 +63,12 @@ class Page:
     def url(self) -> str:
         """Where the page is."""
         return f"http://{self.server.get_host()}:{self.server.get_port()}"
+
+    def follow(self, listener: Any) -> None:
+        """Show what a `LiveListener` hears instead of what the session plans."""
+        with self._lock:
+            self._listener = listener
+            self._live = LiveFigure(self.session.rover)
 
     def close(self) -> None:
         """End the page."""
@@ -278,7 +290,7 @@ class Page:
 
     def _change_value(self, value: RoverValue, number: float) -> None:
         with self._lock:
-            if self.session.change_rover(value.key, number):
+            if self.session.change_rover(value.keys, number):
                 self._draw_rover()
                 self._changed_at = time.monotonic()
             self._take_judgement()
@@ -318,6 +330,11 @@ class Page:
         while not self._ended.wait(FRAME):
             now = time.monotonic()
             with self._lock:
+                if self._live is not None:
+                    board_due = now - board_at > BOARD_FRAME
+                    self._show_live(board_due)
+                    board_at = now if board_due else board_at
+                    continue
                 self._moved |= self.playback.advance(now - last)
                 last = now
                 if self._changed_at is not None and now - self._changed_at > REST:
@@ -329,6 +346,30 @@ class Page:
                     self._show_frame(board_due)
                     board_at = now if board_due else board_at
                     self._moved = False
+
+    def _show_live(self, with_board: bool) -> None:
+        """Show the latest that the listener heard."""
+        assert self._live is not None
+        state, terrain, plan, verdict = self._listener.latest()
+        if terrain is not None and terrain is not self.session.terrain:
+            self.session.terrain = terrain
+            self._draw_ground()
+        if self._told != (id(plan), verdict):
+            self._told = (id(plan), verdict)
+            self._paths.show_plan(self.session.rover, self.session.terrain, plan)
+            passable = plan is not None
+            self._verdict.content = describe_verdict(passable, verdict, "", None)
+        frame = self._live.frame(state)
+        self._figure.visible = frame is not None
+        if frame is None:
+            if with_board:
+                self._board.content = '<div id="board">waiting for odometry</div>'
+            return
+        with self.server.atomic():
+            self._figure.show(frame)
+            self._forces.show(frame)
+        if with_board:
+            self._board.content = draw_board(self.session.rover, frame, "live")
 
     def _show_frame(self, with_board: bool) -> None:
         frame = self.session.shown.journey.frame(self.playback.time)

@@ -1,7 +1,7 @@
 """The values of a rover that can be changed while it is watched: names, units and ranges."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,8 @@ Key = tuple[str | int, ...]
 class RoverValue:
     """One number of a rover file."""
 
-    key: Key
-    """Where it is in the file, such as ("wheel", "radius")."""
+    keys: tuple[Key, ...]
+    """Where it is in the file, such as ("wheel", "radius"); several that are always alike."""
     label: str
     """What it is called, with its unit."""
     low: float
@@ -59,18 +59,21 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
         else:
             low, high = now - span, now + span
         step = 10.0 ** (len(str(int((high - low) * 1000))) - 6)
-        return RoverValue(key, f"{label} [{unit}]", _tidy(low, step), _tidy(high, step), step)
+        return RoverValue((key,), f"{label} [{unit}]", _tidy(low, step), _tidy(high, step), step)
 
+    names = ("rear", "middle", "front")
+    height = value("wheel height", "m", "suspension", "wheels", "rear", 2, span=1.5 * radius)
+    all_wheels = tuple(("suspension", "wheels", name, 2) for name in names)
     wheels = [
-        value(f"{name} wheel {axis}", "m", "suspension", "wheels", name, k, span=0.4 * abs(length))
-        for name in ("rear", "middle", "front")
-        for k, axis in ((0, "x"), (2, "z"))
+        value(f"{name} wheel x", "m", "suspension", "wheels", name, 0, span=abs(length))
+        for name in names
     ]
     return {
         "Links": [
             value("bogie pivot x", "m", "suspension", "bogie_pivot", 0, span=0.5 * abs(length)),
             value("bogie pivot z", "m", "suspension", "bogie_pivot", 2, span=1.5 * radius),
             *wheels,
+            dataclasses.replace(height, keys=all_wheels),
         ],
         "Wheels": [
             value("radius", "m", "wheel", "radius"),
@@ -105,17 +108,18 @@ def get_value(data: Mapping[str, Any], key: Key) -> float:
     return float(inner)
 
 
-def with_value(rover: Rover, key: Key, value: float) -> Rover:
-    """Return a rover with one number changed.
+def with_value(rover: Rover, keys: Sequence[Key], value: float) -> Rover:
+    """Return a rover with one number changed, wherever the keys say that it is.
 
     Raises:
         RoverFileError: The rover would be impossible; names the key.
     """
     data = rover_to_dict(rover)
-    inner: Any = data
-    for part in key[:-1]:
-        inner = inner[part]
-    inner[key[-1]] = float(value)
+    for key in keys:
+        inner: Any = data
+        for part in key[:-1]:
+            inner = inner[part]
+        inner[key[-1]] = float(value)
     return rover_from_dict(data, rover.name)
 
 

@@ -2,13 +2,15 @@
 
 import dataclasses
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import RoverError
-from rover_physics.limits import Verdict
+from rover_physics.limits import Verdict, judge
+from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover
 from rover_physics.terrain import Terrain
 from rover_planner.errors import PlanningError
@@ -121,20 +123,20 @@ class ViewSession:
         self.refusal = ""
         return True
 
-    def change_rover(self, key: Key, value: float) -> bool:
+    def change_rover(self, keys: Sequence[Key], value: float) -> bool:
         """Change a number of the rover and judge the path that is shown again, at once.
 
         The other candidates keep their verdicts until `plan_again`.
 
         Args:
-            key: Where the number is in the rover file.
+            keys: Where the number is in the rover file.
             value: What it is to be.
 
         Returns:
             Whether it was taken; if not, `refusal` says why and the last good rover stays.
         """
         try:
-            rover = with_value(self.rover, key, value)
+            rover = with_value(self.rover, keys, value)
         except REFUSALS as error:
             self.refusal = str(error)
             return False
@@ -155,6 +157,20 @@ class ViewSession:
         self.rover, self.arm_angles, self.refusal = rover, arm_angles, ""
         self._show(candidate, time.perf_counter() - began)
         return True
+
+    def replay(self, prediction: PathPrediction, reasons: Sequence[str]) -> None:
+        """Show a recorded prediction as it is, with the reasons (n,) that were given for it."""
+        first = next((k for k, reason in enumerate(reasons) if reason), -1)
+        verdict = dataclasses.replace(
+            judge(self.rover, prediction),
+            traversable=first < 0,
+            reasons=tuple(reasons),
+            first_failure=first,
+            reason=reasons[first] if first >= 0 else "",
+        )
+        candidate = Candidate(prediction.poses, prediction, verdict, (0.0, 0.0))
+        self.answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
+        self._show(candidate, 0.0)
 
     def plan_again(self) -> bool:
         """Judge all candidates anew, after the rover was changed; return whether that worked."""
