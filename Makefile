@@ -24,6 +24,10 @@ help: ## list what there is
 demo: $(READY) ## plan over DDS on a made Mars terrain; MAP=terrain.npz for another
 	@$(BIN)/python -m rover_planner demo $(if $(MAP),--map "$(MAP)")
 
+.PHONY: view
+view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP=terrain.npz for another
+	@$(BIN)/python -m rover_planner view lsr1 $(if $(MAP),"$(MAP)")
+
 .PHONY: test
 test: lint kernels ## lint, type check and all tests
 	@echo "== tests"

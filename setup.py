@@ -6,7 +6,13 @@ from pathlib import Path
 from setuptools import setup
 
 NAME = "rover_planner"
-PACKAGES = ["rover_physics", "msg_adapters", "rover_planner"]
+PACKAGES = [
+    "rover_physics",
+    "msg_adapters",
+    "rover_planner",
+    "rover_planner.simulator",
+    "rover_planner.viewer",
+]
 HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link to this file
 
 # Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba and osqp are not in it.
@@ -27,10 +33,13 @@ EXTRAS = {
         "ros-jazzy-rmw-fastrtps-cpp>=8.4,<9",
     ],
     "plots": ["matplotlib>=3.6,<4"],
+    "view": ["viser>=1.1,<2", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
     "test": [
         "pytest>=7.4,<10",
         "pytest-xdist>=3.4,<4",
         "hypothesis>=6.98,<7",
+        "playwright>=1.48,<2",
+        "mujoco>=3.2,<5",
     ],
     "bench": ["mujoco>=3.2,<5"],
     "dev": [
@@ -38,7 +47,7 @@ EXTRAS = {
         "mypy>=1.14,<3",
     ],
 }
-EXTRAS["all"] = EXTRAS["ros"] + EXTRAS["plots"] + EXTRAS["test"]
+EXTRAS["all"] = EXTRAS["ros"] + EXTRAS["plots"] + EXTRAS["view"] + EXTRAS["test"]
 
 
 def read_version() -> str:
@@ -84,6 +93,7 @@ setup(
             "traverse_server = rover_planner.traverse_server:main",
             "traction_controller = rover_planner.traction_controller:main",
             "mission_planner = rover_planner.mission_planner:main",
+            "rover_simulator = rover_planner.rover_simulator:main",
         ],
     },
 )

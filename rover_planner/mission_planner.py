@@ -1,6 +1,6 @@
 """The node /mission_planner: asks a traverse_server over ROS 2 for one goal after another.
 
-    mission_planner [--map MAP.npz] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--json]
+    mission_planner [--map MAP.npz] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--drive] [--json]
 
 It is what an operator's planner would do, small enough to copy from: publish a map, call
 `~/can_traverse`, and read the verdict, wheel loads and slip that the server publishes with it.
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -29,7 +30,7 @@ from msg_adapters.paths import stamped_pose
 from msg_adapters.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.terrain import Terrain, load_terrain
-from rover_planner.qos import map_qos, result_qos
+from rover_planner.qos import map_qos, result_qos, sensor_qos, topic_qos
 
 SERVER = "/traverse_server"
 """Name of the server's node; remap its services and topics for another."""
@@ -53,6 +54,10 @@ class MissionPlanner(Node):
         self._changed = threading.Condition()
         self._verdicts: dict[tuple[int, int], dict[str, Any]] = {}
         self._arrays: dict[str, np.ndarray] = {}
+        self._plan = Path()
+        self._place: tuple[float, float] | None = None
+        self._path_publisher = self.create_publisher(Path, "path", topic_qos())
+        self.create_subscription(Odometry, "odometry", self._take_odometry, sensor_qos())
         self._map_publisher = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._client = self.create_client(GetPlan, f"{SERVER}/can_traverse")
         self.create_subscription(
@@ -116,7 +121,7 @@ class MissionPlanner(Node):
         future = self._client.call_async(request)
         future.add_done_callback(self._notify)
         self._wait(future.done, f"the answer of {SERVER}/can_traverse")
-        plan = future.result().plan
+        plan = self._plan = future.result().plan
         stamp = (plan.header.stamp.sec, plan.header.stamp.nanosec)
         self._wait(lambda: stamp in self._verdicts, f"the verdict on {SERVER}/verdict")
         answer = dict(self._verdicts[stamp])
@@ -125,6 +130,38 @@ class MissionPlanner(Node):
         answer["max_wheel_load"] = self._largest("wheel_loads", answer)
         answer["max_slip_ratio"] = self._largest("slip_ratios", answer)
         return answer
+
+    def drive(self, within: float = 0.2, timeout: float = 3600.0) -> None:
+        """Send the last plan to the rover, on the topic `path`, and wait until it is there.
+
+        Args:
+            within: Distance from the end that counts as there [m].
+            timeout: Longest wait [s].
+
+        Raises:
+            NoAnswerError: There is no plan, nobody follows it, or the rover is not there in time.
+        """
+        if not self._plan.poses:
+            raise NoAnswerError("there is no plan to drive")
+        self._wait(
+            lambda: self._path_publisher.get_subscription_count() > 0, "a rover on the topic path"
+        )
+        self._path_publisher.publish(self._plan)
+        end = self._plan.poses[-1].pose.position
+        self._wait(
+            lambda: (
+                self._place is not None
+                and np.hypot(self._place[0] - end.x, self._place[1] - end.y) < within
+            ),
+            "the rover to get there",
+            timeout,
+        )
+
+    def _take_odometry(self, odometry: Odometry) -> None:
+        place = odometry.pose.pose.position
+        with self._changed:
+            self._place = (place.x, place.y)
+            self._changed.notify_all()
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
         """Return the largest value of an array that the server publishes with its verdict."""
@@ -154,20 +191,23 @@ class MissionPlanner(Node):
         with self._changed:
             self._changed.notify_all()
 
-    def _wait(self, condition: Callable[[], bool], what: str) -> None:
+    def _wait(
+        self, condition: Callable[[], bool], what: str, timeout: float | None = None
+    ) -> None:
         """Wait until a condition holds.
 
         Raises:
             NoAnswerError: It does not in time.
             ExternalShutdownException: ROS is shut down meanwhile.
         """
-        deadline = time.monotonic() + self._timeout
+        longest = timeout or self._timeout
+        deadline = time.monotonic() + longest
         with self._changed:
             while not condition():
                 if not self.context.ok():
                     raise ExternalShutdownException
                 if time.monotonic() > deadline:
-                    raise NoAnswerError(f"waited {self._timeout:.0f} s in vain for {what}")
+                    raise NoAnswerError(f"waited {longest:.0f} s in vain for {what}")
                 self._changed.wait(0.1)
 
 
@@ -213,6 +253,10 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options) -> int:
         answer = node.ask(options.start, goal)
         answer["response_time"] = time.monotonic() - asked
         report({"event": "answer", "goal": number, "answer": answer})
+        if options.drive and answer["traversable"]:
+            report({"event": "driving", "goal": number})
+            node.drive()
+            report({"event": "arrived", "goal": number})
     return 0
 
 
@@ -243,6 +287,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--map", help="elevation map to publish first, .npz")
     parser.add_argument("--start", type=_pose, required=True, metavar="X,Y,YAW")
     parser.add_argument("--goal", type=_pose, required=True, action="append", metavar="X,Y,YAW")
+    parser.add_argument(
+        "--drive",
+        action="store_true",
+        help="send the plan to the rover and wait until it is there",
+    )
     parser.add_argument("--map-frame", default="map")
     parser.add_argument("--timeout", type=float, default=60.0, help="for each answer [s]")
     parser.add_argument("--json", action="store_true", help="print a JSON object a line")

@@ -1,0 +1,92 @@
+"""What a rover's sensors publish: joint states, odometry and inertial measurements."""
+
+import array
+from collections.abc import Mapping
+
+import numpy as np
+from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
+from sensor_msgs.msg import Imu, JointState
+
+Floats = NDArray[np.float64]
+BASE_FRAME = "base_link"
+
+
+def joint_state(
+    positions: Mapping[str, float],
+    velocities: Mapping[str, float],
+    efforts: Mapping[str, float],
+    stamp,
+) -> JointState:
+    """Write angles [rad], rates [rad/s] and torques [N m] by joint name.
+
+    A joint without rate or torque gets zero.
+    """
+    message = JointState(name=list(positions))
+    message.header.stamp = stamp
+    message.position = array.array("d", positions.values())
+    message.velocity = array.array("d", (velocities.get(name, 0.0) for name in positions))
+    message.effort = array.array("d", (efforts.get(name, 0.0) for name in positions))
+    return message
+
+
+def odometry_message(
+    position: Floats,
+    orientation: Floats,
+    velocity: Floats,
+    body_rates: Floats,
+    deviations: tuple[float, float],
+    frame_id: str,
+    stamp,
+) -> Odometry:
+    """Write where the rover is and how it moves.
+
+    Args:
+        position: (3,) body origin [m], map frame.
+        orientation: (4,) quaternion x, y, z, w.
+        velocity: (3,) [m/s], body frame.
+        body_rates: (3,) angular velocity [rad/s], body frame.
+        deviations: Standard deviations of places [m] and angles [rad].
+        frame_id: Map frame.
+        stamp: builtin_interfaces/Time.
+    """
+    message = Odometry(child_frame_id=BASE_FRAME)
+    message.header.stamp, message.header.frame_id = stamp, frame_id
+    place, turn = message.pose.pose.position, message.pose.pose.orientation
+    place.x, place.y, place.z = position.tolist()
+    turn.x, turn.y, turn.z, turn.w = orientation.tolist()
+    linear, angular = message.twist.twist.linear, message.twist.twist.angular
+    linear.x, linear.y, linear.z = velocity.tolist()
+    angular.x, angular.y, angular.z = body_rates.tolist()
+    variances = np.repeat(np.square(deviations), 3)
+    message.pose.covariance = np.diag(variances).ravel()
+    message.twist.covariance = np.diag(variances).ravel()
+    return message
+
+
+def imu_message(
+    orientation: Floats, body_rates: Floats, gravity: float, deviation: float, stamp
+) -> Imu:
+    """Write what an inertial unit at the body origin of a slow rover measures.
+
+    Args:
+        orientation: (4,) quaternion x, y, z, w, body to map.
+        body_rates: (3,) angular velocity [rad/s], body frame.
+        gravity: [m/s^2]; at rest the unit measures that much upwards.
+        deviation: Standard deviation of angles [rad].
+        stamp: builtin_interfaces/Time.
+    """
+    message = Imu()
+    message.header.stamp, message.header.frame_id = stamp, BASE_FRAME
+    x, y, z, w = orientation.tolist()
+    turn, rates, pull = message.orientation, message.angular_velocity, message.linear_acceleration
+    turn.x, turn.y, turn.z, turn.w = x, y, z, w
+    rates.x, rates.y, rates.z = body_rates.tolist()
+    pull.x = gravity * 2.0 * (x * z - w * y)
+    pull.y = gravity * 2.0 * (y * z + w * x)
+    pull.z = gravity * (1.0 - 2.0 * (x * x + y * y))
+    covariance = np.diag(np.full(3, max(deviation, 1e-4) ** 2)).ravel()
+    message.orientation_covariance = covariance
+    message.angular_velocity_covariance = covariance
+    message.linear_acceleration_covariance = covariance
+    return message

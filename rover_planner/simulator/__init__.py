@@ -1,0 +1,1 @@
+"""A rover on a terrain that behaves towards its nodes as a real one does."""

@@ -1,0 +1,80 @@
+"""The same interface on MuJoCo: rigid bodies with inertia, wheels that slip."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.rover import Rover
+from rover_physics.terrain import Terrain
+from rover_planner.mujoco_plant import RoverPlant
+from rover_planner.simulator.plant import PlantState
+
+Floats = NDArray[np.float64]
+TIPPED = 1.2
+"""Tilt from which a rover lies [rad]."""
+
+
+class MujocoPlant:
+    """A `RoverPlant` that is driven by speeds, or by torques; it steers by its wheels' speeds."""
+
+    def __init__(
+        self,
+        rover: Rover,
+        terrain: Terrain,
+        pose: tuple[float, float, float],
+        friction: float | None = None,
+    ):
+        """Let a rover down on the ground.
+
+        Raises:
+            PlanningError: Unknown cells, or a pose beyond the terrain.
+        """
+        self._plant = RoverPlant(rover, terrain, pose, friction)
+        self._rover = rover
+        sides = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
+        self._arms = sides * abs(rover.suspension.wheels["middle"][1])
+        self._torques = np.zeros(6)
+        self._last = self._plant.pose[:3]
+        self._velocity = np.zeros(3)
+
+    def pose(self) -> Floats:
+        """Return x, y [m] and yaw [rad] (3,) of the body origin."""
+        return self._plant.pose[[0, 1, 3]]
+
+    def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a time [s], by speed servos."""
+        rates = (speed + yaw_rate * self._arms) / self._rover.wheel.radius
+        self._torques = self._plant.servo(rates, duration)
+        self._measure(duration)
+
+    def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
+        """Let torques (6,) [N m] act for a time [s]; steering is in the torques."""
+        self._torques = np.asarray(torques, dtype=float)
+        self._plant.step(self._torques, duration)
+        self._measure(duration)
+
+    def _measure(self, duration: float) -> None:
+        now = self._plant.pose[:3]
+        x, y, z, w = self._plant.orientation
+        moved = (now - self._last) / duration
+        turn = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        self._velocity, self._last = turn.T @ moved, now
+
+    def state(self) -> PlantState:
+        """Return what can be measured now."""
+        plant = self._plant
+        return PlantState(
+            position=plant.pose[:3],
+            orientation=plant.orientation,
+            velocity=self._velocity,
+            body_rates=plant.body_rates,
+            joint_positions=plant.joint_positions,
+            joint_velocities=plant.joint_velocities,
+            wheel_torques=self._torques,
+            stopped="the rover has tipped over" if plant.tilt > TIPPED else "",
+        )

@@ -1,0 +1,213 @@
+"""The quasi-static rover as a plant: it moves from one equilibrium to the next.
+
+Told a speed, it goes there if the model says that it can, and stops where not, with the model's
+reason. Told torques, the balance decides: what the wheels pull beyond what holds the rover on its
+slope moves its mass along, and what a wheel pulls beyond its friction is lost as slip. That speed
+is the only thing that has inertia here.
+"""
+
+from dataclasses import fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.errors import ModelError
+from rover_physics.limits import find_reasons
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.prediction import PathPrediction
+from rover_physics.rover import Rover
+from rover_physics.sweep import sweep_path
+from rover_physics.terrain import Terrain
+from rover_physics.traction_rows import BalanceWriter, MeasuredState
+from rover_planner.errors import PlanningError
+from rover_planner.simulator.plant import PlantState, quaternion
+
+Floats = NDArray[np.float64]
+DRAG = 0.5
+"""Share of its speed that a rover without torque loses each second beyond rolling: gears [1/s]."""
+MOST_SLIP = 0.95
+
+
+class QuasiStaticPlant:
+    """One rover on one terrain; see the module for what it knows of dynamics."""
+
+    def __init__(
+        self,
+        rover: Rover,
+        terrain: Terrain,
+        pose: tuple[float, float, float],
+        friction: float | None = None,
+        policy: str = "equal",
+    ):
+        """Put a rover on the ground.
+
+        Args:
+            rover: The rover.
+            terrain: The ground.
+            pose: x, y [m] and yaw [rad] of the body origin.
+            friction: Coulomb friction instead of the terrain's and the rover's own.
+            policy: How its servos share the traction, "equal" or "optimal".
+
+        Raises:
+            PlanningError: The rover cannot stand there.
+        """
+        self._rover, self._terrain = rover, terrain
+        self._friction, self._policy = friction, policy
+        self._writer = BalanceWriter(rover)
+        self._pose = np.array(pose, dtype=float)
+        first = self._predict(self._pose[None])
+        reason = self._why_not(first)
+        if reason:
+            raise PlanningError(f"the rover cannot start at {tuple(pose)}: {reason}")
+        self._here, self._before = first, first
+        self._spin = np.zeros(6)
+        self._wheel_rates = np.zeros(6)
+        self._torques = np.zeros(6)
+        self._speed, self._yaw_rate, self._duration = 0.0, 0.0, 1.0
+        self._stopped = ""
+
+    def pose(self) -> Floats:
+        """Return x, y [m] and yaw [rad] (3,) of the body origin."""
+        return self._pose.copy()
+
+    def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a time [s], if the model lets it."""
+        self._torques = self._here.torque[0].copy()
+        self._move(speed, yaw_rate, duration)
+
+    def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
+        """Let torques (6,) [N m] act for a time [s]; `yaw_rate` is what steering asks for."""
+        limit = self._rover.wheel.max_torque
+        self._torques = np.clip(torques, -limit, limit)
+        push, sliding = self._net_push()
+        mass = self._rover.total_mass
+        speed = self._speed + (push / mass - DRAG * self._speed) * duration
+        top = self._rover.wheel.max_speed * self._rover.wheel.radius
+        speed = float(np.clip(speed, -top, top))
+        if self._speed * speed < 0.0:
+            speed = 0.0  # it comes to rest before it rolls the other way
+        turning = yaw_rate if abs(speed) > 1e-4 else 0.0
+        self._move(speed, turning, duration)
+        racing = np.sign(torques) * self._rover.wheel.max_speed
+        self._wheel_rates = np.where(sliding, racing, self._wheel_rates)
+
+    def _net_push(self) -> tuple[float, NDArray[np.bool_]]:
+        """Return the force along the way beyond equilibrium [N], and which wheels slide (6,)."""
+        here = self._here
+        tractions = self._torques / self._rover.wheel.radius
+        most = np.sqrt(
+            np.clip((here.friction[0] * here.wheel_loads[0]) ** 2 - here.lateral[0] ** 2, 0, None)
+        )
+        sliding = np.abs(tractions) > most
+        tractions = np.clip(tractions, -most, most)
+        axis = _axis(here)
+        offsets = (here.contact_points[0] - here.wheel_centres[0]) @ axis
+        state = MeasuredState(
+            float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
+            here.bogie_angle[0], here.contact_angle[0], offsets,
+        )  # fmt: skip
+        try:
+            rows = self._writer.write(state, 0.0)
+        except ModelError:
+            return 0.0, sliding
+        needed = rows.complete(tractions / rows.force_unit)[:6] * rows.force_unit
+        return float((tractions - needed).sum()), sliding
+
+    def _move(self, speed: float, yaw_rate: float, duration: float) -> None:
+        self._stopped = ""
+        middle = self._pose[2] + 0.5 * yaw_rate * duration
+        step = speed * duration
+        way = np.array([step * np.cos(middle), step * np.sin(middle), yaw_rate * duration])
+        there = self._pose + way
+        moved = self._predict(np.vstack([self._pose, there]))
+        reason = self._why_not(moved) if step or yaw_rate else ""
+        if reason:
+            self._stopped, self._speed, self._yaw_rate = reason, 0.0, 0.0
+            self._before, self._duration = self._here, duration
+            self._wheel_rates = np.zeros(6)
+            return
+        self._before, self._here = self._here, _last_row(moved)
+        self._pose, self._speed, self._yaw_rate = there, speed, yaw_rate
+        self._duration = duration
+        ways = self._here.wheel_centres[0] - self._before.wheel_centres[0]
+        ahead = np.array([np.cos(middle), np.sin(middle), 0.0])
+        rolled = np.copysign(np.linalg.norm(ways, axis=1), ways @ ahead)
+        turned = rolled / self._rover.wheel.radius
+        turned /= 1.0 - np.clip(self._here.slip_ratio[0], 0.0, MOST_SLIP)
+        self._spin += turned
+        self._wheel_rates = turned / duration
+
+    def _predict(self, poses: Floats) -> PathPrediction:
+        return sweep_path(
+            self._rover, self._terrain, poses, friction=self._friction, policy=self._policy
+        )
+
+    def _why_not(self, prediction: PathPrediction) -> str:
+        """Return why the way to the last of some poses is not open, empty where it is."""
+        _, reasons = find_reasons(self._rover, prediction)
+        between = prediction.between
+        if not reasons[-1] and between is not None and len(between.poses):
+            _, on_the_way = find_reasons(self._rover, between)
+            return next((reason for reason in on_the_way if reason), "")
+        return reasons[-1]
+
+    def state(self) -> PlantState:
+        """Return what can be measured now."""
+        here, before, duration = self._here, self._before, self._duration
+        angles = _suspension(here)
+        rates = (angles - _suspension(before)) / duration
+        yaw = self._pose[2]
+        roll, pitch = float(here.roll[0]), float(here.pitch[0])
+        roll_rate = (roll - float(before.roll[0])) / duration
+        pitch_rate = (pitch - float(before.pitch[0])) / duration
+        climb = float(here.position[0, 2] - before.position[0, 2]) / duration
+        names = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+        positions = np.concatenate([angles, self._spin])
+        velocities = np.concatenate([rates, self._wheel_rates])
+        return PlantState(
+            position=here.position[0].copy(),
+            orientation=quaternion(roll, pitch, yaw),
+            velocity=np.array([np.hypot(self._speed, climb) * np.sign(self._speed), 0.0, 0.0]),
+            body_rates=_body_rates(roll, pitch, roll_rate, pitch_rate, self._yaw_rate),
+            joint_positions=dict(zip(names, positions.tolist(), strict=True)),
+            joint_velocities=dict(zip(names, velocities.tolist(), strict=True)),
+            wheel_torques=self._torques.copy(),
+            stopped=self._stopped,
+        )
+
+
+def _last_row(prediction: PathPrediction) -> PathPrediction:
+    """Return the last waypoint of a prediction as a prediction of its own."""
+    n = len(prediction.poses)
+    rows = {
+        field.name: getattr(prediction, field.name)[-1:]
+        for field in fields(prediction)
+        if isinstance(getattr(prediction, field.name), np.ndarray)
+        and len(getattr(prediction, field.name)) == n
+    }
+    return replace(prediction, **rows, between=None)
+
+
+def _suspension(prediction: PathPrediction) -> Floats:
+    """Return the angles of SUSPENSION_JOINTS (4,) [rad]."""
+    return np.concatenate([prediction.rocker_angle[0], prediction.bogie_angle[0]])
+
+
+def _axis(prediction: PathPrediction) -> Floats:
+    """Return the direction (3,) of the wheel axes, map frame."""
+    left = prediction.wheel_centres[0, 3:].mean(axis=0)
+    right = prediction.wheel_centres[0, :3].mean(axis=0)
+    return (left - right) / np.linalg.norm(left - right)
+
+
+def _body_rates(
+    roll: float, pitch: float, roll_rate: float, pitch_rate: float, yaw_rate: float
+) -> Floats:
+    """Return the angular velocity (3,) [rad/s], body frame, from rates of the angles."""
+    return np.array(
+        [
+            roll_rate - np.sin(pitch) * yaw_rate,
+            np.cos(roll) * pitch_rate + np.sin(roll) * np.cos(pitch) * yaw_rate,
+            -np.sin(roll) * pitch_rate + np.cos(roll) * np.cos(pitch) * yaw_rate,
+        ]
+    )

@@ -1,0 +1,82 @@
+"""What a sensor on the rover's mast sees of the terrain: in range, in its line of sight, noisy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.terrain import Terrain
+
+Floats = NDArray[np.float64]
+RAYS = 1440
+
+
+@dataclass(frozen=True)
+class RangeSensor:
+    """Where the sensor is and what it can do."""
+
+    reach: float
+    """How far it sees [m]."""
+    noise: float
+    """Standard deviation of heights [m]."""
+    height: float
+    """Over the body origin [m]."""
+    occlusion: bool
+    """Whether ground hides what is behind it."""
+
+    def look(self, terrain: Terrain, position: Floats, rng: np.random.Generator) -> Terrain:
+        """Return the part of a terrain around the rover, unknown where it is not seen.
+
+        Args:
+            terrain: The true ground.
+            position: (3,) body origin [m].
+            rng: Makes the noise.
+        """
+        rows, columns = self._window(terrain, position)
+        x0 = terrain.origin[0] + terrain.resolution * columns.start
+        y0 = terrain.origin[1] + terrain.resolution * rows.start
+        heights = terrain.elevation[rows, columns].copy()
+        y, x = np.indices(heights.shape)
+        dx = x0 + terrain.resolution * x - position[0]
+        dy = y0 + terrain.resolution * y - position[1]
+        away = np.hypot(dx, dy)
+        seen = away <= self.reach
+        if self.occlusion:
+            seen &= self._in_sight(terrain, position, heights, away, np.arctan2(dy, dx))
+        heights[~seen] = np.nan
+        if self.noise > 0.0:
+            heights += rng.normal(0.0, self.noise, heights.shape)
+        std = np.where(seen, self.noise, np.nan) if self.noise > 0.0 else None
+        friction = None if terrain.friction is None else terrain.friction[rows, columns]
+        return Terrain(heights, terrain.resolution, (x0, y0), friction, elevation_std=std)
+
+    def _window(self, terrain: Terrain, position: Floats) -> tuple[slice, slice]:
+        ny, nx = terrain.elevation.shape
+        cells = int(np.ceil(self.reach / terrain.resolution))
+        column, row = (
+            round((position[k] - terrain.origin[k]) / terrain.resolution) for k in (0, 1)
+        )
+        return (
+            slice(max(row - cells, 0), min(row + cells + 1, ny)),
+            slice(max(column - cells, 0), min(column + cells + 1, nx)),
+        )
+
+    def _in_sight(
+        self, terrain: Terrain, position: Floats, heights: Floats, away: Floats, bearing: Floats
+    ) -> NDArray[np.bool_]:
+        """Tell which cells are no lower than the steepest view before them on their ray."""
+        eye = position[2] + self.height
+        ranges = np.arange(terrain.resolution, self.reach + terrain.resolution, terrain.resolution)
+        angles = (np.arange(RAYS) + 0.5) * (2.0 * np.pi / RAYS) - np.pi
+        px = position[0] + ranges * np.cos(angles)[:, None]
+        py = position[1] + ranges * np.sin(angles)[:, None]
+        slopes = (terrain.elevation_at(px, py) - eye) / ranges
+        highest = np.maximum.accumulate(np.where(np.isnan(slopes), -np.inf, slopes), axis=1)
+        before = np.hstack([np.full((RAYS, 1), -np.inf), highest[:, :-1]])
+        ray = np.clip(((bearing + np.pi) / (2.0 * np.pi) * RAYS).astype(int), 0, RAYS - 1)
+        step = np.clip((away / terrain.resolution).astype(int) - 1, 0, len(ranges) - 1)
+        near = away < 1.5 * terrain.resolution
+        own = (heights - eye) / np.maximum(away, 1e-9)
+        # A cell is as wide as it is: what hides it by less than its own size does not count.
+        allowance = 0.5 * terrain.resolution / np.maximum(away, terrain.resolution)
+        return np.asarray(near | (own >= before[ray, step] - allowance))

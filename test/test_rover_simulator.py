@@ -1,0 +1,122 @@
+"""The simulator's node among the others: the whole system on one machine, without hardware."""
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped
+from grounds import make_terrain, waves
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from ros_fixtures import RosRun, wait_until
+from sensor_msgs.msg import Imu, JointState, PointCloud2
+
+from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.imu import imu_to_attitude
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.terrain import save_terrain
+from rover_planner.mission_planner import MissionPlanner
+from rover_planner.qos import map_qos, sensor_qos, topic_qos
+from rover_planner.rover_simulator import RoverSimulator
+from rover_planner.traction_controller import TractionController
+from rover_planner.traverse_server import TraverseServer
+
+START = [-1.0, 0.0, 0.0]
+
+
+@pytest.fixture
+def ros():
+    run = RosRun()
+    yield run
+    run.close()
+
+
+@pytest.fixture(scope="module")
+def terrain_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("maps") / "waves.npz"
+    save_terrain(path, make_terrain(waves, half=4.0))
+    return str(path)
+
+
+def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
+    values = {"terrain_file": terrain_file, "start": START, "speed": 0.08} | values
+    parameters = [Parameter(name, value=value) for name, value in values.items()]
+    return ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
+
+
+class Ear(Node):
+    """Keeps what it hears."""
+
+    def __init__(self, ros):
+        super().__init__("ear", context=ros.context)
+        self.heard = {}
+        for kind, topic, qos in (
+            (JointState, "joint_states", sensor_qos()),
+            (Imu, "imu", sensor_qos()),
+            (PointCloud2, "elevation_cloud", map_qos()),
+            (DiagnosticArray, "/diagnostics", topic_qos()),
+        ):
+            self.create_subscription(kind, topic, self._keeper(topic), qos)
+        self.commands = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
+        ros.spin(self)
+
+    def _keeper(self, topic):
+        return lambda message: self.heard.setdefault(topic, []).append(message)
+
+
+def test_it_publishes_what_a_rover_would(ros, terrain_file):
+    ear = Ear(ros)
+    simulator = start_simulator(ros, terrain_file)
+    wait_until(lambda: len(ear.heard) >= 3, "joint states, attitude and map")
+    state = ear.heard["joint_states"][-1]
+    arm = simulator.simulation.settings.rover.manipulator.joints
+    assert list(state.name) == [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *arm]
+    assert len(state.position) == len(state.velocity) == len(state.effort) == len(state.name)
+    attitude = imu_to_attitude(ear.heard["imu"][-1])
+    settled = simulator.simulation.plant.state()
+    assert ear.heard["imu"][-1].linear_acceleration.z == pytest.approx(9.81, abs=0.3)
+    assert np.isfinite([attitude.roll, attitude.pitch]).all()
+    seen = terrain_from_point_cloud(ear.heard["elevation_cloud"][-1])
+    assert np.isfinite(seen.elevation_at(*settled.position[:2]))
+
+
+def test_it_drives_as_commanded_and_stops_when_commands_stop(ros, terrain_file):
+    ear = Ear(ros)
+    simulator = start_simulator(ros, terrain_file)
+    twist = TwistStamped()
+    twist.twist.linear.x = 0.08
+    plant = simulator.simulation.plant
+
+    def has_moved():
+        ear.commands.publish(twist)
+        return plant.pose()[0] > START[0] + 0.05
+
+    wait_until(has_moved, "the rover to move")
+    wait_until(lambda: plant.state().velocity[0] == 0.0, "the rover to stop")
+
+
+def test_bad_parameters_are_refused_by_name(ros, terrain_file):
+    from rover_planner.errors import PlanningError
+
+    with pytest.raises(PlanningError, match="cannot start"):
+        start_simulator(ros, terrain_file, start=[50.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
+def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
+    ros, terrain_file, engine
+):
+    simulator = start_simulator(ros, terrain_file, follow_commands=True, engine=engine)
+    server = ros.spin(TraverseServer(context=ros.context))
+    controller = ros.spin(TractionController(context=ros.context))
+    planner = ros.spin(MissionPlanner(context=ros.context))
+    planner.wait_for_server()
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    place = simulator.simulation.plant.pose()
+    answer = planner.ask(place, [place[0] + 0.6, 0.05, 0.0])
+    assert answer["traversable"], answer["reason"]
+    planner.drive(within=0.15, timeout=60.0)
+    assert simulator.simulation.plant.pose()[0] > place[0] + 0.4
+    assert controller.statistics.updates > 50
+    assert controller.statistics.fallbacks == 0
+    for node in (simulator, server, controller, planner):
+        assert ros.is_alive(node)
