@@ -321,9 +321,9 @@ ROVER_SIMULATOR = (
         "Terrain it drives on, .npz; empty makes a Mars-like one.",
         read_only=True,
     ),
-    ParameterSpec(
-        "start", [0.0, 0.0, 0.0], "Where it starts: x, y in m, yaw in rad.", read_only=True
-    ),
+    ParameterSpec("start_x", 0.0, "Where it starts.", "m", bounds=(-1e6, 1e6), read_only=True),
+    ParameterSpec("start_y", 0.0, "Where it starts.", "m", bounds=(-1e6, 1e6), read_only=True),
+    ParameterSpec("start_yaw", 0.0, "Its heading.", "rad", bounds=(-6.3, 6.3), read_only=True),
     ParameterSpec(
         "engine",
         "quasi_static",

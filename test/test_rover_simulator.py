@@ -20,7 +20,7 @@ from rover_planner.rover_simulator import RoverSimulator
 from rover_planner.traction_controller import TractionController
 from rover_planner.traverse_server import TraverseServer
 
-START = [-1.0, 0.0, 0.0]
+START_X = -1.0
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def terrain_file(tmp_path_factory):
 
 
 def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
-    values = {"terrain_file": terrain_file, "start": START, "speed": 0.08} | values
+    values = {"terrain_file": terrain_file, "start_x": START_X, "speed": 0.08} | values
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     return ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
 
@@ -88,7 +88,7 @@ def test_it_drives_as_commanded_and_stops_when_commands_stop(ros, terrain_file):
 
     def has_moved():
         ear.commands.publish(twist)
-        return plant.pose()[0] > START[0] + 0.05
+        return plant.pose()[0] > START_X + 0.05
 
     wait_until(has_moved, "the rover to move")
     wait_until(lambda: plant.state().velocity[0] == 0.0, "the rover to stop")
@@ -98,7 +98,7 @@ def test_bad_parameters_are_refused_by_name(ros, terrain_file):
     from rover_planner.errors import PlanningError
 
     with pytest.raises(PlanningError, match="cannot start"):
-        start_simulator(ros, terrain_file, start=[50.0, 0.0, 0.0])
+        start_simulator(ros, terrain_file, start_x=50.0)
 
 
 @pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])

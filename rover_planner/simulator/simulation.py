@@ -57,11 +57,8 @@ def settings_from_parameters(values: Mapping[str, Any]) -> SimulationSettings:
 
     Raises:
         RoverError: Rover or terrain cannot be loaded.
-        PlanningError: The start is not three finite numbers.
     """
-    rover, start = load_rover(values["rover"]), tuple(values["start"])
-    if len(start) != 3 or not np.isfinite(start).all():
-        raise PlanningError(f"start is {list(start)}; it must be x, y in m and yaw in rad")
+    rover = load_rover(values["rover"])
     name = values["terrain_file"]
     if name:
         terrain = load_terrain(Path(name))
@@ -70,7 +67,7 @@ def settings_from_parameters(values: Mapping[str, Any]) -> SimulationSettings:
     return SimulationSettings(
         rover=rover,
         terrain=terrain,
-        start=start,
+        start=(values["start_x"], values["start_y"], values["start_yaw"]),
         engine=values["engine"],
         friction=values["friction"] or None,
         speed=values["speed"] or rover.nominal_speed,
