@@ -11,7 +11,7 @@ from rover_physics.rover import load_rover
 
 pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-from traction import EQUAL, MAP, Obstacle, drive  # noqa: E402
+from traction import EQUAL, MAP, Obstacle, drive
 
 STEP = Obstacle("step", 0.10, 0.5)
 """As high as a wheel radius, at a friction with which equal torques do not do."""
