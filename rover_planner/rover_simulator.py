@@ -1,5 +1,6 @@
 """The node /rover_simulator: a rover on a terrain, with the topics of a real one."""
 
+import argparse
 import contextlib
 import sys
 import time
@@ -26,7 +27,7 @@ from rover_planner.parameters import ROVER_SIMULATOR, declare_parameters
 from rover_planner.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.refusals import BAD_INPUT
 from rover_planner.simulator.plant import PlantState
-from rover_planner.simulator.simulation import Simulation, settings_from_parameters
+from rover_planner.simulator.simulation import ENGINES, Simulation, settings_from_parameters
 
 NODE_NAME = "rover_simulator"
 COMMANDS = "/traction_controller/commands"
@@ -183,9 +184,18 @@ def _make_broadcaster(node: Node) -> Any:
     return None
 
 
+def _with_engine(arguments: list[str]) -> list[str]:
+    """Return the arguments with `--engine NAME` as the parameter of that name."""
+    parser = argparse.ArgumentParser(prog=NODE_NAME, description=__doc__)
+    parser.add_argument("--engine", choices=ENGINES, help="what moves the rover")
+    own, rest = parser.parse_known_args(arguments[1:])
+    chosen = [] if own.engine is None else ["--ros-args", "-p", f"engine:={own.engine}"]
+    return [arguments[0], *rest, *chosen]
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
-    rclpy.init(args=arguments)
+    rclpy.init(args=_with_engine(sys.argv if arguments is None else ["", *arguments]))
     node = None
     try:
         node = RoverSimulator()
