@@ -349,7 +349,8 @@ ROVER_SIMULATOR = (
     ParameterSpec(
         "follow_commands",
         False,
-        "Whether torques from /traction_controller/commands drive it; cmd_vel is published then.",
+        "Whether torques from /traction_controller/commands drive it; cmd_vel is published then, "
+        "unless it comes from elsewhere.",
         read_only=True,
     ),
     ParameterSpec(
