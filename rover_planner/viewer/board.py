@@ -5,7 +5,16 @@ import math
 
 from rover_physics.names import WHEELS
 from rover_physics.rover import Rover
-from rover_planner.viewer.colours import LOAD, PASSABLE, PULL, REFUSED, css, of_use
+from rover_planner.viewer.colours import (
+    LOAD,
+    NOTE,
+    PASSABLE,
+    PULL,
+    REFUSED,
+    UNKNOWN,
+    css,
+    of_use,
+)
 from rover_planner.viewer.journey import Frame
 
 WIDTH, HEIGHT = 330, 250
@@ -31,7 +40,9 @@ def draw_board(rover: Rover, frame: Frame, state: str) -> str:
         f'aria-label="rover from above" font-family="sans-serif" font-size="10">'
         f"{''.join(parts)}</svg>"
     )
-    return f'<div id="board">{picture}{_legend()}{_numbers(frame, state)}</div>'
+    return (
+        f'<div id="board" style="padding:0 8px">{picture}{_legend()}{_numbers(frame, state)}</div>'
+    )
 
 
 def _body() -> str:
@@ -132,7 +143,8 @@ def _numbers(frame: Frame, state: str) -> str:
     )
     return (
         '<div style="display:grid;grid-template-columns:1fr 1fr;font-size:13px;'
-        f'line-height:1.5;margin-top:.3em">{cells}</div><div id="state">{html.escape(state)}</div>'
+        f'line-height:1.5;margin-top:.3em">{cells}</div>'
+        f'<div id="state" style="font-size:13px">{html.escape(state)}</div>'
     )
 
 
@@ -145,18 +157,29 @@ def _tilt(frame: Frame) -> float:
     return math.acos(min(max(math.cos(roll) * math.cos(pitch), -1.0), 1.0))
 
 
-def describe_verdict(traversable: bool, reason: str, refusal: str, judged_in: float | None) -> str:
-    """Return verdict, its reason, what was refused last and the time it took [s] as HTML."""
-    colour = css(PASSABLE if traversable else REFUSED)
-    word = "traversable" if traversable else "not traversable"
+def say_nothing_to_show(state: str) -> str:
+    """Return the board for a rover that stands nowhere, and what is waited for."""
+    return f'<div id="board"><div id="state" style="padding:8px">{html.escape(state)}</div></div>'
+
+
+def describe_verdict(traversable: bool | None, reason: str, refusal: str, judged: str) -> str:
+    """Return a verdict as HTML.
+
+    Args:
+        traversable: The verdict, None where there is none.
+        reason: Why, or what else there is to say.
+        refusal: Why the last change was refused, empty if it was not.
+        judged: What was judged, and how long that took.
+    """
+    colour = css(UNKNOWN if traversable is None else PASSABLE if traversable else REFUSED)
+    word = {None: "no verdict", True: "traversable", False: "not traversable"}[traversable]
     text = f"<b>{word}</b>" + (f": {html.escape(reason)}" if reason else "")
     lines = [f'<div style="border-left:5px solid {colour};padding-left:.5em">{text}</div>']
     if refusal:
         lines.append(
-            f'<div id="refusal" style="border-left:5px solid {css(PULL)};padding-left:.5em">'
+            f'<div id="refusal" style="border-left:5px solid {css(NOTE)};padding-left:.5em">'
             f"refused: {html.escape(refusal)}</div>"
         )
-    if judged_in is not None:
-        took = f"judged in {1e3 * judged_in:.0f} ms"
-        lines.append(f'<div style="opacity:.7;font-size:11px">{took}</div>')
-    return f'<div id="verdict" style="font-size:13px">{"".join(lines)}</div>'
+    if judged:
+        lines.append(f'<div style="opacity:.7;font-size:11px">{html.escape(judged)}</div>')
+    return f'<div id="verdict" style="font-size:13px;padding:0 8px">{"".join(lines)}</div>'
