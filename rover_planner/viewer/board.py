@@ -3,6 +3,8 @@
 import html
 import math
 
+import numpy as np
+
 from rover_physics.names import WHEELS
 from rover_physics.rover import Rover
 from rover_planner.viewer.colours import (
@@ -62,20 +64,20 @@ def _wheel(frame: Frame, wheel: int, x: float, y: float, side: str) -> str:
     return (
         f'<rect x="{x - 11:.0f}" y="{y - 26:.0f}" width="22" height="52" rx="5" '
         f'fill="{css(of_use(use))}" stroke="#333"><title>{WHEELS[wheel]}: friction utilisation '
-        f"{use:.2f}</title></rect>"
+        f"{_number(use, 2)}</title></rect>"
         + _bar(bars, y, float(frame.torque_saturation[wheel]), css(LOAD), "torque saturation")
         + _bar(bars + 16, y, abs(float(frame.slip_ratio[wheel])), css(PULL), "slip ratio")
         + f'<text x="{x:.0f}" y="{y + 38:.0f}" text-anchor="middle" fill="currentColor">'
-        f"{load:.1f} N</text>"
+        f"{_number(load, 1)} N</text>"
     )
 
 
 def _bar(x: float, y: float, share: float, colour: str, what: str) -> str:
-    height = BAR * min(max(share, 0.0), 1.0)
+    height = BAR * min(max(np.nan_to_num(share), 0.0), 1.0)
     over = f' stroke="{css(REFUSED)}" stroke-width="2"' if share > 1.0 else ' stroke="#999"'
     return (
         f'<rect x="{x:.0f}" y="{y - BAR / 2:.1f}" width="12" height="{BAR}" fill="none"{over}>'
-        f"<title>{what} {share:.2f}</title></rect>"
+        f"<title>{what} {_number(share, 2)}</title></rect>"
         f'<rect x="{x:.0f}" y="{y + BAR / 2 - height:.1f}" width="12" height="{height:.1f}" '
         f'fill="{colour}"/>'
         f'<text x="{x + 6:.0f}" y="{y - BAR / 2 - 3:.0f}" text-anchor="middle" font-size="8" '
@@ -84,6 +86,8 @@ def _bar(x: float, y: float, share: float, colour: str, what: str) -> str:
 
 
 def _short(share: float) -> str:
+    if math.isnan(share):
+        return "?"
     return f"{share:.2f}".lstrip("0") if share < 1.0 else f"{min(share, 99.0):.1f}"
 
 
@@ -102,13 +106,13 @@ def _gauge(ratio: float, limit: float) -> str:
             f'fill="none" stroke="{colour}" stroke-width="6"/>'
         )
 
-    tip_x, tip_y = point(ratio, radius - 2)
+    tip_x, tip_y = point(0.0 if math.isnan(ratio) else ratio, radius - 2)
     return (
         arc(0.0, limit, css(REFUSED))
         + arc(limit, most, css(PASSABLE))
         + f'<line x1="{x}" y1="{y}" x2="{tip_x:.1f}" y2="{tip_y:.1f}" stroke="#222" '
         'stroke-width="2.5"/>'
-        f'<text x="{x}" y="{y + 12}" text-anchor="middle" fill="#333">{ratio:.2f}</text>'
+        f'<text x="{x}" y="{y + 12}" text-anchor="middle" fill="#333">{_number(ratio, 2)}</text>'
         f'<text x="{x}" y="{y + 24}" text-anchor="middle" font-size="8" fill="#333">'
         "stability margin</text>"
     )
@@ -146,6 +150,10 @@ def _numbers(frame: Frame, state: str) -> str:
         f'line-height:1.5;margin-top:.3em">{cells}</div>'
         f'<div id="state" style="font-size:13px">{html.escape(state)}</div>'
     )
+
+
+def _number(value: float, digits: int) -> str:
+    return "?" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def _centimetres(length: float) -> str:

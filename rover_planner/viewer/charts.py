@@ -46,7 +46,8 @@ class Charts:
         """Add empty plots to the container that is open."""
         self._plots = {name: _add_plot(gui, chart) for name, chart in CHARTS.items()}
         gui.add_html(_legend())
-        self._curves: dict[str, tuple[Floats, Floats]] = {}
+        self.curves: dict[str, tuple[Floats, Floats]] = {}
+        """Distances and values of the curves that are shown, by the names of CHARTS."""
         self._limits: dict[str, float] = {}
 
     def take(self, rover: Rover, distance: Floats, values: Mapping[str, Floats]) -> None:
@@ -62,17 +63,17 @@ class Charts:
             "friction_utilisation": limits.friction_utilisation,
             "tip_over_ratio": limits.tip_over_ratio,
         }
-        self._curves = {}
+        self.curves = {}
         if len(distance) < 2:
             return
         rows = np.unique(np.linspace(0, len(distance) - 1, MOST_POINTS).astype(int))
         for name, chart in CHARTS.items():
             curves = values[name][rows].reshape(len(rows), -1)
-            self._curves[name] = distance[rows], np.minimum(curves, chart.highest)
+            self.curves[name] = distance[rows], np.minimum(curves, chart.highest)
 
     def show(self, distance: float) -> None:
         """Move the cursor to a distance [m]."""
-        for name, (x, values) in self._curves.items():
+        for name, (x, values) in self.curves.items():
             self._plots[name].data = with_cursor(x, values, distance, self._limits.get(name))
 
 
@@ -126,8 +127,8 @@ def with_cursor(
 ) -> tuple[Floats, ...]:
     """Return columns for a plot: x, curves, limit and an upright line at a distance.
 
-    The line is a curve of its own that is known at two points only, both at the distance; there
-    the other curves are interpolated.
+    The line is a curve of its own: along the lower edge, and at the distance up and down again.
+    The page cannot plot what is not a number, so there is no gap in it.
 
     Args:
         x: (n,) distances [m], ascending.
@@ -136,14 +137,14 @@ def with_cursor(
         limit: A level line, None for none.
     """
     at = int(np.searchsorted(x, distance))
-    columns = [np.insert(x, at, [distance, distance])]
+    columns = [np.insert(x, at, [distance] * 3)]
     low, high = float(values.min()), float(values.max())
     for k in range(values.shape[1]):
         here = float(np.interp(distance, x, values[:, k]))
-        columns.append(np.insert(values[:, k], at, [here, here]))
+        columns.append(np.insert(values[:, k], at, [here] * 3))
     if limit is not None:
-        columns.append(np.full(len(x) + 2, limit))
+        columns.append(np.full(len(x) + 3, limit))
         low, high = min(low, limit), max(high, limit)
-    line = np.full(len(x) + 2, np.nan)
-    line[at : at + 2] = low, high
+    line = np.full(len(x) + 3, low)
+    line[at + 1] = high
     return (*columns, line)

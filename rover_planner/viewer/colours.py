@@ -37,7 +37,12 @@ def ramp(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uin
 
 
 def of_use(share: float) -> Colour:
-    """Return the colour of a share of friction: blue where little is used, vermillion at 1."""
+    """Return the colour of a share of friction: blue where little is used, vermillion at 1.
+
+    Grey where it is not known.
+    """
+    if np.isnan(share):
+        return UNKNOWN
     t = float(np.clip(share, 0.0, 1.0))
     return mix(PASSABLE, MIDDLE, 2 * t) if t < 0.5 else mix(MIDDLE, REFUSED, 2 * t - 1)
 

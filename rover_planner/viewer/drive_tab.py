@@ -13,13 +13,15 @@ from rover_planner.viewer.wishes import Wishes
 class DriveTab:
     """Everything that has to be on the screen without scrolling."""
 
-    def __init__(self, gui: Any, playback: Playback, wishes: Wishes):
-        """Add it to the container that is open."""
-        self._playback, self._wishes = playback, wishes
+    def __init__(self, gui: Any, playback: Playback | None, wishes: Wishes):
+        """Add it to the container that is open; no player without a playback."""
+        self._wishes = wishes
         self._times = Journey.empty_times()
         self.moved = True
         """Whether a button moved the playback since it was shown."""
-        self._player = Player(gui, self._actions(), playback.speed)
+        if playback is not None:
+            self._playback = playback
+            self._player = Player(gui, self._actions(), playback.speed)
         self._verdict = gui.add_html("")
         self._board = gui.add_html("")
 

@@ -29,7 +29,7 @@ class ForceArrows:
         self._along = scene.add_arrows("/forces/along", nothing, PULL, **sizes)
 
     def show(self, frame: Frame) -> None:
-        """Draw the forces of a frame; their length is in proportion."""
+        """Draw the forces of a frame; their length is in proportion, 0 where not known."""
         R = matrix_of(*frame.attitude)
         axis = R[:, 1]
         out = frame.wheel_centres - frame.contact_points
@@ -37,8 +37,11 @@ class ForceArrows:
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         along = np.cross(axis, normal)
         points = frame.contact_points
-        loads = self._scale * frame.wheel_loads[:, None] * normal
-        pulls = self._scale * (frame.tangential[:, None] * along + frame.lateral[:, None] * axis)
+        load, pull, aside = (
+            self._scale * np.nan_to_num(values)[:, None]
+            for values in (frame.wheel_loads, frame.tangential, frame.lateral)
+        )
+        loads, pulls = load * normal, pull * along + aside * axis
         self._normal.points = np.stack([points, points + loads], axis=1)
         self._along.points = np.stack([points, points + pulls], axis=1)
 

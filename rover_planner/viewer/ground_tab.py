@@ -19,23 +19,38 @@ POLICIES = {"equal on all wheels": "equal", "traction control": "optimal"}
 class GroundActions:
     """What is done with ground and path."""
 
-    choose_path: Callable[[int | None], None]
-    """Shows a candidate by its index; None for the best."""
-    set_options: Callable[..., None]
-    """Changes fields of PathQueryOptions."""
     recolour: Act
     """Colours the ground anew."""
     show_forces: Callable[[bool], None]
     """Shows or hides the arrows."""
     follow: Callable[[bool], None]
     """Lets the cameras go along with the rover."""
+    choose_path: Callable[[int | None], None] = lambda _index: None
+    """Shows a candidate by its index; None for the best."""
+    set_options: Callable[..., None] = lambda **_changes: None
+    """Changes fields of PathQueryOptions."""
 
 
 class GroundTab:
     """Drop-downs and boxes, and the scale of the colours."""
 
-    def __init__(self, gui: Any, actions: GroundActions):
-        """Add them to the container that is open."""
+    def __init__(self, gui: Any, actions: GroundActions, *, plans: bool = True):
+        """Add them to the container that is open; what is about paths only where it `plans`."""
+        self._gui = gui
+        if plans:
+            self._add_path(actions)
+        self._layer = gui.add_dropdown("Colour by", tuple(LAYERS), initial_value=HEIGHT)
+        self._heading = gui.add_slider("Heading [deg]", -180, 180, 5, 0)
+        for control in (self._layer, self._heading):
+            control.on_update(lambda event: actions.recolour() if event.client else None)
+        self._scale = gui.add_html("")
+        forces = gui.add_checkbox("Forces", True)
+        forces.on_update(lambda event: actions.show_forces(event.target.value))
+        follow = gui.add_checkbox("Follow rover", False)
+        follow.on_update(lambda event: actions.follow(event.target.value))
+
+    def _add_path(self, actions: GroundActions) -> None:
+        gui = self._gui
         self._clicks = gui.add_dropdown("A click sets", ("goal", "start"), initial_value="goal")
         self._choice = gui.add_dropdown("Path shown", (BEST,))
         self._choice.on_update(
@@ -49,15 +64,6 @@ class GroundTab:
                 soil=None if event.target.value == NO_SOIL else event.target.value
             )
         )
-        self._layer = gui.add_dropdown("Colour by", tuple(LAYERS), initial_value=HEIGHT)
-        self._heading = gui.add_slider("Heading [deg]", -180, 180, 5, 0)
-        for control in (self._layer, self._heading):
-            control.on_update(lambda event: actions.recolour() if event.client else None)
-        self._scale = gui.add_html("")
-        forces = gui.add_checkbox("Forces", True)
-        forces.on_update(lambda event: actions.show_forces(event.target.value))
-        follow = gui.add_checkbox("Follow rover", False)
-        follow.on_update(lambda event: actions.follow(event.target.value))
 
     def _choose(self, event: Any, actions: GroundActions) -> None:
         word = event.target.value.split(":")[0]

@@ -115,10 +115,10 @@ class PathOverlay:
             position=place, wxyz=attitude,
         )  # fmt: skip
         above = np.array([0.0, 0.0, 3.0 * rover.wheel.radius])
-        label = self._scene.add_label(
+        self._scene.add_label(
             f"{name}/reason", text, position=above, anchor="bottom-center", font_screen_scale=0.8
         )
-        self._nodes += [ghost, label]
+        self._nodes.append(ghost)  # what is below it goes with it
 
     def _draw_flag(self, name: str, terrain: Terrain, pose: Floats, radius: float) -> None:
         foot = np.array([pose[0], pose[1], _height(terrain, pose[0], pose[1])])
@@ -126,10 +126,8 @@ class PathOverlay:
         pole = self._scene.add_line_segments(
             f"/flags/{name}", np.array([[foot, top]]), UNKNOWN, thickness=0.1 * radius
         )
-        label = self._scene.add_label(
-            f"/flags/{name}/name", name, position=top, anchor="bottom-center"
-        )
-        self._nodes += [pole, label]
+        self._scene.add_label(f"/flags/{name}/name", name, position=top, anchor="bottom-center")
+        self._nodes.append(pole)
 
 
 def _thin(count: int) -> NDArray[np.intp]:

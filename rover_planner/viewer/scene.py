@@ -32,7 +32,13 @@ class Scene:
 
     def draw_ground(self, ground: Ground) -> None:
         """Show another ground, or the same in other colours."""
-        self._scene.add_mesh_trimesh("/ground", ground.mesh, cast_shadow=False)
+        self._scene.add_mesh_trimesh(
+            "/ground", ground.mesh, cast_shadow=False, receive_shadow=False
+        )
+
+    def hide_ground(self) -> None:
+        """Take the ground away."""
+        self._scene.remove_by_name("/ground")
 
     def draw_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
         """Show another rover, with its arm at angles [rad]."""
