@@ -11,6 +11,7 @@ PACKAGES = [
     "msg_adapters",
     "rover_planner",
     "rover_planner.simulator",
+    "rover_planner.studies",
     "rover_planner.viewer",
 ]
 HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link to this file

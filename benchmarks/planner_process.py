@@ -5,7 +5,7 @@ import os
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 
 import rclpy
@@ -40,6 +40,11 @@ class Planner:
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
         self._clients: dict[str, object] = {}
+
+    @property
+    def node(self) -> Node:
+        """The node that asks."""
+        return self._node
 
     def ask(self, service: str, start, goal) -> tuple[Path, float]:
         """Return the plan of a service from start to goal, (3,) each, and the time it took [s]."""
@@ -89,6 +94,26 @@ class Processes:
         parameters = {"terrain_file": file, **parameters}
         words = [w for name, value in parameters.items() for w in ("-p", f"{name}:={value}")]
         return self._start("rover_planner.traverse_server", "--ros-args", *words)
+
+    def start_rover(self, terrain: Terrain, rate: float, start: Sequence[float]) -> None:
+        """Start a simulated rover that drives straight on, and the controller of its torques."""
+        file = self._folder / "rover_terrain.npz"
+        save_terrain(file, terrain)
+        for module, parameters in (
+            ("rover_planner.traction_controller", {"rate": rate}),
+            (
+                "rover_planner.rover_simulator",
+                {
+                    "rate": rate,
+                    "terrain_file": file,
+                    "start_x": start[0],
+                    "start_y": start[1],
+                    "follow_commands": True,
+                },
+            ),
+        ):
+            words = [w for name, value in parameters.items() for w in ("-p", f"{name}:={value}")]
+            self._start(module, "--ros-args", *words)
 
     def start_echo(self, plan: Path) -> ChildProcess:
         """Start a node that answers with a plan."""

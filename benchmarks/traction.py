@@ -260,7 +260,7 @@ def draw_sums(sums: dict[str, dict], picture: Path) -> None:
     axes.set_xticks(np.arange(len(keys)) + 1.5 * width)
     axes.set_xticklabels(("slip distance", "torque effort", "energy", "utilisation"))
     axes.set_ylabel("share of the speed servos'")
-    axes.legend(frameon=False)
+    figure.legend(loc="outside upper center", ncols=len(CONTROLLERS), frameon=False)
     figure.savefig(picture, dpi=150)
 
 

@@ -62,6 +62,18 @@ class ConfigSection:
         """Return the section below a key."""
         return ConfigSection(self._data[name], self._source, self.key(name), required, optional)
 
+    def sections(
+        self, name: str, required: Sequence[str], optional: Sequence[str] = ()
+    ) -> "list[ConfigSection]":
+        """Return the sections of a list below a key, one at least."""
+        items = self._data[name]
+        if not isinstance(items, list) or not items:
+            raise self.error(name, "a list of one mapping or more")
+        return [
+            ConfigSection(item, self._source, f"{self.key(name)}[{k}]", required, optional)
+            for k, item in enumerate(items)
+        ]
+
     def number(
         self,
         name: str,

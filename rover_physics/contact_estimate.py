@@ -122,14 +122,17 @@ class MotionContactEstimator:
             first=[high, own, 3 + high, 3 + own, 3 + own],
             second=[low, low, 3 + low, 3 + low, own],
         )
-        self._motion = new_record(MOTION)
+        self._motion = motion = new_record(MOTION)
+        # Looking up a field of a record takes as long as writing it.
+        self._angles, self._covariance = self._filter.angles, self._filter.covariance
+        self._attitude, self._joints = motion.attitude, motion.joints
+        self._joint_rates = motion.joint_rates
+        self._wheel_rates, self._body_rates = motion.wheel_rates, motion.body_rates
 
     @property
     def estimate(self) -> ContactEstimate:
         """The estimate so far."""
-        return ContactEstimate(
-            self._filter.angles.copy(), self._filter.covariance.copy(), "motion"
-        )
+        return ContactEstimate(self._angles.copy(), self._covariance.copy(), "motion")
 
     def update(self, motion: Motion, duration: float) -> ContactEstimate:
         """Take a measurement into account.
@@ -138,12 +141,11 @@ class MotionContactEstimator:
             motion: All finite.
             duration: Time since the last measurement [s].
         """
-        record = self._motion
-        record.attitude[:] = motion.roll, motion.pitch
-        record.joints[0], record.joints[1:] = motion.rocker_angle, motion.bogie_angles
-        record.joint_rates[0], record.joint_rates[1:] = motion.rocker_rate, motion.bogie_rates
-        record.wheel_rates[:], record.body_rates[:] = motion.wheel_rates, motion.body_rates
-        _update(self._linkage, record, duration, self._filter)
+        self._attitude[:] = motion.roll, motion.pitch
+        self._joints[0], self._joints[1:] = motion.rocker_angle, motion.bogie_angles
+        self._joint_rates[0], self._joint_rates[1:] = motion.rocker_rate, motion.bogie_rates
+        self._wheel_rates[:], self._body_rates[:] = motion.wheel_rates, motion.body_rates
+        _update(self._linkage, self._motion, duration, self._filter)
         return self.estimate
 
 

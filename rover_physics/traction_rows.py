@@ -116,7 +116,9 @@ class BalanceWriter:
         self._linkage = pack_linkage(rover, mass, com)
         self._linkage.has_tool_load = True
         self._linkage.tool[0] = _centre_of_mass(self._linkage)
-        self._work = new_record(ROWS_WORK)
+        self._work = work = new_record(ROWS_WORK)
+        # Looking up a field of a record takes as long as writing it.
+        self._q, self._angles, self._offsets = work.q, work.angles, work.offsets
         self.weight = float(self._linkage.mass * self._linkage.gravity)
         """Weight of the rover with its payload in [N]."""
 
@@ -131,17 +133,16 @@ class BalanceWriter:
             ModelError: The equations do not determine the forces: the contact angles contradict
                 one another so that the rover could not roll.
         """
-        work, unit = self._work, self.weight / WHEEL_COUNT
-        q = work.q
+        work, unit, q = self._work, self.weight / WHEEL_COUNT, self._q
         q[0], q[1], q[2], q[3] = 0.0, state.roll, state.pitch, state.rocker_angle
         q[4:6] = state.bogie_angles
-        work.angles[:] = state.contact_angles
-        work.offsets[:] = state.contact_offsets
-        work.push = net_traction
+        self._angles[:] = state.contact_angles
+        self._offsets[:] = state.contact_offsets
+        work["push"] = net_traction
         A, b, along = np.zeros((9, FORCES)), np.empty(9), np.empty(6)
         if not _write_rows(self._linkage, work, A, b, along):
             raise ModelError(
-                f"contact angles {np.round(work.angles, 3).tolist()} rad leave the balance "
+                f"contact angles {np.round(self._angles, 3).tolist()} rad leave the balance "
                 "without a solution; they must be such that all wheels can roll at once"
             )
         return BalanceRows(A, b, along, unit)

@@ -1,4 +1,4 @@
-"""The command `rover_planner`: predict, reach, view, terrain, demo, figure4."""
+"""The command `rover_planner`: predict, reach, study, view, terrain, demo, figure4."""
 
 import json
 import sys
@@ -10,6 +10,7 @@ import typer
 
 from rover_physics.errors import RoverError
 from rover_planner.errors import DemoError, PlanningError
+from rover_planner.study_command import study
 from rover_planner.view_command import view
 
 BAD_INPUT = 2
@@ -245,6 +246,7 @@ def figure4(
         draw_figure4(out, model)
 
 
+app.command()(study)
 app.command(context_settings={"ignore_unknown_options": True})(view)
 
 

@@ -321,9 +321,9 @@ ROVER_SIMULATOR = (
         "Terrain it drives on, .npz; empty makes a Mars-like one.",
         read_only=True,
     ),
-    ParameterSpec(
-        "start", [0.0, 0.0, 0.0], "Where it starts: x, y in m, yaw in rad.", read_only=True
-    ),
+    ParameterSpec("start_x", 0.0, "Where it starts.", "m", bounds=(-1e6, 1e6), read_only=True),
+    ParameterSpec("start_y", 0.0, "Where it starts.", "m", bounds=(-1e6, 1e6), read_only=True),
+    ParameterSpec("start_yaw", 0.0, "Its heading.", "rad", bounds=(-6.3, 6.3), read_only=True),
     ParameterSpec(
         "engine",
         "quasi_static",
@@ -349,7 +349,8 @@ ROVER_SIMULATOR = (
     ParameterSpec(
         "follow_commands",
         False,
-        "Whether torques from /traction_controller/commands drive it; cmd_vel is published then.",
+        "Whether torques from /traction_controller/commands drive it; cmd_vel is published then, "
+        "unless it comes from elsewhere.",
         read_only=True,
     ),
     ParameterSpec(
@@ -392,7 +393,7 @@ ROVER_SIMULATOR = (
         read_only=True,
     ),
     ParameterSpec(
-        "seed", 1, "Seed of noise and of a made terrain.", bounds=(0, 2**31), read_only=True
+        "seed", 1, "Seed of noise and of a made terrain.", bounds=(0, 2**31 - 1), read_only=True
     ),
     ParameterSpec("map_frame", "map", "Frame of map, path and odometry.", read_only=True),
 )
@@ -467,6 +468,10 @@ def parameters_document() -> str:
             "## /traction_controller",
             "",
             *_table(TRACTION_CONTROLLER),
+            "",
+            "## /rover_simulator",
+            "",
+            *_table(ROVER_SIMULATOR),
             "",
             "Read-only parameters are set at start, the others at any time "
             "(`ros2 param set /traverse_server friction 0.6`).",

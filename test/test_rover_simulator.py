@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
-from grounds import make_terrain, waves
+from grounds import make_terrain, wall_at, waves
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from ros_fixtures import RosRun, wait_until
@@ -16,11 +16,11 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain import save_terrain
 from rover_planner.mission_planner import MissionPlanner
 from rover_planner.qos import map_qos, sensor_qos, topic_qos
-from rover_planner.rover_simulator import RoverSimulator
+from rover_planner.rover_simulator import RoverSimulator, main
 from rover_planner.traction_controller import TractionController
 from rover_planner.traverse_server import TraverseServer
 
-START = [-1.0, 0.0, 0.0]
+START_X = -1.0
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def terrain_file(tmp_path_factory):
 
 
 def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
-    values = {"terrain_file": terrain_file, "start": START, "speed": 0.08} | values
+    values = {"terrain_file": terrain_file, "start_x": START_X, "speed": 0.08} | values
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     return ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
 
@@ -88,7 +88,7 @@ def test_it_drives_as_commanded_and_stops_when_commands_stop(ros, terrain_file):
 
     def has_moved():
         ear.commands.publish(twist)
-        return plant.pose()[0] > START[0] + 0.05
+        return plant.pose()[0] > START_X + 0.05
 
     wait_until(has_moved, "the rover to move")
     wait_until(lambda: plant.state().velocity[0] == 0.0, "the rover to stop")
@@ -98,7 +98,7 @@ def test_bad_parameters_are_refused_by_name(ros, terrain_file):
     from rover_planner.errors import PlanningError
 
     with pytest.raises(PlanningError, match="cannot start"):
-        start_simulator(ros, terrain_file, start=[50.0, 0.0, 0.0])
+        start_simulator(ros, terrain_file, start_x=50.0)
 
 
 @pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
@@ -120,3 +120,55 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     assert controller.statistics.fallbacks == 0
     for node in (simulator, server, controller, planner):
         assert ros.is_alive(node)
+
+
+def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(ros, terrain_file):
+    ear = Ear(ros)
+    simulator = start_simulator(ros, terrain_file, follow_commands=True)
+    controller = ros.spin(TractionController(context=ros.context))
+    wait_until(lambda: controller.statistics.updates > 5, "the controller to run")
+    twist = TwistStamped()
+    twist.twist.linear.x = 0.06
+    place = simulator.simulation.plant.pose()
+
+    def has_moved():
+        ear.commands.publish(twist)
+        return simulator.simulation.plant.pose()[0] > place[0] + 0.05
+
+    wait_until(has_moved, "the rover to move", 60.0)
+    assert simulator.simulation.steering[0] == 0.06
+    wait_until(lambda: simulator.simulation.steering[0] == 0.0, "the speeds to be forgotten")
+
+
+def test_diagnostics_come_though_nothing_happens_and_say_where_the_rover_is(ros, terrain_file):
+    ear = Ear(ros)
+    start_simulator(ros, terrain_file)
+    wait_until(lambda: len(ear.heard.get("/diagnostics", ())) >= 2, "diagnostics")
+    status = ear.heard["/diagnostics"][-1].status[0]
+    assert status.level == status.OK
+    assert status.values[0].key == "position"
+    assert status.values[0].value.startswith(f"[{START_X}, 0.0, ")
+
+
+def test_a_wall_ahead_stops_it_with_the_reason_in_the_diagnostics(ros, tmp_path):
+    ear = Ear(ros)
+    file = tmp_path / "wall.npz"
+    save_terrain(file, make_terrain(wall_at(0.0), half=3.0))
+    simulator = start_simulator(ros, str(file), start_x=-0.7)
+    twist = TwistStamped()
+    twist.twist.linear.x = 0.09
+
+    def says_why():
+        ear.commands.publish(twist)
+        told = ear.heard.get("/diagnostics", ())
+        return [m.status[0] for m in told if m.status[0].level == m.status[0].ERROR]
+
+    [status, *_] = wait_until(says_why, "the reason", 60.0)
+    assert status.message == simulator.simulation.plant.state().stopped != ""
+
+
+def test_an_engine_that_is_none_is_refused_by_the_command_line(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["--engine", "horses"])
+    assert ended.value.code == 2
+    assert "horses" in capsys.readouterr().err

@@ -57,11 +57,8 @@ def settings_from_parameters(values: Mapping[str, Any]) -> SimulationSettings:
 
     Raises:
         RoverError: Rover or terrain cannot be loaded.
-        PlanningError: The start is not three finite numbers.
     """
-    rover, start = load_rover(values["rover"]), tuple(values["start"])
-    if len(start) != 3 or not np.isfinite(start).all():
-        raise PlanningError(f"start is {list(start)}; it must be x, y in m and yaw in rad")
+    rover = load_rover(values["rover"])
     name = values["terrain_file"]
     if name:
         terrain = load_terrain(Path(name))
@@ -70,7 +67,7 @@ def settings_from_parameters(values: Mapping[str, Any]) -> SimulationSettings:
     return SimulationSettings(
         rover=rover,
         terrain=terrain,
-        start=start,
+        start=(values["start_x"], values["start_y"], values["start_yaw"]),
         engine=values["engine"],
         friction=values["friction"] or None,
         speed=values["speed"] or rover.nominal_speed,
@@ -137,6 +134,10 @@ class Simulation:
         """Take torques (6,) [N m] in wheel order."""
         self._torques, self._torques_at = torques, now
 
+    def has_speeds(self, now: float) -> bool:
+        """Tell whether commanded speeds are in force: fresh, and no path is followed."""
+        return self._follower is None and now - self._wanted_at <= self.settings.timeout
+
     @property
     def follows_path(self) -> bool:
         """Whether there is a path that is not done."""
@@ -160,8 +161,7 @@ class Simulation:
             if self._follower.has_arrived(pose):
                 self._follower = None
             return wanted
-        fresh = now - self._wanted_at <= self.settings.timeout
-        return self._wanted if fresh else (0.0, 0.0)
+        return self._wanted if self.has_speeds(now) else (0.0, 0.0)
 
     def look(self) -> Terrain:
         """Return what the sensor sees of the ground around the rover."""
