@@ -125,13 +125,14 @@ def test_the_scrubber_goes_to_any_time(visitor, page):
     assert visitor.number("Distance") == pytest.approx(150.0, rel=0.05)
 
 
-def test_the_cursor_of_the_plots_moves_along(visitor, page):
-    plots = visitor.tab.locator(".uplot canvas").first
-    before = plots.screenshot()
-    visitor.set_slider("Time [s]", "60")
-    wait_until(lambda: plots.screenshot() != before, "the plots to change")
-    curves = page.charts.curves["wheel_loads"]
-    assert curves[1].shape[1] == 6
+def test_the_plots_are_on_the_page_and_their_cursor_moves_along(visitor, page):
+    assert visitor.tab.locator(".uplot canvas").count() == 3
+    visitor.set_slider("Time [s]", "12")
+    wait_until(lambda: page.playback.time == pytest.approx(12.0), "12 s")
+    distance = page.session.shown.journey.frame(12.0).distance
+    data = page.charts.plots["wheel_loads"]
+    wait_until(lambda: np.any(np.isclose(data.data[0], distance)), "the cursor to be there")
+    assert all(np.isfinite(column).all() for column in data.data)
 
 
 def test_a_slider_changes_the_rover_and_the_path_is_judged_again(visitor, page):

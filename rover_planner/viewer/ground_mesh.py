@@ -149,7 +149,7 @@ def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
     A matt surface over the whole screen takes most of the time of a page that is drawn without a
     graphics card. glTF has the extension KHR_materials_unlit for it, which trimesh does not write.
     """
-    glb = mesh.export(file_type="glb")
+    glb: Any = mesh.export(file_type="glb")
     length = struct.unpack_from("<I", glb, 12)[0]
     content = json.loads(glb[20 : 20 + length])
     for material in content["materials"]:
