@@ -216,6 +216,7 @@ def test_it_shows_the_rover_where_it_is_with_what_was_predicted_there(ros, liste
     answer = planner.ask([-1.0, 0.0, 0.0], [0.5, 0.0, 0.0])
     assert answer["traversable"], answer["reason"]
     wait_until(lambda: listener.latest().plan is not None, "the plan")
+    wait_until(lambda: listener.latest().verdict is not None, "the verdict")
     wait_until(lambda: np.isfinite(listener.latest().state.wheel_loads).all(), "the loads")
     heard = listener.latest()
     assert heard.terrain is not None and len(heard.plan) > 5 and heard.verdict.traversable
