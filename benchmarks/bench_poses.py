@@ -55,9 +55,9 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
     sines, cosines = samples.sines[: samples.rows], samples.cosines[: samples.rows]
     laterals, radius, scale = samples.laterals[: samples.circles], samples.radius, grid[4]
     cells = []
-    settled = results[results.status == SETTLED]
+    settled = results[results["status"] == SETTLED]
     work = new_work()
-    for i in np.flatnonzero(results.status == SETTLED):
+    for i in np.flatnonzero(results["status"] == SETTLED):
         place(setup.linkage, *poses[i], results[i].q, work.placement)
         placed = work.placement
         axis = placed.R[:, 1]

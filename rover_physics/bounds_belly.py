@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from rover_physics.clearance import POINTS, point_of_underside
+from rover_physics.ground import height_at_cell, look_up
 from rover_physics.kernels import kernel
 
 
@@ -48,8 +50,32 @@ def bound_clearance(grid, error, linkage, spread, bounds):
             least = min(least, above - error[i, j] + lowered - bend)
             if inside >= shift:
                 most = min(most, above + error[i, j] + raised + bend)
+    if most == np.inf:
+        least, most = _bound_points(grid, error, spread, belly, shift, bend, least)
     if least < np.inf:
         bounds[0], bounds[1] = least, most
+
+
+@kernel
+def _bound_points(grid, error, spread, belly, shift, bend, least):
+    """Return smaller of `least` and the least clearance below POINTS, and the most there [m].
+
+    For outlines with no known cell inside, where `belly_clearance` looks at these points.
+    """
+    R, origin = spread.model.placement.R, spread.model.placement.origin
+    most = np.inf
+    for k in range(POINTS):
+        x, y, z = point_of_underside(R, origin, belly, k)
+        height, slope_x, slope_y = look_up(grid, x, y)
+        if height != height:
+            continue
+        gx = (x - grid.x0) * grid.inverse_resolution
+        gy = (y - grid.y0) * grid.inverse_resolution
+        wrong = height_at_cell(error, gx, gy) + bend + shift * (abs(slope_x) + abs(slope_y))
+        lowered, raised = _plane_change(R, spread, x - origin[0], y - origin[1], z - origin[2])
+        least = min(least, z - height + lowered - wrong)
+        most = min(most, z - height + raised + wrong)
+    return least, most
 
 
 @kernel

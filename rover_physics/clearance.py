@@ -4,11 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rover_physics.ground import BLOCK
+from rover_physics.ground import BLOCK, look_up
 from rover_physics.kernels import kernel
 
 HALF = 0.5 * (BLOCK - 1)
 """Distance of a block's outer rows and columns from its middle, in cells."""
+POINTS = 9
+"""Corners, middles of edges and middle of the underside."""
 
 
 class Underside(NamedTuple):
@@ -38,9 +40,10 @@ class Underside(NamedTuple):
 def belly_clearance(grid, ceiling, linkage, placement):
     """Return the smallest height [m] of the underside above the known ground below it.
 
-    Looked up at all cell centres within the outline of the underside; NaN where none is known
-    there. The block of cells that may come nearest is looked at first; others are passed over
-    whose highest ground, as `ceiling` has it, stays farther below than what is found already.
+    Looked up at all cell centres within the outline of the underside; where none is known there,
+    as between large cells, at nine points of it, and NaN where they too are unknown. The block of
+    cells that may come nearest is looked at first; others are passed over whose highest ground,
+    as `ceiling` has it, stays farther below than what is found already.
     """
     R, origin, belly = placement.R, placement.origin, linkage.belly
     if not R[2, 2] > 0.0:
@@ -53,16 +56,40 @@ def belly_clearance(grid, ceiling, linkage, placement):
             bound = _lowest_above(plane, bi, bj) - ceiling[bi, bj]
             if bound < nearest and _is_below(plane, belly, bi, bj):
                 nearest, nearest_i, nearest_j = bound, bi, bj
-    if nearest == np.inf:
-        return np.nan
-    smallest = _clear_block(grid.elevation, plane, belly, nearest_i, nearest_j, np.inf)
+    smallest = np.inf
+    if nearest < np.inf:
+        smallest = _clear_block(grid.elevation, plane, belly, nearest_i, nearest_j, np.inf)
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
             if _lowest_above(plane, bi, bj) - ceiling[bi, bj] < smallest and _is_below(
                 plane, belly, bi, bj
             ):
                 smallest = _clear_block(grid.elevation, plane, belly, bi, bj, smallest)
+    return smallest if smallest < np.inf else _clear_points(grid, R, origin, belly)
+
+
+@kernel
+def _clear_points(grid, R, origin, belly):
+    """Return the smallest clearance [m] below POINTS of the underside, NaN if none is known."""
+    smallest = np.inf
+    for k in range(POINTS):
+        x, y, z = point_of_underside(R, origin, belly, k)
+        clearance = z - look_up(grid, x, y)[0]
+        if clearance < smallest:
+            smallest = clearance
     return smallest if smallest < np.inf else np.nan
+
+
+@kernel
+def point_of_underside(R, origin, belly, k):
+    """Return x, y, z [m] of one of POINTS of the underside."""
+    along = belly[1] + 0.5 * (k % 3) * (belly[2] - belly[1])
+    across = belly[3] + 0.5 * (k // 3) * (belly[4] - belly[3])
+    return (
+        origin[0] + R[0, 0] * along + R[0, 1] * across + R[0, 2] * belly[0],
+        origin[1] + R[1, 0] * along + R[1, 1] * across + R[1, 2] * belly[0],
+        origin[2] + R[2, 0] * along + R[2, 1] * across + R[2, 2] * belly[0],
+    )
 
 
 @kernel

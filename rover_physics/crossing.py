@@ -8,7 +8,7 @@ contact; downwards it drops.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,11 +45,17 @@ class Crossings:
     results: Any
     """(m,) RESULT of each pose."""
 
-    def select(self, mask: np.ndarray) -> "Crossings":
-        """Return the poses that `mask` (m,) has, or those of some rows in their order."""
+    def select(self, rows: np.ndarray | slice) -> "Crossings":
+        """Return the poses that a mask (m,) has, or those of some rows in their order."""
         return Crossings(
-            self.place[mask], self.waypoint[mask], self.poses[mask], self.results[mask]
+            self.place[rows], self.waypoint[rows], self.poses[rows], self.results[rows]
         )
+
+    def between(self, first: int, end: int) -> "Crossings":
+        """Return what lies between waypoints `first` and `end`, counted from the first of them."""
+        start, stop = np.searchsorted(self.place, (first, end))
+        part = self.select(slice(start, stop))
+        return replace(part, place=part.place - first, waypoint=part.waypoint - first)
 
 
 def find_crossings(
@@ -59,21 +65,23 @@ def find_crossings(
     results: Any,
     evaluate: Evaluate,
     direction: float = 1.0,
+    joined: np.ndarray | bool = True,
 ) -> Crossings:
     """Evaluate the poses between waypoints where contacts jump.
 
     Args:
         terrain: The ground.
         radius: Wheel radius [m].
-        poses: (n, 3) waypoints.
+        poses: (n, 3) waypoints of one path, or of several behind one another.
         results: (n,) their RESULTs.
         evaluate: Evaluates poses (k, 3), with heights and contact angles (k, 6, 2) of held
             wheels or NONE_HELD.
         direction: 1 where the rover drives forwards along the path, -1 backwards.
+        joined: (n - 1,) True where the path leads from a waypoint to the next one.
     """
     spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    jumps = _jumps(results[:-1], results[1:], radius) & (spacing <= radius) & (spacing > 0.0)
-    at = np.flatnonzero(jumps)
+    near = (spacing <= radius) & (spacing > 0.0) & joined
+    at = np.flatnonzero(_jumps(results, slice(None, -1), slice(1, None), radius) & near)
     open_ = _Stretches(
         np.column_stack([at, at + 1.0]),
         poses[np.column_stack([at, at + 1])],
@@ -88,6 +96,9 @@ def find_crossings(
         found.append(_climb(terrain, radius, pieces.select(short | stuck), evaluate, direction))
         open_ = pieces.select(~(short | stuck))
     return _in_order(found)
+
+
+_NOTHING = Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_results(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +154,7 @@ class _Stretches:
         before, after = known[:-1], known[1:]
         same = before // (PIECES + 1) == after // (PIECES + 1)
         before, after = before[same], after[same]
-        jumps = _jumps(results[before], results[after], radius)
+        jumps = _jumps(results, before, after, radius)
         ends = np.column_stack([before[jumps], after[jumps]])
         place, poses = insert(self.place, inner.place), insert(self.poses, inner.poses)
         return _Stretches(place[ends], poses[ends], results[ends]), ends[:, 1] - ends[:, 0] > 1
@@ -152,7 +163,7 @@ class _Stretches:
 def _in_order(found: list[Crossings]) -> Crossings:
     found = [part for part in found if len(part.place)]
     if not found:
-        return Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_results(0))
+        return _NOTHING
     place = np.concatenate([part.place for part in found])
     results, end = new_results(len(place)), 0
     for part in found:
@@ -167,14 +178,18 @@ def _in_order(found: list[Crossings]) -> Crossings:
     return together.select(np.argsort(place, kind="stable"))
 
 
-def _jumps(before: np.ndarray, after: np.ndarray, radius: float) -> np.ndarray:
-    """Return (k,) True where a contact jumps between the results before and after."""
-    settled = (before["status"] == SETTLED) & (after["status"] == SETTLED)
-    here, there = before["contact_angle"], after["contact_angle"]
+def _jumps(
+    results: np.ndarray, before: np.ndarray | slice, after: np.ndarray | slice, radius: float
+) -> np.ndarray:
+    """Return (k,) True where a contact jumps between the rows before (k,) and after (k,)."""
+    settled = results["status"] == SETTLED
+    angle, height = results["contact_angle"], results["wheel_centres"][:, :, 2]
+    here, there = angle[before], angle[after]
     steep = np.maximum(np.abs(here), np.abs(there)) > STEEP
     turned = steep & (np.abs(there - here) > ANGLE_JUMP)
-    rise = after["wheel_centres"][:, :, 2] - before["wheel_centres"][:, :, 2]
-    return settled & np.any(turned | (np.abs(rise) > HEIGHT_JUMP * radius), axis=1)
+    rise = np.abs(height[after] - height[before]) > HEIGHT_JUMP * radius
+    jumps = settled[before] & settled[after] & np.any(turned | rise, axis=1)
+    return np.asarray(jumps)
 
 
 def _climb(
@@ -186,7 +201,7 @@ def _climb(
     climbing = rise > 0.05 * radius
     at = np.flatnonzero(np.any(climbing & (rise > HEIGHT_JUMP * radius), axis=1))
     if not len(at):
-        return _in_order([])
+        return _NOTHING
     stages = len(CLIMB_STAGES)
     held = np.full((len(at), stages, 6, 2), np.nan)
     for row, i in enumerate(at):

@@ -57,11 +57,11 @@ def find_falls(
     extra = crossings.results
     steps = np.hypot(*np.diff(in_order(poses, crossings.poses)[:, :2], axis=0).T)
     distance = np.concatenate([[0.0], np.cumsum(steps)])
-    angle = direction * in_order(results.contact_angle, extra.contact_angle)
-    steep = _find_steep(angle, in_order(results.friction, extra.friction))
+    angle = direction * in_order(results["contact_angle"], extra["contact_angle"])
+    steep = _find_steep(angle, in_order(results["friction"], extra["friction"]))
     falling = _keep_short_runs(steep, distance, radius)
     rolling_over = _extend_to_edges(falling, angle, distance, radius)
-    heights = in_order(results.wheel_centres, extra.wheel_centres)[:, :, 2]
+    heights = in_order(results["wheel_centres"], extra["wheel_centres"])[:, :, 2]
     owner = in_order(np.arange(n), crossings.waypoint)
     drops = _measure_drops(radius, heights, steps, rolling_over, owner, n)
     unordered = np.empty_like(falling)

@@ -92,7 +92,7 @@ def new_results(n: int) -> Any:
     numbers = np.full((n, RESULT.itemsize // 8), np.nan)
     results = numbers.view(RESULT)[:, 0]
     results["status"] = 0
-    return results.view(np.recarray)
+    return results
 
 
 def new_work() -> Any:
@@ -102,6 +102,9 @@ def new_work() -> Any:
     return work
 
 
+NEW_WORK = np.array([new_work()], WORK)
+
+
 def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     """Evaluate the model at poses (n, 3) and return the results (n,), a RESULT each.
 
@@ -109,10 +112,11 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     those that rest on the ground; (0, 6, 2) where none climbs. The others are those of `Setup`.
     """
     results = new_results(len(poses))
-    works = np.full(min(MOST_CHUNKS, -(-len(poses) // CHUNK)), new_work(), WORK)
     records = (np.array([record]) for record in (linkage, samples, settings))
     effort = 1 if settings.policy == EQUAL else OPTIMAL_EFFORT
-    with threads_worth(effort * len(poses)):
+    with threads_worth(effort * len(poses)) as threads:
+        chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-len(poses) // CHUNK))
+        works = np.repeat(NEW_WORK, chunks)
         evaluate_poses(ground, *records, poses, held, works, results)
     return results
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rover_physics.limits import Verdict, find_reasons
 from rover_physics.names import WHEELS
 from rover_physics.prediction import PathPrediction
-from rover_physics.reasons import Check, check_limits
+from rover_physics.reasons import check_limits
 from rover_physics.rover import Rover
 from rover_physics.terrain import Terrain
 from rover_physics.trap import judge_path
@@ -166,26 +166,17 @@ def _look_between(rover: Rover, prediction: PathPrediction, decisions: list[_Dec
 
 
 def _decide_rows(rover: Rover, prediction: PathPrediction) -> Iterator[_Decision]:
-    checks = {check.code: check for check in check_limits(rover, prediction)}
+    checks = check_limits(rover, prediction)
+    wheels = {check.code: check.wheels() for check in checks}
+    margins = {check.code: check.margins() for check in checks}
     codes, reasons = find_reasons(rover, prediction)
-    asked = [checks[code] for code in WHEEL_CONSTRAINTS]
-    margins = np.stack([check.margin for check in asked])
-    tightest = np.argmin(margins, axis=0)
-    rows = np.arange(len(codes))
-    wheels = np.stack([check.wheel for check in asked])[tightest, rows].tolist()
-    least = margins[tightest, rows].tolist()
+    tightest = np.argmin([margins[code] for code in WHEEL_CONSTRAINTS], axis=0)
     falls = np.asarray(prediction.falling.any(axis=1)).tolist()
     for i, which in enumerate(tightest.tolist()):
-        if codes[i]:
-            wheel, margin = _amount(checks.get(codes[i]), i)
-            yield _Decision(codes[i], wheel, margin, reasons[i])
-        elif falls[i]:
+        code = codes[i] or WHEEL_CONSTRAINTS[which]
+        if code not in margins:
+            yield _Decision(code, -1, float("nan"), reasons[i])
+        elif falls[i] and not codes[i]:
             yield _NOTHING_ASKED
         else:
-            yield _Decision(WHEEL_CONSTRAINTS[which], wheels[i], least[i], "")
-
-
-def _amount(check: Check | None, i: int) -> tuple[int, float]:
-    if check is None:
-        return -1, float("nan")
-    return int(check.wheel[i]), float(check.margin[i])
+            yield _Decision(code, int(wheels[code][i]), float(margins[code][i]), reasons[i])

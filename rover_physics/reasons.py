@@ -20,10 +20,10 @@ class Check(NamedTuple):
     """Its code in a verdict."""
     broken: np.ndarray
     """(n,) True where the limit is broken."""
-    margin: np.ndarray
-    """(n,) share of the limit that is left, negative where it is broken."""
-    wheel: np.ndarray
-    """(n,) index of the wheel that it is about, -1 for none."""
+    margins: Callable[[], np.ndarray]
+    """Gives the share of the limit (n,) that is left, negative where it is broken."""
+    wheels: Callable[[], np.ndarray]
+    """Gives the index of the wheel (n,) that it is about, -1 for none."""
     describe: Callable[[int], str]
     """Says of a waypoint by how much."""
 
@@ -46,8 +46,8 @@ def _share_left(values: np.ndarray, limit: float) -> np.ndarray:
     return 1.0 - values / limit if limit > 0.0 else limit - values
 
 
-def _no_wheel(values: np.ndarray) -> np.ndarray:
-    return np.full(len(values), -1)
+def _no_wheel(values: np.ndarray) -> Callable[[], np.ndarray]:
+    return lambda: np.full(len(values), -1)
 
 
 def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
@@ -71,7 +71,10 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
     low = np.repeat([suspension.rocker_limits[0], suspension.bogie_limits[0]], 2)
     high = np.repeat([suspension.rocker_limits[1], suspension.bogie_limits[1]], 2)
     beyond = (joints < low - TOLERANCE) | (joints > high + TOLERANCE)
-    margin = (np.minimum(joints - low, high - joints) / (high - low)).min(axis=1)
+
+    def margins() -> np.ndarray:
+        left = np.minimum(joints - low, high - joints) / (high - low)
+        return np.asarray(left.min(axis=1))
 
     def describe(i: int) -> str:
         joint = int(np.argmax(beyond[i]))
@@ -79,7 +82,7 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
         limit = low[joint] if joints[i, joint] < low[joint] else high[joint]
         return f"{name} angle {compare(joints[i, joint], limit, 2, ' rad')}"
 
-    return Check("suspension", np.any(beyond, axis=1), margin, _no_wheel(margin), describe)
+    return Check("suspension", np.any(beyond, axis=1), margins, _no_wheel(joints), describe)
 
 
 def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
@@ -88,8 +91,13 @@ def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"tilt {compare(tilt[i], limit, 1, ' deg')}"
 
-    broken, margin = tilt > limit + TOLERANCE, _share_left(tilt, limit)
-    return Check("tilt", broken, margin, _no_wheel(margin), describe)
+    return Check(
+        "tilt",
+        tilt > limit + TOLERANCE,
+        lambda: _share_left(tilt, limit),
+        _no_wheel(tilt),
+        describe,
+    )
 
 
 def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
@@ -98,8 +106,13 @@ def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"tip-over ratio {compare(ratio[i], limit, 2)}"
 
-    broken, margin = ratio < limit - TOLERANCE, -_share_left(ratio, limit)
-    return Check("tip_over", broken, margin, _no_wheel(margin), describe)
+    return Check(
+        "tip_over",
+        ratio < limit - TOLERANCE,
+        lambda: -_share_left(ratio, limit),
+        _no_wheel(ratio),
+        describe,
+    )
 
 
 def _check_wheel_lift(prediction: PathPrediction) -> Check:
@@ -112,9 +125,12 @@ def _check_wheel_lift(prediction: PathPrediction) -> Check:
             f"under {prediction.policy} torques"
         )
 
-    margin = loads.min(axis=1) / np.maximum(loads.sum(axis=1) / 6.0, TOLERANCE)
-    lightest = np.argmin(loads, axis=1)
-    return Check("wheel_lift", np.any(loads < 0.0, axis=1), margin, lightest, describe)
+    def margins() -> np.ndarray:
+        share = loads.min(axis=1) / np.maximum(loads.sum(axis=1) / 6.0, TOLERANCE)
+        return np.asarray(share)
+
+    broken = np.any(loads < 0.0, axis=1)
+    return Check("wheel_lift", broken, margins, lambda: np.argmin(loads, axis=1), describe)
 
 
 def _check_sinkage(rover: Rover, prediction: PathPrediction) -> Check:
@@ -148,9 +164,13 @@ def _check_wheels(
         wheel = int(np.argmax(values[i]))
         return f"{WHEELS[wheel]} {words} {compare(values[i, wheel], limit, digits, unit)}"
 
-    margin = _share_left(np.max(values, axis=1), limit)
-    broken, worst = np.any(values > limit + TOLERANCE, axis=1), np.argmax(values, axis=1)
-    return Check(code, broken, margin, worst, describe)
+    return Check(
+        code,
+        np.any(values > limit + TOLERANCE, axis=1),
+        lambda: _share_left(np.max(values, axis=1), limit),
+        lambda: np.argmax(values, axis=1),
+        describe,
+    )
 
 
 def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
@@ -159,5 +179,10 @@ def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"belly clearance {compare(clearance[i], limit, 3, ' m')}"
 
-    broken, margin = clearance < limit - TOLERANCE, -_share_left(clearance, limit)
-    return Check("belly", broken, margin, _no_wheel(margin), describe)
+    return Check(
+        "belly",
+        clearance < limit - TOLERANCE,
+        lambda: -_share_left(clearance, limit),
+        _no_wheel(clearance),
+        describe,
+    )

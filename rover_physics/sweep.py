@@ -1,18 +1,18 @@
 """The quasi-static model along a path: poses in, `PathPrediction` out."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.crossing import find_crossings
+from rover_physics.crossing import Crossings, find_crossings
 from rover_physics.drops import find_falls
 from rover_physics.errors import PoseError
 from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, evaluate
-from rover_physics.model_setup import POLICIES, set_up
+from rover_physics.model_setup import POLICIES, Setup, set_up
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover, load_rover
 from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
@@ -26,8 +26,11 @@ __all__ = [
     "SETTLED",
     "UNKNOWN_GROUND",
     "sweep_path",
+    "sweep_paths",
     "warm_up",
 ]
+
+POLICY_NAMES = {number: name for name, number in POLICIES.items()}
 
 one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
 
@@ -69,7 +72,6 @@ def sweep_path(
         ModelError: an argument that makes no sense.
         SoilError: a soil of the terrain, or `soil`, that is not among the presets.
     """
-    poses = check_poses(poses)
     setup = set_up(
         rover,
         terrain,
@@ -83,21 +85,61 @@ def sweep_path(
         soil=soil,
         backward=backward,
     )
-    settings = setup.settings
+    return _sweep(rover, terrain, setup, [check_poses(poses)])[0]
 
+
+def sweep_paths(
+    rover: Rover, terrain: Terrain, paths: Sequence[ArrayLike], **arguments: Any
+) -> list[PathPrediction]:
+    """Predict the rover along several paths at once, which is faster than one after the other.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        paths: Poses of each path, as `sweep_path` takes them.
+        arguments: Further arguments of `sweep_path`.
+
+    Raises:
+        PoseError, ModelError, SoilError: As `sweep_path`.
+    """
+    setup = set_up(rover, terrain, **arguments)
+    return _sweep(rover, terrain, setup, [check_poses(poses) for poses in paths])
+
+
+def _sweep(
+    rover: Rover, terrain: Terrain, setup: Setup, paths: Sequence[np.ndarray]
+) -> list[PathPrediction]:
     def evaluate_at(at: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
         with one_sweep_at_a_time:
             return evaluate(*setup, at, held)
 
+    if not paths:
+        return []
+    ends = np.cumsum([len(poses) for poses in paths])
+    poses = np.concatenate(paths)
     results = evaluate_at(poses)
-    radius, direction = rover.wheel.radius, -1.0 if backward else 1.0
-    crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction)
-    falls = find_falls(radius, poses, results, crossings, direction)
+    joined = np.ones(len(poses) - 1, bool)
+    joined[ends[:-1] - 1] = False
+    radius, direction = rover.wheel.radius, float(setup.settings.direction)
+    crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
+    predictions = []
+    for first, end in zip([0, *ends[:-1]], ends, strict=True):
+        part = crossings.between(first, end)
+        predictions.append(
+            _predict(setup.settings, radius, poses[first:end], results[first:end], part)
+        )
+    return predictions
+
+
+def _predict(
+    settings: Any, radius: float, poses: np.ndarray, results: np.ndarray, crossings: Crossings
+) -> PathPrediction:
+    """Return what results and crossings of one path say of it."""
+    falls = find_falls(radius, poses, results, crossings, float(settings.direction))
     between = _collect(
         crossings.poses,
         crossings.results,
         settings,
-        policy,
         wheel_drop=np.zeros((len(crossings.poses), 6)),
         falling=falls.between,
         between=None,
@@ -107,7 +149,6 @@ def sweep_path(
         poses,
         results,
         settings,
-        policy,
         wheel_drop=falls.drops,
         falling=falls.at_waypoints,
         between=between,
@@ -135,30 +176,28 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     return array
 
 
-def _collect(poses: np.ndarray, results: Any, settings: Any, policy: str, **more):
-    settled = results.status == SETTLED
-    position = np.column_stack([poses[:, :2], results.q[:, 0]])
+def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any) -> PathPrediction:
+    same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
+    q, power = results["q"], np.nan_to_num(results["power"])
+    settled = results["status"] == SETTLED
+    position = np.column_stack([poses[:, :2], q[:, 0]])
     position[~settled] = np.nan
-    rocker = results.q[:, 3]
     steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     climbs = np.nan_to_num(np.diff(position[:, 2]))
     durations = np.hypot(steps, climbs) / settings.speed
-    power = np.nan_to_num(results.power)
     work = 0.5 * (power[1:] + power[:-1]) * durations
-    same = {name: results[name] for name in RESULT.names or () if name not in ("q", "status")}
     return PathPrediction(
         poses=poses,
-        status=results.status,
         settled=settled,
         position=position,
-        roll=results.q[:, 1],
-        pitch=results.q[:, 2],
-        rocker_angle=np.column_stack([rocker, -rocker]),
-        bogie_angle=results.q[:, 4:6],
+        roll=q[:, 1],
+        pitch=q[:, 2],
+        rocker_angle=q[:, 3:4] * (1.0, -1.0),
+        bogie_angle=q[:, 4:6],
         energy=_accumulate(work, settled),
         time=_accumulate(durations, settled),
         distance=np.concatenate([[0.0], np.cumsum(steps)]),
-        policy=policy,
+        policy=POLICY_NAMES[int(settings.policy)],
         **same,
         **more,
     )

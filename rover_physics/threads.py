@@ -10,11 +10,12 @@ ALONE = 2000
 
 
 @contextmanager
-def threads_worth(poses: int) -> Iterator[None]:
-    """Let kernels use as many threads as they may, or one if there are few `poses`."""
+def threads_worth(poses: int) -> Iterator[int]:
+    """Let kernels use as many threads as they may, or one if there are few `poses`; yield it."""
     allowed = numba.get_num_threads()
-    numba.set_num_threads(allowed if poses > ALONE else 1)
+    used = allowed if poses > ALONE else 1
+    numba.set_num_threads(used)
     try:
-        yield
+        yield used
     finally:
         numba.set_num_threads(allowed)

@@ -11,7 +11,7 @@ no return, and then a way on is looked for: straight ahead and in curves, from t
 just behind the point of no return.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +23,7 @@ from rover_physics.prediction import PathPrediction
 from rover_physics.reasons import TOLERANCE
 from rover_physics.rover import Rover
 from rover_physics.soil import use_of_shear
-from rover_physics.sweep import sweep_path
+from rover_physics.sweep import sweep_path, sweep_paths
 from rover_physics.terrain import Terrain
 from rover_physics.uncertainty import SIGMAS, bound_path, check_sigmas, judge_bounds
 
@@ -67,24 +67,30 @@ def judge_path(
         ModelError: an argument that makes no sense.
         SoilError: a soil that is not among the presets.
     """
+    return judge_paths(rover, terrain, [poses], sigmas=sigmas, **arguments)[0]
+
+
+def judge_paths(
+    rover: Rover,
+    terrain: Terrain,
+    paths: Sequence[ArrayLike],
+    *,
+    sigmas: float | None = SIGMAS,
+    **arguments: Any,
+) -> list[tuple[PathPrediction, Verdict]]:
+    """Judge several paths at once, which is faster than one after the other; see `judge_path`."""
     check_sigmas(sigmas)
-    prediction, verdict = _judge_as_mapped(rover, terrain, poses, arguments)
-    bounds = bound_path(rover, terrain, prediction, sigmas, **arguments)
-    if bounds is None:
-        return prediction, verdict
-    verdict = judge_bounds(rover, prediction, bounds, verdict)
-    return replace(prediction, bounds=bounds), verdict
-
-
-def _judge_as_mapped(
-    rover: Rover, terrain: Terrain, poses: ArrayLike, arguments: dict[str, Any]
-) -> tuple[PathPrediction, Verdict]:
-    """Predict and judge a path on the heights of the map as they are."""
-    prediction = sweep_path(rover, terrain, poses, **arguments)
-    verdict = judge(rover, prediction)
-    if verdict.code == "wheel_drop":
-        return prediction, verdict
-    return prediction, _ask_for_ways_out(rover, terrain, prediction, verdict, arguments)
+    judged = []
+    for prediction in sweep_paths(rover, terrain, paths, **arguments):
+        verdict = judge(rover, prediction)
+        if verdict.code != "wheel_drop":
+            verdict = _ask_for_ways_out(rover, terrain, prediction, verdict, arguments)
+        bounds = bound_path(rover, terrain, prediction, sigmas, **arguments)
+        if bounds is not None:
+            verdict = judge_bounds(rover, prediction, bounds, verdict)
+            prediction = replace(prediction, bounds=bounds)
+        judged.append((prediction, verdict))
+    return judged
 
 
 def _ask_for_ways_out(

@@ -1,6 +1,6 @@
 """The question a mission planner asks: which path from here to there can the rover drive."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from rover_physics.limits import Verdict
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover
 from rover_physics.terrain import Terrain
-from rover_physics.trap import judge_path
+from rover_physics.trap import judge_paths
 from rover_physics.uncertainty import SIGMAS
 from rover_planner.candidates import generate_candidates, path_length
 
@@ -126,7 +126,6 @@ def answer_path_query(
     goal,
     options: PathQueryOptions | None = None,
     joint_angles: Mapping[str, float] | None = None,
-    on_progress: Callable[[int, int], None] | None = None,
 ) -> PathAnswer:
     """Sweep the candidate paths from start to goal and choose the best traversable one.
 
@@ -137,7 +136,6 @@ def answer_path_query(
         goal: The same.
         options: How candidates are made and judged.
         joint_angles: Measured angles [rad] of the manipulator's joints by name.
-        on_progress: Called with the number of candidates judged and their total.
 
     Raises:
         PlanningError: start, goal or options make no candidate paths.
@@ -152,12 +150,7 @@ def answer_path_query(
         waypoint_spacing=options.waypoint_spacing,
         min_radius=smallest_radius(rover),
     )
-    candidates = []
-    for k, poses in enumerate(paths):
-        candidates.append(check_path(rover, terrain, poses, options, joint_angles))
-        if on_progress is not None:
-            on_progress(k + 1, len(paths))
-    return choose(tuple(candidates))
+    return choose(tuple(_check_paths(rover, terrain, paths, options, joint_angles)))
 
 
 def check_path(
@@ -172,17 +165,29 @@ def check_path(
     Raises:
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
-    options = options or PathQueryOptions()
-    prediction, verdict = judge_path(
+    return _check_paths(rover, terrain, [poses], options or PathQueryOptions(), joint_angles)[0]
+
+
+def _check_paths(
+    rover: Rover,
+    terrain: Terrain,
+    paths: Sequence[NDArray[np.float64]],
+    options: PathQueryOptions,
+    joint_angles: Mapping[str, float] | None,
+) -> list[Candidate]:
+    judged = judge_paths(
         rover,
         terrain,
-        poses,
+        paths,
         policy=options.policy,
         joint_angles=joint_angles,
         sigmas=options.map_sigmas,
         **options.ground_and_load(),
     )
-    return Candidate(prediction.poses, prediction, verdict, path_cost(rover, prediction, verdict))
+    return [
+        Candidate(prediction.poses, prediction, verdict, path_cost(rover, prediction, verdict))
+        for prediction, verdict in judged
+    ]
 
 
 def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:

@@ -10,6 +10,7 @@ from rover_geometry import attitude_of
 from rover_physics.rover import load_rover
 from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain
+from rover_physics.trap import judge_path
 
 LSR1 = load_rover("lsr1")
 RESOLUTION = 0.02
@@ -82,3 +83,20 @@ def test_it_is_what_a_look_at_every_cell_gives(seed):
         below = (np.abs(place[..., 0]) <= 0.30) & (np.abs(place[..., 1]) <= 0.20)
         heights = (origin[2] + belly_z - ground.elevation)[below]
         assert prediction.belly_clearance[i] == pytest.approx(heights.min(), abs=1e-9)
+
+
+def test_between_cells_larger_than_the_belly_the_ground_there_counts():
+    coarse = Terrain(np.zeros((9, 9)), 1.0, (-3.5, -3.5))
+    assert clearance(coarse) == pytest.approx(0.24, abs=1e-6)
+    rise = 0.05 * (-3.5 + np.arange(9.0))
+    slope = Terrain(np.tile(rise, (9, 1)), 1.0, (-3.5, -3.5))
+    assert clearance(slope) == pytest.approx(0.24 / np.cos(np.arctan(0.05)), abs=1e-4)
+
+
+def test_it_stays_within_its_bounds_between_cells_larger_than_the_belly():
+    ground = Terrain(np.zeros((9, 9)), 1.0, (-3.5, -3.5), elevation_std=np.full((9, 9), 0.001))
+    prediction, verdict = judge_path(LSR1, ground, [[0.0, 0.0, 0.3]])
+    low, high = prediction.bounds.belly_clearance[0]
+    assert low < prediction.belly_clearance[0] < high
+    assert low == pytest.approx(0.24, abs=0.02) and high == pytest.approx(0.24, abs=0.02)
+    assert verdict.traversable

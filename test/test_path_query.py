@@ -90,19 +90,6 @@ def test_the_goal_at_the_start_is_a_single_pose_that_is_judged(rover):
     assert outside.chosen.reach == 0.0
 
 
-def test_progress_is_told_after_every_candidate(rover):
-    told = []
-    answer_path_query(
-        rover,
-        flat(),
-        (-2, 0, 0),
-        (2, 0, 0),
-        COARSE,
-        on_progress=lambda done, total: told.append((done, total)),
-    )
-    assert told == [(k, 5) for k in range(1, 6)]
-
-
 def test_options_reach_the_model(rover):
     slope = with_heights(flat(), lambda x, y: 0.2 * x + 0 * y)
     grippy = dataclasses.replace(COARSE, friction=1.0, max_torque=100.0)

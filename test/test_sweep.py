@@ -11,7 +11,7 @@ from rough_grounds import fractal, plane, random_poses, rocky
 
 from rover_physics.errors import ModelError, PoseError, RoverError
 from rover_physics.rover import load_rover
-from rover_physics.sweep import OFF_MAP, SETTLED, sweep_path
+from rover_physics.sweep import OFF_MAP, SETTLED, sweep_path, sweep_paths
 
 LSR1 = load_rover("lsr1")
 LEVEL = plane(0.0, 0.0)
@@ -150,6 +150,24 @@ def test_any_choice_of_poses_gives_identical_rows(seed, count):
     assert_identical(chosen, everything, rows)
     assert (everything.status == SETTLED).any()
     assert (everything.status == OFF_MAP).any()
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_paths_swept_together_are_as_swept_one_by_one(policy):
+    ground = rocky(3)
+    paths = [random_poses(1, 1, 1.0), line(-1.0, 1.0, 101), line(1.0, -1.0, 60), line(9.0, 9.1, 4)]
+    together = sweep_paths(LSR1, ground, paths, policy=policy)
+    assert sum(len(prediction.between.poses) for prediction in together) > 20
+    for poses, prediction in zip(paths, together, strict=True):
+        alone = sweep_path(LSR1, ground, poses, policy=policy)
+        for part, expected in ((prediction, alone), (prediction.between, alone.between)):
+            assert_identical(part, expected)
+            for name in sorted(ALONG_THE_PATH - {"between", "bounds"}):
+                assert getattr(part, name).tobytes() == getattr(expected, name).tobytes(), name
+
+
+def test_no_path_gives_no_prediction():
+    assert sweep_paths(LSR1, LEVEL, []) == []
 
 
 def test_two_callers_at_once_get_what_each_gets_alone():
