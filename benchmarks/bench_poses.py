@@ -3,17 +3,25 @@
 import numba
 import numpy as np
 from grounds import all_grounds, random_poses, reference_ground
-from measure import Figure, median_time
+from measure import Figure, median_time, median_times
 
 from rover_physics.evaluation import WORK, evaluate, new_results, new_work
 from rover_physics.ground import find_roof, height_inside, heights_of
 from rover_physics.linkage import place
 from rover_physics.model_setup import Setup, set_up
 from rover_physics.rover import load_rover
-from rover_physics.settling import SETTLED, settle
+from rover_physics.settling import SETTLED, settle, settle_from
+from rover_physics.terrain import Terrain
 
 POSES = 4_000
 FLOOR_POSES = 400
+LINES = 20
+SPACING = 0.02
+"""Way between poses of a line [m]."""
+MARGIN = 0.9
+"""Way from the edge of the ground to where lines begin and end [m]."""
+OTHER_POSE = 1e-3
+"""Difference of height [m] or angles [rad] from which on a pose is another one."""
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
@@ -28,6 +36,25 @@ def settle_all(grid, linkages, samplings, poses, works, results):
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
+def settle_along(grid, linkages, samplings, poses, works, results):
+    """Settle the rover at poses (n, 3) of a path, each from the one before it."""
+    work = works[0]
+    for i in range(len(poses)):
+        q = results[i].q
+        if i > 0 and results[i - 1].status == SETTLED:
+            q[:] = results[i - 1].q
+            results[i].status = settle_from(
+                grid, linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
+                q, work.placement, work.touch, work.J, work.step,
+            )  # fmt: skip
+        else:
+            results[i].status = settle(
+                grid, linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
+                q, work.placement, work.touch, work.J, work.step,
+            )  # fmt: skip
+
+
+@numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 def look_up_all(elevation, cells):
     """Look up the heights at `cells` (n, 2) and return the highest."""
     highest = -np.inf
@@ -36,11 +63,12 @@ def look_up_all(elevation, cells):
     return highest
 
 
-def run_settling(setup: Setup, poses: np.ndarray) -> None:
-    """Settle at all poses."""
+def run_settling(setup: Setup, poses: np.ndarray, kernel=settle_all) -> np.ndarray:
+    """Settle at all poses and return the results."""
     records = [np.array([record]) for record in (setup.linkage, setup.samples)]
     works, results = np.full(1, new_work(), WORK), new_results(len(poses))
-    settle_all(heights_of(setup.ground), *records, poses, works, results)
+    kernel(heights_of(setup.ground), *records, poses, works, results)
+    return results
 
 
 def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
@@ -97,7 +125,40 @@ def measure() -> list[Figure]:
                 100.0,
             ),
         ]
-    return figures + measure_floor(rover)
+    return figures + measure_warm_start(rover) + measure_floor(rover)
+
+
+def measure_warm_start(rover) -> list[Figure]:
+    """Measure settling from rest against settling from the neighbour, on lines of poses."""
+    figures = []
+    for name in ("flat", "rocks", "fractal"):
+        ground = reference_ground(name)
+        setup, lines = set_up(rover, ground), lines_of_poses(ground)
+
+        def settle_with(kernel, setup=setup, lines=lines) -> np.ndarray:
+            return np.concatenate([run_settling(setup, poses, kernel) for poses in lines])
+
+        cold, warm = median_times(
+            [lambda: settle_with(settle_all), lambda: settle_with(settle_along)]
+        )
+        rest, neighbour = settle_with(settle_all), settle_with(settle_along)
+        both = (rest["status"] == SETTLED) & (neighbour["status"] == SETTLED)
+        moved = np.abs(rest["q"] - neighbour["q"]).max(axis=1)[both] > OTHER_POSE
+        figures += [
+            Figure("warm", f"{name}: from the neighbour", warm / cold, "x", against="from rest"),
+            Figure("warm", f"{name}: another pose", 1e3 * moved.mean(), "in 1000", repeats=1),
+        ]
+    return figures
+
+
+def lines_of_poses(ground: Terrain) -> list[np.ndarray]:
+    """Return straight paths across a ground, a pose each SPACING."""
+    low, high = ground.bounds[0] + MARGIN, ground.bounds[1] - MARGIN
+    x = np.arange(low, high, SPACING)
+    return [
+        np.column_stack([x, np.full(len(x), y), np.zeros(len(x))])
+        for y in np.linspace(ground.bounds[2] + MARGIN, ground.bounds[3] - MARGIN, LINES)
+    ]
 
 
 def measure_floor(rover) -> list[Figure]:

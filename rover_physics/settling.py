@@ -45,6 +45,15 @@ def settle(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     if np.isnan(worst):
         return status
     _descend(linkage, placement, touch, q, 1.0, J, step)
+    return settle_from(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+
+
+@kernel
+def settle_from(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+    """Settle the rover as `settle` does, but from the q that is given, such as a neighbour's.
+
+    Faster than from rest, but over edges it depends on q which of several poses is found.
+    """
     place(linkage, x, y, yaw, q, placement)
     status, worst = _touch_all(grid, samples, placement, QUICK, touch)
     if status != TOUCHING:
