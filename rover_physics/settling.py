@@ -30,6 +30,8 @@ RELAXED = 0.003
 RELAXED_FURTHER = 0.25
 """The same after each attempt that failed: wedged between tread and face, gaps are small."""
 RELAXATION = 0.3
+TURNED_OVER = 1.45
+"""Roll or pitch [rad] beyond which the search is given up: the rover stands on end or on a side."""
 
 
 @kernel
@@ -75,9 +77,11 @@ def settle_from(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
             _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
         _newton(grid, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
         status, worst = _touch_all(grid, samples, placement, EXACT, touch)
+        if _has_turned_over(q):
+            return NOT_SETTLED
     if status != TOUCHING:
         return status
-    if not worst <= GAP_TOLERANCE:
+    if not worst <= GAP_TOLERANCE or _has_turned_over(q):
         return NOT_SETTLED
     for wheel in range(6):
         find_contact(samples, placement, wheel, touch)
@@ -141,9 +145,14 @@ def _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touc
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
         status, worst = _touch_all(grid, samples, placement, scope, touch)
-        if not worst > relaxed:
+        if not worst > relaxed or _has_turned_over(q):
             break
     _touch_all(grid, samples, placement, EXACT, touch)
+
+
+@kernel
+def _has_turned_over(q):
+    return abs(q[1]) > TURNED_OVER or abs(q[2]) > TURNED_OVER
 
 
 @kernel

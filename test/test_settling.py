@@ -250,6 +250,14 @@ def test_a_wall_across_the_rover_is_never_settled_by_a_guess():
     assert (prediction.status == NOT_SETTLED).any()
 
 
+def test_a_rover_never_settles_turned_over():
+    ground = fractal(3, roughness=0.5)
+    prediction = sweep_path(LSR1, ground, random_poses(3, 600, 1.9))
+    assert (prediction.status == NOT_SETTLED).any()
+    turned = np.maximum(np.abs(prediction.roll), np.abs(prediction.pitch))
+    assert np.nanmax(turned) < 0.5 * np.pi
+
+
 def test_poses_that_do_not_settle_have_nan_for_every_number():
     prediction = sweep_path(LSR1, plane(0.0, 0.0), [[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
     for name in (
