@@ -10,7 +10,7 @@ from rover_physics.plain import to_plain
 from rover_physics.prediction import PathPrediction
 from rover_physics.reasons import check_limits, tilt_of
 from rover_physics.rover import Rover
-from rover_physics.settling import NOT_SETTLED, OFF_MAP, UNKNOWN_GROUND
+from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
 
 CODES = (
     "off_map",
@@ -145,9 +145,8 @@ def find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], l
     """Return code and reason of each row of a prediction, empty where passable."""
     n = len(prediction.poses)
     codes, reasons = [""] * n, [""] * n
-    for i, status in enumerate(prediction.status.tolist()):
-        if status in _PLACELESS:
-            codes[i], reasons[i] = _PLACELESS[status]
+    for i in np.flatnonzero(prediction.status != SETTLED).tolist():
+        codes[i], reasons[i] = _PLACELESS[int(prediction.status[i])]
     falls = np.asarray(prediction.falling.any(axis=1))
     for check in check_limits(rover, prediction):
         broken = check.broken
