@@ -77,7 +77,8 @@ class StudyResult:
             writer.writerow(heads)
             for trial in self.trials:
                 shares = [f"{share:.6f}" for share in trial.load_shares]
-                writer.writerow([*trial.values, trial.objective, *shares, trial.note])
+                numbers = [f"{number:.9g}" for number in (*trial.values, trial.objective)]
+                writer.writerow([*numbers, *shares, trial.note])
 
 
 def _head(name: str, unit: str) -> str:
