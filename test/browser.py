@@ -49,7 +49,8 @@ class Visitor:
     """A person before the page: sees texts and pixels, presses, drags and clicks."""
 
     def __init__(self, browser: Any, url: str):
-        self.tab = browser.new_page(viewport=LAPTOP)
+        # Few pixels: without a graphics card each one costs time.
+        self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=0.4)
         self.faults: list[str] = []
         self.tab.on("pageerror", lambda error: self.faults.append(str(error)))
         self.tab.set_default_timeout(1000.0 * WAIT)

@@ -44,7 +44,7 @@ class Charts:
 
     def __init__(self, gui: Any):
         """Add empty plots to the container that is open."""
-        self._plots = {name: _add_plot(gui, chart) for name, chart in CHARTS.items()}
+        self.plots = {name: _add_plot(gui, chart) for name, chart in CHARTS.items()}
         gui.add_html(_legend())
         self.curves: dict[str, tuple[Floats, Floats]] = {}
         """Distances and values of the curves that are shown, by the names of CHARTS."""
@@ -74,7 +74,7 @@ class Charts:
     def show(self, distance: float) -> None:
         """Move the cursor to a distance [m]."""
         for name, (x, values) in self.curves.items():
-            self._plots[name].data = with_cursor(x, values, distance, self._limits.get(name))
+            self.plots[name].data = with_cursor(x, values, distance, self._limits.get(name))
 
 
 def _add_plot(gui: Any, chart: Chart) -> Any:

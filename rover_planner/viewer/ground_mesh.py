@@ -1,5 +1,7 @@
 """The terrain as a mesh with a picture of a layer on it, and where a click on it is."""
 
+import json
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +23,10 @@ MOST_SCORED = 100
 """The same for places where the model is asked."""
 MOST_PIXELS = 1200
 """Pixels along a side of the picture."""
+LIGHT = (-0.6, 0.5, 1.0)
+"""Where light comes from on the picture."""
+RELIEF = 1.3
+"""How strong light and shadow are; 1 is that of a matt surface."""
 LINE_SHADE = 0.82
 """How dark the lines are that are drawn every metre."""
 
@@ -70,7 +76,8 @@ def draw_ground(
         values = slope_of(x, y, heights) if layer_name == SLOPE else heights
         low, high = span_of(layer, rover, values)
         colours = ramp(values, low, high)
-    return Ground(_mesh(x, y, heights, _picture(colours, x, y)), low, high, layer.unit)
+    shaded = _shade(colours, x, y, heights)
+    return Ground(_mesh(x, y, heights, _picture(shaded, x, y)), low, high, layer.unit)
 
 
 def _thin_out(terrain: Terrain, most: int) -> tuple[Floats, Floats, Floats]:
@@ -92,6 +99,19 @@ def _stretch(
         for at, was in zip(wanted, given, strict=True)
     )
     return colours[rows][:, columns]
+
+
+def _shade(colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats) -> NDArray[np.uint8]:
+    """Return colours as if lit from LIGHT: drawn into the picture, it costs the page nothing."""
+    if min(heights.shape) < 2:
+        return colours
+    along_y, along_x = np.gradient(np.nan_to_num(heights), y, x)
+    normal = np.stack([-along_x, -along_y, np.ones_like(along_x)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    light = np.array(LIGHT) / np.linalg.norm(LIGHT)
+    lit = np.clip(normal @ light, 0.0, None) / light[2]
+    factor = np.clip(1.0 + RELIEF * (lit - 1.0), 0.3, 1.25)
+    return np.clip(colours * factor[..., None], 0, 255).astype(np.uint8)
 
 
 def _picture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
@@ -121,6 +141,24 @@ def _mesh(x: Floats, y: Floats, heights: Floats, picture: NDArray[np.uint8]) -> 
         uv=np.column_stack([u.ravel(), v.ravel()]), material=material
     )
     return trimesh.Trimesh(vertices, _faces(np.isfinite(heights)), visual=visual, process=False)
+
+
+def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
+    """Return a mesh as a binary glTF file whose picture is shown as it is, without lights.
+
+    A matt surface over the whole screen takes most of the time of a page that is drawn without a
+    graphics card. glTF has the extension KHR_materials_unlit for it, which trimesh does not write.
+    """
+    glb: Any = mesh.export(file_type="glb")
+    length = struct.unpack_from("<I", glb, 12)[0]
+    content = json.loads(glb[20 : 20 + length])
+    for material in content["materials"]:
+        material["extensions"] = {"KHR_materials_unlit": {}}
+    content["extensionsUsed"] = ["KHR_materials_unlit"]
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    chunk = struct.pack("<I4s", len(text), b"JSON") + text + glb[20 + length :]
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
 
 
 def _faces(known: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -73,7 +73,7 @@ class PathOverlay:
         end = verdict.first_failure
         beyond = mix(REFUSED, (255, 255, 255), FADED)
         self._draw_line(name, terrain, places[: end + 1], REFUSED, lift, wide)
-        self._draw_line(f"{name}/beyond", terrain, places[end:], beyond, lift, wide)
+        self._draw_line(f"{name}-beyond", terrain, places[end:], beyond, lift, wide)
 
     def _draw_line(
         self, name: str, terrain: Terrain, places: Floats, colour: Colour, lift: float, wide: bool

@@ -8,7 +8,7 @@ import numpy as np
 from rover_physics.rover import Rover
 from rover_physics.terrain import Terrain
 from rover_planner.viewer.force_arrows import ForceArrows
-from rover_planner.viewer.ground_mesh import Ground
+from rover_planner.viewer.ground_mesh import Ground, as_unlit_glb
 from rover_planner.viewer.journey import Frame
 from rover_planner.viewer.overlays import PathOverlay
 from rover_planner.viewer.rover_figure import RoverFigure
@@ -32,9 +32,8 @@ class Scene:
 
     def draw_ground(self, ground: Ground) -> None:
         """Show another ground, or the same in other colours."""
-        self._scene.add_mesh_trimesh(
-            "/ground", ground.mesh, cast_shadow=False, receive_shadow=False
-        )
+        glb = as_unlit_glb(ground.mesh)
+        self._scene.add_glb("/ground", glb, cast_shadow=False, receive_shadow=False)
 
     def hide_ground(self) -> None:
         """Take the ground away."""
