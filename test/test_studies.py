@@ -146,6 +146,7 @@ def test_two_parameters_are_tried_in_all_combinations():
         ({"parameters": [PIVOT_X | {"steps": 3}]}, "steps"),
         ({"parameters": [PIVOT_X, PIVOT_X]}, "no other parameter varies"),
         ({"parameters": [PIVOT_X | {"also": ["wheel.mass"]}]}, "names of numbers in m"),
+        ({"parameters": [PIVOT_X | {"count": 2.5}]}, "count is 2.5; it must be a whole number"),
         ({"soil": "dry_sand"}, "left out"),
         ({"colour": "red"}, "a study file has"),
         ({"method": "guess"}, "method is 'guess'"),

@@ -136,12 +136,20 @@ def study_from_dict(data: object, source: str, folder: Path = Path()) -> Study:
         policy=top.choice("policy", POLICIES) if top.has("policy") else "equal",
         friction=top.number("friction", "", above=0.0) if top.has("friction") else None,
         soil=soil_named(top.text("soil")).name if top.has("soil") else None,
-        evaluations=(
-            int(top.number("evaluations", "", least=3, most=1e5)) if top.has("evaluations") else 60
-        ),
+        evaluations=_whole(top, "evaluations", 3, 100_000, 60),
         parameters=tuple(_read_parameters(top, rover, source)),
         drives=drives,
     )
+
+
+def _whole(section: ConfigSection, name: str, least: int, most: int, default: int) -> int:
+    """Return a whole number, the default where the key is not there."""
+    if not section.has(name):
+        return default
+    value = section.number(name, "", least=least, most=most)
+    if not value.is_integer():
+        raise section.error(name, f"a whole number from {least} to {most}")
+    return int(value)
 
 
 def _read_parameters(top: ConfigSection, rover: Rover, source: str):
@@ -153,9 +161,7 @@ def _read_parameters(top: ConfigSection, rover: Rover, source: str):
         low, high = section.number("from", unit), section.number("to", unit)
         if not low < high:
             raise section.error("to", f"above from, {low:g}")
-        count = (
-            int(section.number("count", "", least=2, most=1000)) if section.has("count") else 11
-        )
+        count = _whole(section, "count", 2, 1000, 11)
         also = tuple(_read_also(section, contents, source, unit))
         if taken & {key, *also}:
             raise section.error("name", "a number that no other parameter varies")
