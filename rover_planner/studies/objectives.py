@@ -104,7 +104,7 @@ def _ground(rover: Rover, drive: StudyDrive) -> Terrain:
     x = np.broadcast_to(axis, (len(axis), len(axis)))
     if drive.kind == "slope":
         return Terrain(np.tan(drive.size) * x, cell, (axis[0], axis[0]))
-    return _step(rover, drive.size)
+    return step_ground(rover, drive.size)
 
 
 @lru_cache(maxsize=16)
@@ -118,10 +118,10 @@ def _length(rover: Rover) -> float:
 
 
 def _flat(rover: Rover) -> Terrain:
-    return _step(rover, 0.0)
+    return step_ground(rover, 0.0)
 
 
-def _step(rover: Rover, height: float) -> Terrain:
+def step_ground(rover: Rover, height: float) -> Terrain:
     """Return level ground that rises by a step across x = 0."""
     cell = 0.1 * rover.wheel.radius
     half = 2.0 * _length(rover)
@@ -165,5 +165,7 @@ def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | 
     reach = 0.75 * _length(rover)
     x = np.linspace(-reach, reach, round(2.0 * reach / SPACING) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
-    prediction = sweep_path(able, _step(rover, height), poses, policy=policy, friction=friction)
+    prediction = sweep_path(
+        able, step_ground(rover, height), poses, policy=policy, friction=friction
+    )
     return judge(able, prediction).reason
