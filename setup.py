@@ -10,6 +10,7 @@ PACKAGES = [
     "rover_physics",
     "msg_adapters",
     "rover_planner",
+    "rover_planner.parameters",
     "rover_planner.simulator",
     "rover_planner.studies",
     "rover_planner.viewer",

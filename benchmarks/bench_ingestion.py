@@ -10,7 +10,7 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics.terrain import Terrain
 from rover_planner.mars_terrain import make_mars_terrain
-from rover_planner.parameters import TRAVERSE_SERVER
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
 from rover_planner.traverse_service import TraverseService, settings_from_parameters
 
 CELLS = 1_000

@@ -13,7 +13,7 @@ from planner_process import SERVER, Planner, planner_and_processes
 
 from rover_physics.terrain import Terrain
 from rover_planner.mars_terrain import make_mars_terrain
-from rover_planner.parameters import TRAVERSE_SERVER
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
 from rover_planner.traverse_service import TraverseService, settings_from_parameters
 
 ECHO = "/echo/can_traverse"

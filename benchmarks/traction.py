@@ -21,7 +21,7 @@ from rich.table import Table
 from rover_physics.rover import Rover, load_rover
 from rover_physics.terrain import Terrain
 from rover_planner.mujoco_plant import RoverPlant
-from rover_planner.parameters import TRACTION_CONTROLLER
+from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
 from rover_planner.traction_service import TractionService, settings_from_parameters
 
 TESTS = Path(__file__).resolve().parents[1] / "test"

@@ -18,6 +18,7 @@ class ConfigSection:
         path: Dotted key of the section, empty for the whole file.
         required: Keys that must be there.
         optional: Keys that may be there.
+        kind: What the whole file is, for error texts.
 
     Raises:
         RoverFileError: Not a mapping, or a key is unknown or missing.
@@ -30,9 +31,11 @@ class ConfigSection:
         path: str,
         required: Sequence[str],
         optional: Sequence[str] = (),
+        kind: str = "a rover file",
     ) -> None:
         self._source = source
         self._path = path
+        self._kind = kind
         if not isinstance(data, Mapping):
             where = path or "the file"
             keys = ", ".join(required)
@@ -138,6 +141,13 @@ class ConfigSection:
             raise self.error(name, must)
         return tuple(items)
 
+    def names(self, name: str) -> tuple[str, ...]:
+        """Return a list of one text or more, all different, none of them empty."""
+        items = self._data[name]
+        if not isinstance(items, list) or not items:
+            raise self.error(name, "a list of one name or more")
+        return self.texts(name, len(items))
+
     def choice(self, name: str, choices: Sequence[str]) -> str:
         """Return a text that is one of the choices."""
         value = self._data[name]
@@ -172,7 +182,7 @@ class ConfigSection:
 
     def _check_keys(self, required: Sequence[str], optional: Sequence[str]) -> None:
         known = (*required, *optional)
-        place = self._path or "a rover file"
+        place = self._path or self._kind
         for key in self._data:
             if key in known:
                 continue

@@ -26,8 +26,9 @@ PIECES = 4
 """Pieces into which a stretch with a jump is divided, again and again."""
 SHORTEST = 1e-4
 """Distance between poses [m] below which a jump counts as one place."""
-CLIMB_STAGES = np.linspace(0.0, 1.0, 6)[1:]
-"""Shares of the height of a face at which a climbing wheel is evaluated."""
+CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
+"""Shares of the height of a face at which a climbing wheel is evaluated; at its foot only where
+the wheel has the edge of the face there, for no later contact is as steep."""
 
 Evaluate = Callable[[np.ndarray, np.ndarray], Any]
 
@@ -210,8 +211,9 @@ def _climb(
             centre = before[i, wheel]
             face, edge = _face_ahead(terrain, radius, centre, course)
             for k, height in enumerate(centre[2] + CLIMB_STAGES * rise[i, wheel]):
-                angle = direction * _angle_on_face(radius, height, face, edge)
-                held[row, k, wheel] = height, angle
+                if k > 0 or height > edge:
+                    angle = direction * _angle_on_face(radius, height, face, edge)
+                    held[row, k, wheel] = height, angle
     poses = np.repeat(places.poses[at, 0], stages, axis=0)
     results = evaluate(poses, held.reshape(-1, 6, 2))
     start, end = places.place[at, :1], places.place[at, 1:]

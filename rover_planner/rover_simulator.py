@@ -28,7 +28,8 @@ from msg_adapters.errors import MessageError
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
-from rover_planner.parameters import ROVER_SIMULATOR, declare_parameters
+from rover_planner.parameters.declare import declare_parameters
+from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
 from rover_planner.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.refusals import BAD_INPUT
 from rover_planner.simulator.plant import PlantState

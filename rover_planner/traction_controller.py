@@ -29,7 +29,8 @@ from msg_adapters.joints import joint_positions, joint_velocities
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.traction_status import traction_diagnostics
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.parameters import TRACTION_CONTROLLER, check_changes, declare_parameters
+from rover_planner.parameters.declare import check_changes, declare_parameters
+from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
 from rover_planner.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.refusals import BAD_INPUT
 from rover_planner.traction_service import (

@@ -33,7 +33,8 @@ from rover_physics.sweep import warm_up
 from rover_physics.terrain import Terrain, load_terrain
 from rover_planner.afterwards import Afterwards
 from rover_planner.judgement import Judgement, refusal
-from rover_planner.parameters import TRAVERSE_SERVER, check_changes, declare_parameters
+from rover_planner.parameters.declare import check_changes, declare_parameters
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
 from rover_planner.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.reach_topics import ReachTopics
 from rover_planner.refusals import BAD_INPUT, answer_or_refuse

@@ -10,6 +10,7 @@ import typer
 from rover_planner.errors import PlanningError
 
 if TYPE_CHECKING:
+    from rover_physics.rover import Rover
     from rover_physics.terrain import Terrain
     from rover_planner.viewer.page_base import PageBase
     from rover_planner.viewer.session import ViewSession
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 TERRAIN_SIZE = 12.0
 """Width of the terrain that is made where none is given [m]."""
 SEED = 7
+LONGEST_DEMO = 10.0
+"""Largest distance of the ends that are chosen where none are told [m]."""
+PLACES_TRIED = 41
+"""Places along each side of the map that are tried for an end."""
 Pose = tuple[float, float, float]
 
 
@@ -65,7 +70,7 @@ def view(
     model = load_rover(rover)
     ground = _load_or_make(terrain, follow)
     _compile()
-    low, high = choose_ends(ground)
+    low, high = choose_ends(model, ground)
     session = ViewSession(model, ground, start or low, goal or high)
     with contextlib.ExitStack() as closing:
         if follow:
@@ -131,9 +136,30 @@ def _load_or_make(path: Path | None, follow: bool) -> "Terrain":
     return make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)
 
 
-def choose_ends(ground: "Terrain") -> tuple[Pose, Pose]:
-    """Return two places on the middle line of a map, a quarter and three quarters along it."""
-    ny, nx = ground.elevation.shape
-    y = ground.origin[1] + ground.resolution * ny * 0.5
-    first, last = (ground.origin[0] + ground.resolution * nx * share for share in (0.25, 0.75))
-    return (first, y, 0.0), (last, y, 0.0)
+def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
+    """Return two places where the rover can stand, on both sides of the middle of a map.
+
+    Each is the nearest to a quarter and three quarters of the way along x, at most LONGEST_DEMO
+    apart; where the rover can stand nowhere they are just there, and the page says why not.
+    """
+    import numpy as np
+
+    from rover_physics.map_sweep import score_poses
+
+    x_low, x_high, y_low, y_high = ground.bounds
+    middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high)])
+    half = 0.5 * min(0.5 * (x_high - x_low), LONGEST_DEMO)
+    x, y = np.meshgrid(
+        np.linspace(x_low, x_high, PLACES_TRIED), np.linspace(y_low, y_high, PLACES_TRIED)
+    )
+    wanted = middle + np.array([[-half, 0.0], [half, 0.0]])
+    places = np.vstack([wanted, np.column_stack([x.ravel(), y.ravel()])])
+    poses = np.column_stack([places, np.zeros(len(places))])
+    stands = score_poses(rover, ground, poses).within_limits(rover)
+    ends: list[Pose] = []
+    for aim, side in zip(wanted, (-1.0, 1.0), strict=True):
+        fit = stands & (side * (places[:, 0] - middle[0]) > 0.0)
+        away = np.where(fit, np.linalg.norm(places - aim, axis=1), np.inf)
+        best = places[np.argmin(away)] if fit.any() else aim
+        ends.append((float(best[0]), float(best[1]), 0.0))
+    return ends[0], ends[1]

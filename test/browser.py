@@ -72,9 +72,15 @@ class Visitor:
         return named.locator("xpath=ancestor::*[.//input][1]")
 
     def set_slider(self, label: str, value: str) -> None:
-        """Type a value into the box beside a slider."""
+        """Type a value into the box beside a slider, key by key.
+
+        Not `fill`, which puts a text there without a key: the box then takes it for a change at
+        the place where the last key was pressed, and may throw it away.
+        """
         box = self._row(label).locator("input").last
-        box.fill(value)
+        box.click()
+        box.press("Control+a")
+        box.press_sequentially(value)
         box.press("Enter")
 
     def slider_value(self, label: str) -> float:

@@ -226,6 +226,20 @@ def test_on_a_face_the_needed_friction_does_not_depend_on_the_spacing():
 # The foot of a step
 
 
+def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_waypoints_are():
+    height = 0.8 * RADIUS
+    needed = []
+    for shift in (0.0, 0.0034, 0.0068, 0.0071, 0.0142):
+        poses = drive_path(0.02) + np.array([shift, 0.0, 0.0])
+        prediction = sweep_path(FREE, sharp("step", height), poses, policy="optimal", friction=0.5)
+        between = prediction.between
+        front = (between.poses[:, 0] < -0.3) & (between.contact_angle[:, 2] > 0.0)
+        needed.append(between.friction_utilisation[front].max())
+        leaving = np.arccos(1.0 - height / RADIUS)
+        assert between.contact_angle[front].max() == pytest.approx(leaving, abs=0.01)
+    assert max(needed) < 1.01 * min(needed)
+
+
 @pytest.mark.parametrize("height", [0.03, 0.06, 0.1, 0.15, 0.25])
 def test_at_the_foot_of_a_step_every_pose_settles(height):
     """Each 0.1 mm from 3 cm before the wheel touches the face to 3 cm after."""

@@ -97,7 +97,7 @@ def test_every_console_script_is_a_function_that_exists(setup_arguments):
 
 
 def test_the_launch_file_starts_nodes_and_sets_parameters_that_exist(setup_arguments):
-    from rover_planner.parameters import ROVER_SIMULATOR
+    from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
 
     text = (TOP / "launch" / "simulation.launch.py").read_text(encoding="utf-8")
     tree = ast.parse(text)

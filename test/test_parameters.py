@@ -8,14 +8,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from rover_planner.errors import PlanningError
-from rover_planner.parameters import (
-    TRAVERSE_SERVER,
-    ParameterError,
-    ParameterSpec,
-    check_changes,
-    declare_parameters,
-    parameters_document,
-)
+from rover_planner.parameters.declare import check_changes, declare_parameters
+from rover_planner.parameters.document import parameters_document
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
+from rover_planner.parameters.spec import ParameterError, ParameterSpec
 
 
 @pytest.fixture

@@ -12,8 +12,11 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import imu_to_attitude
+from rover_physics.errors import SoilError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
-from rover_physics.terrain import save_terrain
+from rover_physics.rover import load_rover
+from rover_physics.sweep import sweep_path
+from rover_physics.terrain import load_terrain, save_terrain
 from rover_planner.mission_planner import MissionPlanner
 from rover_planner.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.rover_simulator import RoverSimulator, main
@@ -99,6 +102,24 @@ def test_bad_parameters_are_refused_by_name(ros, terrain_file):
 
     with pytest.raises(PlanningError, match="cannot start"):
         start_simulator(ros, terrain_file, start_x=50.0)
+    with pytest.raises(SoilError, match="no soil 'dry_snad'.*dry_sand"):
+        start_simulator(ros, terrain_file, soil="dry_snad")
+    with pytest.raises(PlanningError, match="policy is 'fair'"):
+        start_simulator(ros, terrain_file, policy="fair")
+    for other in ({"soil": "dry_sand"}, {"policy": "optimal"}):
+        with pytest.raises(PlanningError, match=f"{next(iter(other))} is .* engine mujoco"):
+            start_simulator(ros, terrain_file, engine="mujoco", **other)
+
+
+def test_soil_and_policy_are_those_of_the_model_that_moves_it(ros, terrain_file):
+    given = {"soil": "dry_sand", "policy": "optimal"}
+    plant = start_simulator(ros, terrain_file, **given).simulation.plant
+    model = sweep_path(
+        load_rover("lsr1"), load_terrain(terrain_file), np.array([[START_X, 0.0, 0.0]]), **given
+    )
+    plant.drive(0.08, 0.0, 1e-9)
+    assert (model.motion_resistance > 0.0).all()
+    assert plant.state().wheel_torques == pytest.approx(model.torque[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])

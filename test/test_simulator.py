@@ -60,6 +60,30 @@ def test_it_stops_before_a_wall_and_says_why_and_can_go_back():
     assert not drive(plant, 1.0, -0.06).stopped
 
 
+def test_on_sand_wheels_turn_farther_than_they_roll_and_need_torque_on_level_ground():
+    ground = plane(0.0, 0.0, half=3.0)
+    firm, sand = (
+        QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0), soil=soil) for soil in (None, "dry_sand")
+    )
+    on_firm, on_sand = drive(firm, 5.0), drive(sand, 5.0)
+    assert sand.pose() == pytest.approx(firm.pose())
+    for wheel in WHEEL_JOINTS:
+        assert on_sand.joint_positions[wheel] > 1.01 * on_firm.joint_positions[wheel]
+    assert on_firm.wheel_torques == pytest.approx(np.zeros(6), abs=1e-6)
+    assert (on_sand.wheel_torques > 0.05).all()
+
+
+def test_servos_with_the_best_torques_climb_where_equal_ones_slip():
+    ground = make_terrain(lambda x, y: 0.07 * (x > 0.0), half=3.0, resolution=0.01)
+    equal, optimal = (
+        QuasiStaticPlant(LSR1, ground, (-0.7, 0.0, 0.0), friction=0.5, policy=policy)
+        for policy in ("equal", "optimal")
+    )
+    assert "slips" in drive(equal, 15.0).stopped
+    assert not drive(optimal, 15.0).stopped
+    assert optimal.pose()[0] > equal.pose()[0] + 0.1
+
+
 def test_a_start_on_which_no_rover_stands_is_refused():
     with pytest.raises(PlanningError, match="cannot start at"):
         QuasiStaticPlant(LSR1, wavy(), (9.0, 0.0, 0.0))

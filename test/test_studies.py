@@ -56,8 +56,74 @@ def test_a_rover_that_cannot_be_is_a_trial_with_a_note_and_no_value():
     parameters = [{"name": "suspension.wheels.rear.x", "from": -0.4, "to": 0.4, "count": 3}]
     result = run_study(study(parameters=parameters))
     assert [bool(trial.note) for trial in result.trials] == [False, True, True]
+    assert np.isnan(result.trials[-1].load_shares).all()
     assert np.isnan(result.trials[-1].objective)
     assert "wheels" in result.trials[-1].note
+
+
+def test_on_level_sand_equal_load_shares_need_the_least_energy():
+    parameters = [
+        {"name": "masses.body.com.x", "from": -0.1, "to": 0.1},
+        {"name": "suspension.bogie_pivot.x", "from": 0.1, "to": 0.3},
+    ]
+    found = run_study(
+        study(
+            objective="drive_energy", soil="dry_sand", method="optimise", evaluations=80,
+            parameters=parameters, drives=[{"slope": 0.0, "length": 0.04}],
+        )
+    )  # fmt: skip
+    assert found.best.load_shares == pytest.approx([1 / 6] * 6, abs=0.004)
+    uneven = max(found.trials, key=lambda trial: max(trial.load_shares))
+    assert uneven.objective > 1.01 * found.best.objective
+
+
+def test_a_drive_that_breaks_another_limit_gives_no_value_but_the_reason():
+    parameters = [{"name": "belly.z", "from": -0.285, "to": -0.1, "count": 2}]
+    drives = [{"slope": 0.1, "length": 0.1}]
+    low, high = run_study(
+        study(objective="worst_utilisation", drives=drives, parameters=parameters)
+    ).trials
+    assert np.isnan(low.objective) and "drive 1: belly clearance" in low.note
+    assert high.objective > 0.0
+
+
+def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones():
+    parameters = [
+        {
+            "name": "suspension.wheels.rear.y", "from": 0.25, "to": 0.4, "count": 2,
+            "also": ["suspension.wheels.middle.y", "suspension.wheels.front.y"],
+        }
+    ]  # fmt: skip
+    drives = [{"slope": 0.2, "length": 0.1, "start": [0.0, 0.0, 1.5708]}]
+    task = study(objective="tip_over_margin", drives=drives, parameters=parameters)
+    narrow, wide = run_study(task).trials
+    height = LSR1.masses.body.com[2] - LSR1.suspension.wheels["rear"][2] + LSR1.wheel.radius
+    assert narrow.objective < wide.objective < np.arctan(0.4 / height) + 0.5
+    assert run_study(task).baseline.values == (0.31,)
+
+
+def test_what_stops_the_rover_at_a_taller_step_is_noted():
+    [first, _] = run_study(
+        study(
+            objective="tallest_step", friction=0.5,
+            parameters=[{"name": "wheel.max_torque", "from": 0.5, "to": 2.0, "count": 2}],
+        )
+    ).trials  # fmt: skip
+    taller = float(first.note.split(" m:")[0])
+    assert taller == pytest.approx(first.objective + 0.002, abs=6e-4)
+    assert "limit" in first.note
+
+
+def test_files_are_looked_for_beside_the_study(tmp_path):
+    from rover_physics.terrain import Terrain, save_terrain
+
+    save_terrain(tmp_path / "flat.npz", Terrain(np.zeros((60, 60)), 0.05, (-1.5, -1.5)))
+    data = {
+        "rover": "lsr1", "objective": "drive_energy", "parameters": [PIVOT_X | {"count": 2}],
+        "drives": [{"file": "flat.npz", "length": 0.1}],
+    }  # fmt: skip
+    task = study_from_dict(data, "study", tmp_path)
+    assert np.isfinite([trial.objective for trial in run_study(task).trials]).all()
 
 
 def test_two_parameters_are_tried_in_all_combinations():
@@ -78,6 +144,11 @@ def test_two_parameters_are_tried_in_all_combinations():
         ({"parameters": [PIVOT_X | {"name": "wheel.radios"}]}, "wheel.radius"),
         ({"parameters": [PIVOT_X | {"to": 0.0}]}, "above from"),
         ({"parameters": [PIVOT_X | {"steps": 3}]}, "steps"),
+        ({"parameters": [PIVOT_X, PIVOT_X]}, "no other parameter varies"),
+        ({"parameters": [PIVOT_X | {"also": ["wheel.mass"]}]}, "names of numbers in m"),
+        ({"parameters": [PIVOT_X | {"count": 2.5}]}, "count is 2.5; it must be a whole number"),
+        ({"soil": "dry_sand"}, "left out"),
+        ({"colour": "red"}, "a study file has"),
         ({"method": "guess"}, "method is 'guess'"),
         ({"objective": "tip_over_margin", "drives": [{"length": 1.0}]}, "one of slope"),
     ],
@@ -102,7 +173,7 @@ def test_every_number_of_a_rover_has_a_name_and_a_unit():
         for part in key:
             inner = inner[part]
         assert inner == value
-        assert vary(LSR1, (key,), (value,)) == LSR1
+        assert vary(LSR1, {key: value}) == LSR1
 
 
 def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):
@@ -112,7 +183,9 @@ def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):
         "  - {name: suspension.bogie_pivot.x, from: 0.1, to: 0.3, count: 5}\n"
     )
     assert main(["study", str(file), "--output", str(tmp_path / "out")]) == 0
-    assert "suspension.bogie_pivot.x = 0.2 m" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "suspension.bogie_pivot.x = 0.2 m" in said
+    assert "suspension.bogie_pivot.x: 0.1 to 0.3 m, now 0.2" in said
     with (tmp_path / "out" / "loads.csv").open() as table:
         rows = list(csv.reader(table))
     assert rows[0][0] == "suspension.bogie_pivot.x [m]" and len(rows) == 6

@@ -8,7 +8,7 @@ from rough_grounds import plane
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.input_watch import InputWatch
-from rover_planner.parameters import TRACTION_CONTROLLER
+from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
 from rover_planner.traction_loops import PushLoop, StallWatch, limit_rate, rolling_rates
 from rover_planner.traction_service import TractionService, settings_from_parameters
 

@@ -13,7 +13,7 @@ from rover_physics.errors import RoverFileError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain import Terrain, load_terrain
 from rover_planner.errors import PlanningError
-from rover_planner.parameters import TRAVERSE_SERVER
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
 from rover_planner.traverse_service import (
     TraverseService,
     densify,

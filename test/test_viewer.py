@@ -14,6 +14,7 @@ from rover_physics.terrain import Terrain
 from rover_physics.trap import judge_path
 from rover_planner.errors import PlanningError
 from rover_planner.prediction_files import read_prediction, write_prediction
+from rover_planner.view_command import choose_ends
 from rover_planner.viewer.board import describe_verdict, draw_board
 from rover_planner.viewer.charts import CHARTS, with_cursor
 from rover_planner.viewer.colours import PASSABLE, REFUSED, UNKNOWN, of_use, ramp
@@ -436,3 +437,22 @@ def test_a_session_on_a_terrain_with_soil_takes_its_soils():
     )
     session = ViewSession(LSR1, sandy, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     assert session.shown.verdict.max_sinkage > 0.0
+
+
+def test_the_ends_of_a_path_that_nobody_told_are_where_the_rover_can_stand():
+    ground = make_terrain(lambda x, y: np.where(np.hypot(x + 2.0, y) < 1.0, np.nan, 0.0))
+    (x, y, _), goal = choose_ends(LSR1, ground)
+    assert goal == pytest.approx((2.0, 0.0, 0.0))
+    assert 1.0 < np.hypot(x + 2.0, y) < 2.5 and x < 0.0
+    assert ViewSession(LSR1, ground, (x, y, 0.0), goal).shown.journey.length > 0.0
+
+
+def test_where_the_rover_can_stand_nowhere_ends_are_chosen_all_the_same():
+    steep = make_terrain(lambda x, y: 2.0 * x)
+    start, goal = choose_ends(LSR1, steep)
+    assert (start, goal) == (pytest.approx((-2.0, 0.0, 0.0)), pytest.approx((2.0, 0.0, 0.0)))
+
+
+def test_ends_on_a_large_map_are_no_farther_apart_than_can_be_watched():
+    start, goal = choose_ends(LSR1, Terrain(np.zeros((1200, 1200)), 0.1, (0.0, 0.0)))
+    assert np.hypot(goal[0] - start[0], goal[1] - start[1]) == pytest.approx(10.0)

@@ -1,10 +1,11 @@
 """The page in a real browser: what its buttons, sliders and clicks do, as a visitor sees it."""
 
+import time
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
+from browser import ARGUMENTS, PROGRAM, WAIT, Visitor, needs_browser, sync_api, wait_until
 from grounds import make_terrain, waves
 
 from rover_physics.rover import load_rover
@@ -128,6 +129,39 @@ def test_the_scrubber_goes_to_any_time_and_the_cursor_of_the_plots_with_it(visit
     data = page.charts.plots["wheel_loads"]
     wait_until(lambda: np.any(np.isclose(data.data[0], distance)), "the cursor to be there")
     assert all(np.isfinite(column).all() for column in data.data)
+
+
+def test_every_time_that_is_typed_takes_effect_though_the_page_moves_the_scrubber_too(
+    visitor, page
+):
+    for typed in ("50", "50", "7.5", "61.2"):
+        visitor.set_slider("Time [s]", typed)
+        wait_until(lambda typed=typed: page.playback.time == float(typed), f"{typed} s")
+        visitor.press("To the start")
+        wait_until(lambda: visitor.slider_value("Time [s]") == 0.0, "the start")
+
+
+def test_a_time_counts_that_is_typed_just_before_the_page_shows_another(visitor, page):
+    scrubber = page.drive_tab._player._scrubber
+
+    def show_late(typed: float) -> None:
+        """Keep the page's thread from looking until the visitor's time is there."""
+        ready.append(typed)
+        end = time.monotonic() + WAIT
+        while scrubber.value != typed and time.monotonic() < end:
+            pass
+        page.drive_tab.show_time()
+
+    for typed in range(1, 10):
+        ready: list[float] = []
+        wait_until(lambda: page.drive_tab._hand_on_until is None, "the last time to be shown")
+        page.wishes.ask(lambda typed=typed: show_late(typed))
+        wait_until(lambda ready=ready: ready, "the page's thread")
+        visitor.set_slider("Time [s]", f"{typed}")
+        wait_until(lambda typed=typed: page.playback.time == typed, f"{typed} s")
+        wait_until(
+            lambda typed=typed: visitor.slider_value("Time [s]") == typed, "the box to show it"
+        )
 
 
 def test_a_slider_changes_the_rover_and_the_path_is_judged_again(visitor, page):

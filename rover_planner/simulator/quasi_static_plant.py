@@ -44,6 +44,7 @@ class QuasiStaticPlant:
         pose: tuple[float, float, float],
         friction: float | None = None,
         policy: str = "equal",
+        soil: str | None = None,
     ):
         """Put a rover on the ground.
 
@@ -53,12 +54,14 @@ class QuasiStaticPlant:
             pose: x, y [m] and yaw [rad] of the body origin.
             friction: Coulomb friction instead of the terrain's and the rover's own.
             policy: How its servos share the traction, "equal" or "optimal".
+            soil: Preset soil where the terrain names none; None: Coulomb friction.
 
         Raises:
             PlanningError: The rover cannot stand there.
+            SoilError: No soil of that name.
         """
         self._rover, self._terrain = rover, terrain
-        self._friction, self._policy = friction, policy
+        self._friction, self._policy, self._soil = friction, policy, soil
         self._writer = BalanceWriter(rover)
         self._mass = self._writer.weight / rover.gravity
         limits = replace(rover.limits, friction_utilisation=NO_LIMIT, torque_saturation=NO_LIMIT)
@@ -156,8 +159,9 @@ class QuasiStaticPlant:
         """Ask the model; about a rover that is pulled, what the best of torques could do."""
         policy = "optimal" if pulled else self._policy
         return sweep_path(
-            self._rover, self._terrain, poses, friction=self._friction, policy=policy
-        )
+            self._rover, self._terrain, poses,
+            friction=self._friction, policy=policy, soil=self._soil,
+        )  # fmt: skip
 
     def _why_not(self, prediction: PathPrediction, pulled: bool = False) -> str:
         """Return why the way to the last of some poses is not open, empty where it is.

@@ -37,6 +37,10 @@ class SimulationSettings:
     """One of ENGINES."""
     friction: float | None
     """Coulomb friction instead of terrain's and rover's own."""
+    soil: str | None
+    """Soil where the terrain names none; None: Coulomb friction."""
+    policy: str
+    """How the rover's own servos share the traction, "equal" or "optimal"."""
     speed: float
     """Along a path [m/s]."""
     follow_commands: bool
@@ -70,6 +74,8 @@ def settings_from_parameters(values: Mapping[str, Any]) -> SimulationSettings:
         start=(values["start_x"], values["start_y"], values["start_yaw"]),
         engine=values["engine"],
         friction=values["friction"] or None,
+        soil=values["soil"] or None,
+        policy=values["policy"],
         speed=values["speed"] or rover.nominal_speed,
         follow_commands=values["follow_commands"],
         timeout=values["timeout"],
@@ -87,11 +93,21 @@ def make_plant(settings: SimulationSettings) -> Plant:
     """Make the plant that the settings name.
 
     Raises:
-        PlanningError: MuJoCo is asked for and not installed, or the rover cannot start there.
+        PlanningError: MuJoCo is asked for and not installed or told what it has no use for, or
+            the rover cannot start there.
+        SoilError: No soil of that name.
     """
     if settings.engine != "mujoco":
         return QuasiStaticPlant(
-            settings.rover, settings.terrain, settings.start, settings.friction
+            settings.rover, settings.terrain, settings.start,
+            settings.friction, settings.policy, settings.soil,
+        )  # fmt: skip
+    if settings.soil is not None:
+        raise PlanningError(f"soil is {settings.soil!r}; it must be empty with the engine mujoco")
+    if settings.policy != "equal":
+        raise PlanningError(
+            f"policy is {settings.policy!r}; it must be left out with the engine mujoco, whose "
+            "servos hold speeds"
         )
     try:
         from rover_planner.simulator.mujoco_engine import MujocoPlant
@@ -109,7 +125,7 @@ class Simulation:
         """Put the rover at its start.
 
         Raises:
-            PlanningError: See `make_plant`.
+            PlanningError: See `make_plant`, as for SoilError.
         """
         self.settings = settings
         self.plant = make_plant(settings)

@@ -1,67 +1,115 @@
-"""What a rover is worth: utilisation, margin, the tallest step it climbs, even loads."""
+"""What a rover is worth: utilisation, margin, energy, the tallest step, even loads."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.limits import judge
+from rover_physics.model_setup import set_up
 from rover_physics.rover import Rover
 from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain, load_terrain
+from rover_physics.trap import judge_path
 from rover_planner.studies.study_file import Study, StudyDrive
 
 Floats = NDArray[np.float64]
 SPACING = 0.02
 """Distance between waypoints [m]."""
+NO_LIMIT = 1e9
 STEP_TOLERANCE = 0.002
 """To which the height of a step is found [m]."""
 SEARCH_STEP = 0.02
 """Heights of steps that are tried one after another before the last one is bracketed [m]."""
 
 
-def evaluate(study: Study, rover: Rover) -> float:
-    """Return the objective of a study for a rover; NaN where it cannot be told.
+@dataclass(frozen=True)
+class Score:
+    """What a rover is worth."""
+
+    value: float
+    """Of the objective; NaN where it cannot be told."""
+    note: str = ""
+    """Why it cannot, or what keeps it from being better."""
+
+
+def evaluate(study: Study, rover: Rover) -> Score:
+    """Return the objective of a study for a rover; what makes it impossible is a note.
 
     Raises:
         RoverError: A terrain cannot be loaded, or the model refuses an argument.
     """
     if study.objective == "tallest_step":
-        return tallest_step(rover, study.policy, study.friction)
+        height = tallest_step(rover, study.policy, study.friction)
+        taller = height + STEP_TOLERANCE
+        reason = why_not_climbed(rover, taller, study.policy, study.friction)
+        return Score(height, f"{taller:.3f} m: {reason}")
     if study.objective == "load_imbalance":
-        loads = sweep_path(rover, _flat(rover), np.zeros((1, 3))).wheel_loads[0]
-        return float(loads.max() / loads.mean())
-    worst = [_worst_on(study, rover, drive) for drive in study.drives]
-    return float(np.max(worst) if study.objective == "worst_utilisation" else np.min(worst))
+        shares = load_shares(rover)
+        return Score(float(shares.max() / shares.mean()))
+    scores = [_score_drive(study, rover, k) for k in range(len(study.drives))]
+    failed = [score for score in scores if not np.isfinite(score.value)]
+    if failed:
+        return failed[0]
+    choose = min if study.wants_largest else max
+    return choose(scores, key=lambda score: score.value)
 
 
-def _worst_on(study: Study, rover: Rover, drive: StudyDrive) -> float:
-    path = drive.length * np.linspace(0.0, 1.0, round(drive.length / SPACING) + 1)
+def load_shares(rover: Rover) -> Floats:
+    """Return the shares (6,) of the weight that the wheels carry on level ground, at rest."""
+    loads = sweep_path(rover, _flat(rover), np.zeros((1, 3))).wheel_loads[0]
+    return np.asarray(loads / loads.sum())
+
+
+def _score_drive(study: Study, rover: Rover, k: int) -> Score:
+    """Drive number k; all limits have to hold but the one that the objective is about."""
+    drive, where = study.drives[k], f"drive {k + 1}"
+    path = drive.length * np.linspace(0.0, 1.0, max(round(drive.length / SPACING), 1) + 1)
     x, y, yaw = drive.start
     poses = np.column_stack(
         [x + path * np.cos(yaw), y + path * np.sin(yaw), np.full_like(path, yaw)]
     )
-    prediction = sweep_path(
-        rover, _ground(rover, drive), poses, friction=study.friction, policy=study.policy
-    )
-    verdict = judge(rover, prediction)
-    if not prediction.settled.all():
-        return float("nan")
+    ground = _ground(rover, drive)
+    prediction, verdict = judge_path(
+        _lift_limit(study, rover), ground, poses,
+        friction=study.friction, policy=study.policy, soil=study.soil,
+    )  # fmt: skip
+    if not verdict.traversable:
+        return Score(float("nan"), f"{where}: {verdict.reason}")
     if study.objective == "worst_utilisation":
-        return verdict.max_friction_utilisation
-    return verdict.min_tip_over_ratio
+        return Score(verdict.max_friction_utilisation, where)
+    if study.objective == "drive_energy":
+        return Score(float(prediction.energy[-1] / prediction.distance[-1]), where)
+    # The verdict's ratio is to the same rover on flat ground, so it does not compare rovers.
+    flat_angle = float(set_up(rover, ground).settings.flat_angle)
+    return Score(verdict.min_tip_over_ratio * flat_angle, where)
+
+
+def _lift_limit(study: Study, rover: Rover) -> Rover:
+    """Return the rover without the limit that the objective measures."""
+    lifted = {
+        "worst_utilisation": {"friction_utilisation": NO_LIMIT},
+        "tip_over_margin": {"tip_over_ratio": -NO_LIMIT},
+    }.get(study.objective, {})
+    return replace(rover, limits=replace(rover.limits, **lifted))
 
 
 def _ground(rover: Rover, drive: StudyDrive) -> Terrain:
     if drive.kind == "file":
-        return load_terrain(drive.file)
+        return _load_once(drive.file)
     reach = drive.length + 2.0 * _length(rover) + abs(drive.start[0]) + abs(drive.start[1])
     cell = 0.2 * rover.wheel.radius
     axis = cell * np.arange(-int(reach / cell), int(reach / cell) + 1)
     x = np.broadcast_to(axis, (len(axis), len(axis)))
     if drive.kind == "slope":
         return Terrain(np.tan(drive.size) * x, cell, (axis[0], axis[0]))
-    return _step(rover, drive.size)
+    return step_ground(rover, drive.size)
+
+
+@lru_cache(maxsize=16)
+def _load_once(file: str) -> Terrain:
+    return load_terrain(file)
 
 
 def _length(rover: Rover) -> float:
@@ -70,10 +118,10 @@ def _length(rover: Rover) -> float:
 
 
 def _flat(rover: Rover) -> Terrain:
-    return _step(rover, 0.0)
+    return step_ground(rover, 0.0)
 
 
-def _step(rover: Rover, height: float) -> Terrain:
+def step_ground(rover: Rover, height: float) -> Terrain:
     """Return level ground that rises by a step across x = 0."""
     cell = 0.1 * rover.wheel.radius
     half = 2.0 * _length(rover)
@@ -90,17 +138,13 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
     limits of tilt, margin, clearance and drop. Heights are tried from low to high, for a step may
     be climbed that is taller than one that is not.
     """
-    limits = replace(
-        rover.limits, tilt=1.5, tip_over_ratio=0.0, belly_clearance=0.0, wheel_drop=100.0
-    )
-    able = replace(rover, limits=limits)
     climbed, height = 0.0, SEARCH_STEP
-    while height < 4.0 * rover.wheel.radius and climbs(able, height, policy, friction):
+    while height < 4.0 * rover.wheel.radius and climbs(rover, height, policy, friction):
         climbed, height = height, height + SEARCH_STEP
     low, high = climbed, height
     while high - low > STEP_TOLERANCE:
         middle = 0.5 * (low + high)
-        if climbs(able, middle, policy, friction):
+        if climbs(rover, middle, policy, friction):
             low = middle
         else:
             high = middle
@@ -109,8 +153,19 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
 
 def climbs(rover: Rover, height: float, policy: str, friction: float | None) -> bool:
     """Tell whether a rover gets up a step of a height [m], belly included."""
+    return not why_not_climbed(rover, height, policy, friction)
+
+
+def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | None) -> str:
+    """Return why a rover does not get up a step of a height [m], empty where it does."""
+    limits = replace(
+        rover.limits, tilt=1.5, tip_over_ratio=0.0, belly_clearance=0.0, wheel_drop=100.0
+    )
+    able = replace(rover, limits=limits)
     reach = 0.75 * _length(rover)
     x = np.linspace(-reach, reach, round(2.0 * reach / SPACING) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
-    prediction = sweep_path(rover, _step(rover, height), poses, policy=policy, friction=friction)
-    return judge(rover, prediction).traversable
+    prediction = sweep_path(
+        able, step_ground(rover, height), poses, policy=policy, friction=friction
+    )
+    return judge(able, prediction).reason

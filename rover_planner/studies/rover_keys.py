@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rover_physics.errors import RoverFileError
-from rover_physics.rover import Rover
-from rover_planner.viewer.rover_values import rover_to_dict, with_value
+from rover_physics.rover import Rover, rover_from_dict
+from rover_planner.viewer.rover_values import rover_to_dict
 
 Key = tuple[str | int, ...]
 AXES = ("x", "y", "z")
@@ -58,18 +58,14 @@ def _list_keys(contents: Any, name: str = "", key: Key = ()) -> Iterator[tuple[s
         yield name, key
 
 
-def vary(rover: Rover, keys: tuple[Key, ...], values: tuple[float, ...]) -> Rover:
-    """Return a rover with numbers changed.
+def vary(rover: Rover, values: Mapping[Key, float]) -> Rover:
+    """Return a rover with other numbers, by their keys.
 
     Raises:
         RoverFileError: No such rover can be; names the key.
     """
-    if len(keys) == 1:
-        return with_value(rover, keys, values[0])
-    from rover_physics.rover import rover_from_dict
-
     data = rover_to_dict(rover)
-    for key, value in zip(keys, values, strict=True):
+    for key, value in values.items():
         inner: Any = data
         for part in key[:-1]:
             inner = inner[part]

@@ -1,5 +1,6 @@
 """Runs a study: all combinations of a sweep, or an optimisation by scipy."""
 
+import contextlib
 import csv
 import itertools
 from collections.abc import Callable, Iterator
@@ -9,14 +10,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.errors import RoverFileError
+from rover_physics.errors import ModelError, RoverFileError
+from rover_physics.names import WHEELS
 from rover_planner.errors import PlanningError
-from rover_planner.studies.objectives import evaluate
+from rover_planner.studies.objectives import evaluate, load_shares
 from rover_planner.studies.rover_keys import vary
 from rover_planner.studies.study_file import OBJECTIVES, Study
 
 Floats = NDArray[np.float64]
 SEED = 1
+ALL_OVER = 0.6
+"""Share of an optimisation's evaluations that looks all over the bounds; the rest looks nearby."""
+NEAR = -0.05
+"""First steps of the search nearby, in widths of the bounds."""
+IMPOSSIBLE = 1e6
+"""What the optimiser is told of a rover that cannot be judged."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,9 @@ class Trial:
     objective: float
     """What it is worth; NaN where there is no such rover or it cannot be told."""
     note: str
-    """Why not, empty where it can."""
+    """Why not; or on which drive it is what it is."""
+    load_shares: tuple[float, ...] = (float("nan"),) * 6
+    """Of the weight on the wheels on level ground, wheel order; NaN where it cannot stand."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +47,8 @@ class StudyResult:
 
     study: Study
     """The study."""
+    baseline: Trial
+    """The rover as its file has it."""
     trials: tuple[Trial, ...]
     """In the order in which they were tried."""
 
@@ -58,15 +70,15 @@ class StudyResult:
     def write_csv(self, path: Path) -> None:
         """Write a row for each trial."""
         _, what, unit = OBJECTIVES[self.study.objective]
-        heads = [_head(p.name, p.unit) for p in self.study.parameters] + [
-            _head(what, unit),
-            "note",
-        ]
+        heads = [_head(p.name, p.unit) for p in self.study.parameters]
+        heads += [_head(what, unit), *(f"load share {wheel}" for wheel in WHEELS), "note"]
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(heads)
             for trial in self.trials:
-                writer.writerow([*trial.values, trial.objective, trial.note])
+                shares = [f"{share:.6f}" for share in trial.load_shares]
+                numbers = [f"{number:.9g}" for number in (*trial.values, trial.objective)]
+                writer.writerow([*numbers, *shares, trial.note])
 
 
 def _head(name: str, unit: str) -> str:
@@ -88,6 +100,7 @@ def run_study(study: Study, on_trial: Callable[[Trial], None] | None = None) -> 
         on_trial: Called after each trial.
     """
     trials: list[Trial] = []
+    baseline = _try(study, tuple(parameter.now for parameter in study.parameters))
 
     def attempt(values: tuple[float, ...]) -> float:
         trial = _try(study, values)
@@ -101,17 +114,22 @@ def run_study(study: Study, on_trial: Callable[[Trial], None] | None = None) -> 
             attempt(values)
     else:
         _optimise(study, attempt)
-    return StudyResult(study, tuple(trials))
+    return StudyResult(study, baseline, tuple(trials))
 
 
 def _try(study: Study, values: tuple[float, ...]) -> Trial:
+    numbers = {
+        key: value
+        for parameter, value in zip(study.parameters, values, strict=True)
+        for key in (parameter.key, *parameter.also)
+    }
     try:
-        rover = vary(study.rover, tuple(p.key for p in study.parameters), values)
-    except RoverFileError as error:
+        rover = vary(study.rover, numbers)
+        shares = tuple(load_shares(rover).tolist())
+        score = evaluate(study, rover)
+    except (RoverFileError, ModelError) as error:
         return Trial(values, float("nan"), str(error))
-    objective = evaluate(study, rover)
-    note = "" if np.isfinite(objective) else "it does not settle everywhere on the drives"
-    return Trial(values, objective, note)
+    return Trial(values, score.value, score.note, shares)
 
 
 def _combinations(study: Study) -> Iterator[tuple[float, ...]]:
@@ -119,28 +137,40 @@ def _combinations(study: Study) -> Iterator[tuple[float, ...]]:
     return itertools.product(*axes)
 
 
+class _EnoughError(Exception):
+    """As many rovers were tried as may be."""
+
+
 def _optimise(study: Study, attempt: Callable[[tuple[float, ...]], float]) -> None:
-    """Search by differential evolution (Storn and Price, 1997): objectives have jumps."""
-    from scipy.optimize import differential_evolution
+    """Search all over by differential evolution, then near the best by Nelder and Mead.
+
+    Neither needs derivatives: objectives have kinks and jumps. Sources: Storn and Price, 1997;
+    Nelder and Mead, 1965.
+    """
+    from scipy.optimize import differential_evolution, minimize
 
     sign = -1.0 if study.wants_largest else 1.0
-    left = study.evaluations
+    bounds = np.array([(p.low, p.high) for p in study.parameters])
+    tried: list[tuple[float, Floats]] = []
 
-    class Enough(Exception):  # noqa: N818 - it is no error
-        pass
-
-    def cost(x: Floats) -> float:
-        nonlocal left
-        if left <= 0:
-            raise Enough
-        left -= 1
+    def cost(x: Floats, most: int) -> float:
+        if len(tried) >= most:
+            raise _EnoughError
         value = attempt(tuple(float(number) for number in x))
-        return sign * value if np.isfinite(value) else 1e6
+        tried.append((sign * value if np.isfinite(value) else IMPOSSIBLE, np.array(x)))
+        return tried[-1][0]
 
-    try:
+    with contextlib.suppress(_EnoughError):
         differential_evolution(
-            cost, [(p.low, p.high) for p in study.parameters], popsize=5, tol=1e-3, seed=SEED,
-            polish=False, maxiter=study.evaluations,
+            cost, bounds, args=(round(ALL_OVER * study.evaluations),), popsize=5, tol=1e-3,
+            seed=SEED, polish=False, maxiter=study.evaluations,
         )  # fmt: skip
-    except Enough:
+    value, best = min(tried, key=lambda pair: pair[0])
+    if value >= IMPOSSIBLE:
         return
+    simplex = np.vstack([best, best + NEAR * np.diag(bounds[:, 1] - bounds[:, 0])])
+    with contextlib.suppress(_EnoughError):
+        minimize(
+            cost, best, args=(study.evaluations,), method="Nelder-Mead", bounds=bounds,
+            options={"initial_simplex": np.clip(simplex, *bounds.T), "xatol": 1e-6, "fatol": 1e-9},
+        )  # fmt: skip

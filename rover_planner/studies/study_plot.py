@@ -12,7 +12,8 @@ from rover_planner.pictures import STYLE, save_figure
 from rover_planner.studies.runner import StudyResult
 from rover_planner.studies.study_file import OBJECTIVES
 
-POINT, BEST = "#0072B2", "#D55E00"
+POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
+"""Colours that colour-blind people tell apart (Okabe and Ito); each has a marker of its own."""
 
 
 def draw_study(result: StudyResult, path: Path) -> None:
@@ -49,7 +50,10 @@ def _draw_curve(axes: Axes, result: StudyResult) -> None:
     parameter = result.study.parameters[0]
     points = np.array(sorted((t.values[0], t.objective) for t in result.trials))
     axes.plot(points[:, 0], points[:, 1], "-o", color=POINT, markersize=3)
-    axes.plot(*_best_point(result), "o", color=BEST, markersize=8)
+    now = result.baseline
+    axes.plot(now.values[0], now.objective, "s", color=NOW, markersize=7, label="as it is")
+    axes.plot(*_best_point(result), "o", color=BEST, markersize=8, label="best")
+    axes.legend()
     _, what, unit = OBJECTIVES[result.study.objective]
     axes.set_xlabel(_label(parameter.name, parameter.unit))
     axes.set_ylabel(_label(what, unit))
@@ -64,7 +68,11 @@ def _draw_map(figure: Figure, axes: Axes, result: StudyResult) -> None:
     values = np.array([trial.values for trial in result.trials])
     objective = np.array([trial.objective for trial in result.trials])
     points = axes.scatter(values[:, 0], values[:, 1], c=objective, cmap="cividis", s=40)
-    axes.plot(*result.best.values, "o", markerfacecolor="none", color=BEST, markersize=12)
+    axes.plot(*result.baseline.values, "s", color=NOW, markersize=7, label="as it is")
+    axes.plot(
+        *result.best.values, "o", markerfacecolor="none", color=BEST, markersize=12, label="best"
+    )
+    axes.legend()
     _, what, unit = OBJECTIVES[result.study.objective]
     figure.colorbar(points, ax=axes, label=_label(what, unit))
     axes.set_xlabel(_label(first.name, first.unit))

@@ -26,6 +26,20 @@ PLAY_BUTTONS = ("Rewind", "Play", "Pause", "Fast forward")
 STEP_BUTTONS = ("Step back", "Step", "To the start")
 
 
+def on_visit(control: Any, act: Callable[[Any], None]) -> None:
+    """Call `act` with each value that a visitor gives a control; it has to be quick.
+
+    The value is read at once, on the loop that received it: in a thread of its own, as callbacks
+    otherwise are called, the page may have put another value there before.
+    """
+
+    async def take(event: Any) -> None:
+        if event.client is not None:
+            act(event.target.value)
+
+    control.on_update(take)
+
+
 class Player:
     """Play, pause, step, rewind, fast forward, speed and a scrubber."""
 
@@ -35,17 +49,19 @@ class Player:
             group = gui.add_button_group(label, names)
             group.on_click(lambda event: actions.buttons[event.target.value]())
         self._scrubber = gui.add_slider("Time [s]", 0.0, 1.0, 0.1, 0.0)
-        self._scrubber.on_update(
-            lambda event: actions.seek(event.target.value) if event.client else None
-        )
+        on_visit(self._scrubber, actions.seek)
         speeds = [f"{s} x" for s in SPEEDS]
         self._speed = gui.add_dropdown("Speed", speeds, initial_value=f"{speed:g} x")
         self._speed.on_update(
             lambda event: actions.set_speed(float(event.target.value.removesuffix(" x")))
         )
 
-    def show(self, time: float, duration: float) -> None:
-        """Move the scrubber to a time of a journey [s]."""
+    def show(self, time: float, duration: float, *, anew: bool = False) -> None:
+        """Move the scrubber to a time of a journey [s]; `anew` even if it was put there."""
+        if anew:
+            # Another time may have been on its way to the browser when the visitor chose this one,
+            # and a value is sent only where it changes.
+            self._scrubber.value = self._scrubber.min
         longest = max(round(duration, 1), 0.1)
         if longest < self._scrubber.max:
             self._scrubber.value = min(round(time, 1), longest)
@@ -71,9 +87,7 @@ class RoverSliders:
         self, gui: Any, value: RoverValue, now: float, change: Callable[[RoverValue, float], None]
     ) -> None:
         slider = gui.add_slider(value.label, value.low, value.high, value.step, now)
-        slider.on_update(
-            lambda event: change(value, float(event.target.value)) if event.client else None
-        )
+        on_visit(slider, lambda number: change(value, float(number)))
         self._sliders[value] = slider
 
     def show(self, rover: Rover) -> None:

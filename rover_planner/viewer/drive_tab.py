@@ -1,5 +1,6 @@
 """The main part of the panel: player, verdict and the board of the paper's Figure 5."""
 
+import time
 from typing import Any
 
 from rover_physics.rover import Rover
@@ -8,6 +9,9 @@ from rover_planner.viewer.controls import PLAY_BUTTONS, STEP_BUTTONS, Player, Pl
 from rover_planner.viewer.journey import Frame, Journey
 from rover_planner.viewer.playback import Playback
 from rover_planner.viewer.wishes import Wishes
+
+HAND_OFF = 0.5
+"""Time after a visitor's last word to the scrubber from which the page moves it again [s]."""
 
 
 class DriveTab:
@@ -19,6 +23,9 @@ class DriveTab:
         self._times = Journey.empty_times()
         self.moved = True
         """Whether a button moved the playback since it was shown."""
+        self._hand_on_until: float | None = None
+        self._crossed = False
+        """Whether the page moved the scrubber when a visitor took it."""
         if playback is not None:
             self._playback = playback
             self._player = Player(gui, self._actions(), playback.speed)
@@ -34,8 +41,8 @@ class DriveTab:
         def ask(act: Any) -> Any:
             return lambda: self._wishes.ask(lambda: self._move(act))
 
-        def seek(time: float) -> None:
-            self._wishes.ask(lambda: self._move(lambda: self._seek(time)), "seek")
+        def seek(place: float) -> None:
+            self._wishes.ask(lambda: self._move(lambda: self._scrub(place)), "seek")
 
         def set_speed(speed: float) -> None:
             playback.speed = speed
@@ -49,9 +56,14 @@ class DriveTab:
     def _step(self, by: int) -> None:
         self._playback.step(self._times, by)
 
-    def _seek(self, time: float) -> None:
+    def _seek(self, place: float) -> None:
         self._playback.pause()
-        self._playback.jump(time)
+        self._playback.jump(place)
+
+    def _scrub(self, place: float) -> None:
+        self._hand_on_until = time.monotonic() + HAND_OFF
+        self._crossed = self._crossed or self._playback.rate != 0.0
+        self._seek(place)
 
     def take(self, journey: Journey) -> None:
         """Play another journey."""
@@ -71,5 +83,15 @@ class DriveTab:
         self._board.content = draw_board(rover, frame, state)
 
     def show_time(self) -> None:
-        """Move the scrubber to where the playback is."""
-        self._player.show(self._playback.time, self._playback.duration)
+        """Move the scrubber to where the playback is, unless a visitor has a hand on it.
+
+        A number that is written over while it is typed becomes another one.
+        """
+        if self._hand_on_until is None:
+            self._player.show(self._playback.time, self._playback.duration)
+
+    def settle_scrubber(self) -> None:
+        """Move the scrubber to where the playback is once a visitor has let go of it."""
+        if self._hand_on_until is not None and time.monotonic() > self._hand_on_until:
+            crossed, self._crossed, self._hand_on_until = self._crossed, False, None
+            self._player.show(self._playback.time, self._playback.duration, anew=crossed)

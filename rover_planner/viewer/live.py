@@ -42,7 +42,7 @@ class LiveVerdict:
     traversable: bool
     """Whether there is a path that the rover can drive."""
     reason: str
-    """Why not, or what else it said."""
+    """Why not, empty where there is one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ class LiveListener(Node):
             status = verdict.status[0]
             passable = status.level != DiagnosticStatus.ERROR
             with self._lock:
-                self._verdict = LiveVerdict(passable, status.message)
+                self._verdict = LiveVerdict(passable, "" if passable else status.message)
 
     def _take_angles(self, message: Float64MultiArray) -> None:
         if len(message.data) >= 6:

@@ -48,6 +48,7 @@ class PlannedDrive:
 
     def advance(self, seconds: float) -> None:
         """Move on by the time that passed for the visitor [s]."""
+        self._tab.settle_scrubber()
         moved = self._playback.advance(seconds) or self._tab.moved
         if not moved:
             return

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rover_physics.rover import Rover, load_rover, preset_names
-from rover_planner.viewer.controls import RoverSliders
+from rover_planner.viewer.controls import RoverSliders, on_visit
 from rover_planner.viewer.rover_values import RoverValue, read_rover, write_rover
 
 TURN = 3.15
@@ -76,15 +77,8 @@ class RoverTab:
         limits = arm.joint_limits or ((-TURN, TURN),) * 3
         for joint, (low, high), stowed in zip(arm.joints, limits, arm.stowed, strict=True):
             slider = self._gui.add_slider(f"{joint} [rad]", low, high, 0.01, stowed)
-            slider.on_update(self._turner(joint))
+            on_visit(slider, partial(self._actions.turn_arm, joint))
             self._arm[joint] = slider
-
-    def _turner(self, joint: str) -> Callable[[Any], None]:
-        def turn(event: Any) -> None:
-            if event.client is not None:
-                self._actions.turn_arm(joint, float(event.target.value))
-
-        return turn
 
     def show_verdict(self, text: str) -> None:
         """Show a verdict as HTML."""

@@ -1,0 +1,1 @@
+"""Parameters of the nodes: one table each, from which declaration, checks and docs are made."""
