@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import osqp
+from osqp import ext_builtin as ext
 from scipy import sparse
 
+from rover_physics.kernels import kernel
 from rover_physics.traction import (
     LEAST_LOAD,
     ROWS,
@@ -18,8 +20,22 @@ from rover_physics.traction import (
 )
 from rover_physics.traction_rows import FORCES, WHEEL_COUNT, BalanceRows
 
-TOLERANCE = 1e-5
-"""Of OSQP, absolute and relative. Its default of 1e-3 leaves rows 1e-2 of the weight open."""
+SETTINGS = {
+    # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
+    "eps_abs": 1e-4,
+    "eps_rel": 1e-4,
+    # The programme is scaled already; a scaling of its own, anew each time, spoils the start.
+    "scaling": 0,
+    "rho": 5.0,
+    "adaptive_rho_interval": 100,
+    "check_termination": 5,
+    "polishing": False,
+    "warm_starting": True,
+    "verbose": False,
+}
+"""Of OSQP."""
+UNBOUNDED = 1e30
+"""What OSQP takes for infinite."""
 MOST_ITERATIONS = 4000
 SETTLED = 0.02
 """Change of the scaled tractions, which are of order one, at which a sequence has settled."""
@@ -57,19 +73,25 @@ class TractionAnswer:
 
 
 class TractionWorkspace:
-    """An OSQP problem that is set up once, updated in place and started from the last answer."""
+    """An OSQP problem that is set up once, updated in place and started from the last answer.
+
+    It works on OSQP's extension module: `osqp.OSQP`, which stands around it, takes longer to copy
+    every answer and all that there is to say about it than OSQP takes to solve.
+    """
 
     def __init__(self, most_iterations: int = MOST_ITERATIONS):
         """Set up the problem; `most_iterations` is where OSQP gives up."""
         self._cells, pattern = _find_pattern()
-        self._solver = osqp.OSQP()
-        unbounded = np.full(ROWS, np.inf)
-        self._solver.setup(
-            sparse.eye(VARIABLES, format="csc"), np.zeros(VARIABLES), pattern,
-            -unbounded, unbounded,
-            eps_abs=TOLERANCE, eps_rel=TOLERANCE, max_iter=most_iterations, check_termination=5,
-            polishing=False, warm_starting=True, verbose=False,
-        )  # fmt: skip
+        settings = ext.OSQPSettings()
+        ext.osqp_set_default_settings(settings)
+        for name, value in SETTINGS.items():
+            setattr(settings, name, value)
+        settings.max_iter = most_iterations
+        self._P, self._A = ext.CSC(sparse.eye(VARIABLES, format="csc")), ext.CSC(pattern)
+        self._vectors = np.zeros(VARIABLES), np.full(ROWS, -UNBOUNDED), np.full(ROWS, UNBOUNDED)
+        self._solver = ext.OSQPSolver(
+            self._P, self._vectors[0], self._A, *self._vectors[1:], ROWS, VARIABLES, settings
+        )
 
     def solve(self, qp: TractionQP) -> tuple[np.ndarray, int, str, bool]:
         """Solve a programme.
@@ -77,11 +99,17 @@ class TractionWorkspace:
         Returns:
             Variables (18,), iterations, OSQP's words for its status, whether it was solved.
         """
-        self._solver.update(Px=qp.P, Ax=qp.A.ravel()[self._cells], q=qp.q, l=qp.lower, u=qp.upper)
-        self._solver.warm_start(x=qp.start)
-        result = self._solver.solve(raise_error=False)
-        solved = result.info.status_val == SOLVED and bool(np.isfinite(result.x).all())
-        return result.x, result.info.iter, result.info.status, solved
+        solver, values = self._solver, qp.A.ravel()[self._cells]
+        lower, upper = np.maximum(qp.lower, -UNBOUNDED), np.minimum(qp.upper, UNBOUNDED)
+        failed = solver.update_data_vec(q=qp.q, l=lower, u=upper)
+        failed = solver.update_data_mat(P_x=qp.P, P_i=None, A_x=values, A_i=None) or failed
+        if failed:
+            return qp.start, 0, f"OSQP refuses the programme, error {failed}", False
+        solver.warm_start(qp.start, None)
+        solver.solve()
+        info, y = solver.info, solver.solution.x.copy()
+        solved = info.status_val == SOLVED and bool(np.isfinite(y).all())
+        return y, info.iter, info.status, solved
 
 
 def _find_pattern() -> tuple[np.ndarray, sparse.csc_matrix]:
@@ -153,19 +181,46 @@ def solve_traction(
 
 def measure_utilisation(rows: BalanceRows, friction: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return sqrt(T^2 + S^2) / (mu N) (6,) of x (14,), with loads of LEAST_LOAD at least."""
-    across = np.hypot(x[:6], x[12] + x[13] * rows.along)
-    return across / (friction * np.maximum(x[6:12], LEAST_LOAD))
+    used = np.empty(WHEEL_COUNT)
+    _measure(rows.along, friction, x, used)
+    return used
 
 
 def measure_peak(rows: BalanceRows, friction: np.ndarray, x: np.ndarray) -> float:
     """Return the largest of `measure_utilisation`."""
-    return float(measure_utilisation(rows, friction, x).max())
+    return _measure(rows.along, friction, x, np.empty(WHEEL_COUNT))
 
 
-def _excess(x: np.ndarray, most_pull: float) -> float:
+@kernel
+def _measure(along, friction, x, used):
+    """Write the utilisations (6,) and return the largest."""
+    peak = 0.0
+    for wheel in range(6):
+        lateral = x[12] + x[13] * along[wheel]
+        across = np.sqrt(x[wheel] * x[wheel] + lateral * lateral)
+        used[wheel] = across / (friction[wheel] * max(x[6 + wheel], LEAST_LOAD))
+        peak = max(peak, used[wheel])
+    return peak
+
+
+@kernel
+def _excess(x, most_pull):
     """Return by how much contact and torque limits are broken, in force units."""
-    pull, lift = np.abs(x[:6]).max() - most_pull, -x[6:12].min()
-    return 10.0 * float(max(pull - 1e-4 * most_pull, 0.0) + max(lift, 0.0))
+    pull = lift = 0.0
+    for wheel in range(6):
+        pull = max(pull, abs(x[wheel]) - (1.0 + 1e-4) * most_pull)
+        lift = max(lift, -x[6 + wheel])
+    return 10.0 * (pull + lift)
+
+
+@kernel
+def _write_forces(along, friction, unit, x, used, lateral):
+    """Write utilisations, infinite without load, and lateral forces in [N]."""
+    for wheel in range(6):
+        share = x[12] + x[13] * along[wheel]
+        lateral[wheel] = unit * share
+        across = np.sqrt(x[wheel] * x[wheel] + share * share)
+        used[wheel] = across / (friction[wheel] * x[6 + wheel]) if x[6 + wheel] > 0.0 else np.inf
 
 
 def _describe(
@@ -173,16 +228,16 @@ def _describe(
 ) -> dict:
     """Return the forces of an answer in SI units and what is left of the limits."""
     T, N = rows.force_unit * x[:6], rows.force_unit * x[6:12]
-    S = rows.force_unit * (x[12] + x[13] * rows.along)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        utilisation = np.where(N > 0.0, np.hypot(T, S) / (friction * N), np.inf)
+    utilisation, lateral = np.empty((2, WHEEL_COUNT))
+    _write_forces(rows.along, friction, rows.force_unit, x, utilisation, lateral)
+    torques = radius * T
     return {
-        "torques": np.clip(radius * T, -max_torque, max_torque),
+        "torques": np.minimum(np.maximum(torques, -max_torque), max_torque),
         "loads": N,
         "tractions": T,
-        "lateral": S,
+        "lateral": lateral,
         "utilisation": utilisation,
         "friction_slack": max(float(utilisation.max()) - 1.0, 0.0),
         "load_slack": max(-float(N.min()), 0.0),
-        "torque_slack": max(radius * float(np.abs(T).max()) - max_torque, 0.0),
+        "torque_slack": max(float(np.abs(torques).max()) - max_torque, 0.0),
     }

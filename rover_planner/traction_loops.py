@@ -52,8 +52,11 @@ class PushLoop:
         """
         step = self._integral_gain * error * duration
         if not (limited and step * self._integral > 0.0):
-            self._integral = float(np.clip(self._integral + step, -self._most, self._most))
-        return float(np.clip(self._gain * error + self._integral, -self._most, self._most))
+            self._integral = self._limit(self._integral + step)
+        return self._limit(self._gain * error + self._integral)
+
+    def _limit(self, push: float) -> float:
+        return min(max(push, -self._most), self._most)
 
 
 class StallWatch:
@@ -90,9 +93,10 @@ def rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:
         ratios: (6,) speeds of the wheels' centres, relative to their mean; a wheel that has to
             go backwards or far ahead is more likely one whose contact angle is wrong.
     """
-    ratios = np.clip(ratios, 0.2, 2.0)
+    ratios = np.minimum(np.maximum(ratios, 0.2), 2.0)
     most = OVERSPEED * abs(wanted)
-    return ratios * (np.clip(wheel_rates.mean(), -most, most) / ratios.mean())
+    total = min(max(float(wheel_rates.sum()), -len(ratios) * most), len(ratios) * most)
+    return ratios * (total / float(ratios.sum()))
 
 
 def limit_rate(torques: Floats, last: Floats, most: float) -> Floats:

@@ -118,6 +118,7 @@ class TractionService:
         self._positions = np.zeros(len(SUSPENSION_JOINTS))
         self._rates: Floats | None = None
         self._wheel_rates = np.zeros(len(WHEEL_JOINTS))
+        self._mean_rate = 0.0
         self._attitude = (0.0, 0.0)
         self._body_rates: Floats | None = None
         self._wanted = (0.0, 0.0)
@@ -172,6 +173,7 @@ class TractionService:
             return
         self._positions = np.array([positions[name] for name in SUSPENSION_JOINTS])
         self._wheel_rates = np.array([velocities[name] for name in WHEEL_JOINTS])
+        self._mean_rate = float(self._wheel_rates.sum()) / len(WHEEL_JOINTS)
         known = all(name in velocities for name in SUSPENSION_JOINTS)
         self._rates = np.array([velocities[name] for name in SUSPENSION_JOINTS]) if known else None
         self._watch.take("joint_states", now)
@@ -275,7 +277,7 @@ class TractionService:
 
     def _push(self, duration: float) -> float:
         """Return the wanted net traction [N] by the mean travel of the wheels."""
-        speed = float(self._wheel_rates.mean()) * self._settings.rover.wheel.radius
+        speed = self._mean_rate * self._settings.rover.wheel.radius
         return self._speed.update(self._wanted[0] - speed, duration, self._limited)
 
     def _share(self, rows: BalanceRows) -> TractionAnswer:
@@ -301,10 +303,11 @@ class TractionService:
             wanted = self._wanted[0] / settings.rover.wheel.radius
             rolling = rolling_rates(self._wheel_rates, rows.wheel_speeds, wanted)
             torques -= gains.slip * (self._wheel_rates - rolling)
-            share = self._stall.update(float(self._wheel_rates.mean()), wanted, duration)
-            servo = gains.slip * SERVO_STIFFNESS * (wanted - self._wheel_rates)
-            torques += share * (servo - torques)
-        torques = np.clip(torques, -settings.max_torque, settings.max_torque)
+            share = self._stall.update(self._mean_rate, wanted, duration)
+            if share > 0.0:
+                servo = gains.slip * SERVO_STIFFNESS * (wanted - self._wheel_rates)
+                torques += share * (servo - torques)
+        torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)
         self._torques = limit_rate(torques, self._torques, gains.torque_rate * duration)
         return self._torques
 
