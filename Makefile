@@ -12,6 +12,7 @@ READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.bench_ready
 PACKAGES := rover_physics msg_adapters rover_planner
 MAP ?=
+BROWSER_TESTS := test/test_viewer_page.py
 # Tests, demo and nodes talk to this machine only.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -31,7 +32,9 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP=terrai
 .PHONY: test
 test: lint kernels ## lint, type check and all tests
 	@echo "== tests"
-	$(BIN)/python -m pytest -n auto --dist loadfile test
+	$(BIN)/python -m pytest -n auto --dist loadfile --ignore $(BROWSER_TESTS) test
+	echo "== tests of the page, alone: a browser without a graphics card needs all cores"
+	$(BIN)/python -m pytest $(BROWSER_TESTS)
 
 .PHONY: lint
 lint: $(READY) ## ruff and mypy

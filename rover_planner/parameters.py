@@ -349,7 +349,8 @@ ROVER_SIMULATOR = (
     ParameterSpec(
         "follow_commands",
         False,
-        "Whether torques from /traction_controller/commands drive it; cmd_vel is published then.",
+        "Whether torques from /traction_controller/commands drive it; cmd_vel is published then, "
+        "unless it comes from elsewhere.",
         read_only=True,
     ),
     ParameterSpec(
@@ -392,7 +393,7 @@ ROVER_SIMULATOR = (
         read_only=True,
     ),
     ParameterSpec(
-        "seed", 1, "Seed of noise and of a made terrain.", bounds=(0, 2**31), read_only=True
+        "seed", 1, "Seed of noise and of a made terrain.", bounds=(0, 2**31 - 1), read_only=True
     ),
     ParameterSpec("map_frame", "map", "Frame of map, path and odometry.", read_only=True),
 )
@@ -467,6 +468,10 @@ def parameters_document() -> str:
             "## /traction_controller",
             "",
             *_table(TRACTION_CONTROLLER),
+            "",
+            "## /rover_simulator",
+            "",
+            *_table(ROVER_SIMULATOR),
             "",
             "Read-only parameters are set at start, the others at any time "
             "(`ros2 param set /traverse_server friction 0.6`).",

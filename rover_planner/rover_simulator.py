@@ -1,8 +1,12 @@
 """The node /rover_simulator: a rover on a terrain, with the topics of a real one."""
 
+import argparse
 import contextlib
+import json
 import sys
 import time
+from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +17,8 @@ from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
@@ -26,13 +32,14 @@ from rover_planner.parameters import ROVER_SIMULATOR, declare_parameters
 from rover_planner.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.refusals import BAD_INPUT
 from rover_planner.simulator.plant import PlantState
-from rover_planner.simulator.simulation import Simulation, settings_from_parameters
+from rover_planner.simulator.simulation import ENGINES, Simulation, settings_from_parameters
 
 NODE_NAME = "rover_simulator"
 COMMANDS = "/traction_controller/commands"
 """Where torques come from; remap it for another controller."""
 DEVIATIONS = (0.01, 0.005)
 """Of odometry: places [m] and angles [rad]."""
+DIAGNOSTICS_PERIOD = 1.0
 
 
 class RoverSimulator(Node):
@@ -47,11 +54,13 @@ class RoverSimulator(Node):
         self._simulation = Simulation(self._settings)
         self._period = 1.0 / values["rate"]
         self._told = ""
+        self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self._simulation.plant.state()
         self.create_timer(self._period, self._advance)
         self.create_timer(1.0 / values["map_rate"], self._publish_map)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._publish_map()
         self.get_logger().info(
             f"rover {self._settings.rover.name} on {values['engine']}, starts at "
@@ -78,10 +87,9 @@ class RoverSimulator(Node):
     def _create_subscriptions(self) -> None:
         qos = topic_qos()
         self.create_subscription(Path, "path", self._take_path, qos)
+        self.create_subscription(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
         if self._settings.follow_commands:
             self.create_subscription(Float64MultiArray, COMMANDS, self._take_torques, qos)
-        else:
-            self.create_subscription(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
 
     def _take_path(self, path: Path) -> None:
         try:
@@ -90,6 +98,8 @@ class RoverSimulator(Node):
             self.get_logger().error(f"path refused: {error}")
 
     def _take_speeds(self, twist: TwistStamped) -> None:
+        if _stamp_of(twist) in self._own_stamps:
+            return
         try:
             self._simulation.take_speeds(*twist_to_speeds(twist), time.monotonic())
         except MessageError as error:
@@ -123,17 +133,19 @@ class RoverSimulator(Node):
         self._imu.publish(
             imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
         )
-        if self._commands is not None:
-            self._commands.publish(_twist(self._simulation.steering, stamp))
+        if self._commands is not None and not self._simulation.has_speeds(time.monotonic()):
+            twist = _twist(self._simulation.steering, stamp)
+            self._own_stamps.append(_stamp_of(twist))
+            self._commands.publish(twist)
         if self._transforms is not None:
             self._transforms.sendTransform(_transform(state, self._frame, stamp))
-        self._tell(state, stamp)
+        self._tell(state)
 
     def _arm_angles(self) -> dict[str, float]:
         arm = self._settings.rover.manipulator
         return {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
 
-    def _tell(self, state: PlantState, stamp: Any) -> None:
+    def _tell(self, state: PlantState) -> None:
         """Say once why the rover stops, and when it goes on."""
         if state.stopped == self._told:
             return
@@ -142,15 +154,25 @@ class RoverSimulator(Node):
             self.get_logger().warning(f"stopped: {state.stopped}")
         else:
             self.get_logger().info("drives on")
+        self._publish_diagnostics()
+
+    def _publish_diagnostics(self) -> None:
+        state, speeds = self._state, self._simulation.steering
+        said = {
+            "position": np.round(state.position, 3).tolist(),
+            "wanted_speed": round(speeds[0], 4),
+            "wanted_yaw_rate": round(speeds[1], 4),
+            "follows_path": self._simulation.follows_path,
+        }
         status = DiagnosticStatus(
             level=DiagnosticStatus.ERROR if state.stopped else DiagnosticStatus.OK,
             name=f"{NODE_NAME}: rover",
-            message=state.stopped or "drives",
+            message=state.stopped or "nothing stops the rover",
             hardware_id=self._settings.rover.name,
-            values=[KeyValue(key="position", value=str(np.round(state.position, 3).tolist()))],
+            values=[KeyValue(key=key, value=json.dumps(value)) for key, value in said.items()],
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp = stamp
+        message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
     def _publish_map(self) -> None:
@@ -163,6 +185,10 @@ def _twist(speeds: tuple[float, float], stamp: Any) -> TwistStamped:
     message.header.stamp, message.header.frame_id = stamp, BASE_FRAME
     message.twist.linear.x, message.twist.angular.z = speeds
     return message
+
+
+def _stamp_of(twist: TwistStamped) -> tuple[int, int]:
+    return twist.header.stamp.sec, twist.header.stamp.nanosec
 
 
 def _transform(state: PlantState, frame_id: str, stamp: Any) -> TransformStamped:
@@ -183,12 +209,15 @@ def _make_broadcaster(node: Node) -> Any:
     return None
 
 
-def main(arguments: list[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
+    given = remove_ros_args(sys.argv if arguments is None else ["", *arguments])[1:]
+    engine = _parser().parse_args(given).engine
     rclpy.init(args=arguments)
     node = None
     try:
-        node = RoverSimulator()
+        overrides = [Parameter("engine", value=engine)] if engine else []
+        node = RoverSimulator(parameter_overrides=overrides)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()
@@ -202,6 +231,16 @@ def main(arguments: list[str] | None = None) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=NODE_NAME, description="A rover on a terrain, with the topics of a real one."
+    )
+    parser.add_argument(
+        "--engine", choices=ENGINES, help="what moves it; the same as the parameter engine"
+    )
+    return parser
 
 
 if __name__ == "__main__":

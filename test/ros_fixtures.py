@@ -76,8 +76,14 @@ class RosRun:
 def call(client, request, timeout: float = TIMEOUT):
     """Call a service and return its response."""
     assert client.wait_for_service(timeout), f"no service {client.srv_name}"
-    done = threading.Event()
-    future = client.call_async(request)
-    future.add_done_callback(lambda _: done.set())
-    assert done.wait(timeout), f"no answer from {client.srv_name}"
+    # A service is found before it has found who asks; on a busy machine its first answer may then
+    # be lost (it waits a tenth of a second only), so a question is asked twice before giving up.
+    for _ in range(2):
+        done = threading.Event()
+        future = client.call_async(request)
+        future.add_done_callback(lambda _, done=done: done.set())
+        if done.wait(timeout):
+            break
+        client.remove_pending_request(future)
+    assert future.done(), f"no answer from {client.srv_name}"
     return future.result()

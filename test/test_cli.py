@@ -40,6 +40,21 @@ SHAPES = {
     "traversable": (),
     "first_failure": (),
 }
+REPLAY_SHAPES = {
+    "poses": (N, 3),
+    "status": (N,),
+    "contact_points": (N, 6, 3),
+    "contact_angle": (N, 6),
+    "torque": (N, 6),
+    "friction": (N, 6),
+    "sinkage": (N, 6),
+    "motion_resistance": (N, 6),
+    "power": (N,),
+    "distance": (N,),
+    "wheel_drop": (N, 6),
+    "falling": (N, 6),
+}
+"""What the file holds beside the contract's arrays, for a replay."""
 
 
 @pytest.fixture
@@ -108,7 +123,7 @@ def test_prediction_has_every_array_of_the_contract(files):
     result = run(*arguments(files))
     assert (result.returncode, result.stderr, result.stdout) == (0, "", "")
     with np.load(files / "out.npz", allow_pickle=False) as out:
-        assert {name: out[name].shape for name in out.files} == SHAPES
+        assert {name: out[name].shape for name in out.files} == SHAPES | REPLAY_SHAPES
         assert out["settled"].dtype == bool
         assert out["traversable"].dtype == bool
         assert bool(out["traversable"])
@@ -275,7 +290,9 @@ GRADE_SHAPES = {
 def test_grades_and_torque_ranges_are_added_on_demand(files):
     assert main([*arguments(files), "--grade", "--torque-ranges"]) == 0
     with np.load(files / "out.npz", allow_pickle=False) as out:
-        assert {name: out[name].shape for name in out.files} == SHAPES | GRADE_SHAPES
+        assert {
+            name: out[name].shape for name in out.files
+        } == SHAPES | REPLAY_SHAPES | GRADE_SHAPES
         assert set(out["grade"]) == {"passable"}
         assert set(out["grade_constraint"]) <= {"friction", "torque", "wheel_lift"}
         assert set(out["grade_wheel"]) <= set(WHEELS)
@@ -298,7 +315,7 @@ def test_what_only_traction_control_passes_is_graded_so_under_either_policy(file
 def test_on_soil_the_file_has_sinkage_and_resistance_too(files):
     assert main([*arguments(files), "--soil", "dry_sand"]) == 0
     with np.load(files / "out.npz") as out:
-        assert set(out.files) == SHAPES.keys() | {"sinkage", "motion_resistance"}
+        assert set(out.files) == SHAPES.keys() | REPLAY_SHAPES.keys()
         assert out["sinkage"].shape == out["motion_resistance"].shape == (N, 6)
         assert (out["sinkage"] > 0.001).all()
         assert (out["motion_resistance"] > 0.5).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
-from grounds import make_terrain, waves
+from grounds import make_terrain, wall_at, waves
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from ros_fixtures import RosRun, wait_until
@@ -12,11 +12,11 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import imu_to_attitude
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.terrain import save_terrain
 from rover_planner.mission_planner import MissionPlanner
 from rover_planner.qos import map_qos, sensor_qos, topic_qos
-from rover_planner.rover_simulator import RoverSimulator
+from rover_planner.rover_simulator import RoverSimulator, main
 from rover_planner.traction_controller import TractionController
 from rover_planner.traverse_server import TraverseServer
 
@@ -120,3 +120,56 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     assert controller.statistics.fallbacks == 0
     for node in (simulator, server, controller, planner):
         assert ros.is_alive(node)
+
+
+def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(ros, terrain_file):
+    ear = Ear(ros)
+    simulator = start_simulator(ros, terrain_file, follow_commands=True)
+    controller = ros.spin(TractionController(context=ros.context))
+    wait_until(lambda: controller.statistics.updates > 5, "the controller to run")
+    twist = TwistStamped()
+    twist.twist.linear.x = 0.06
+    place = simulator.simulation.plant.pose()
+
+    def has_moved():
+        ear.commands.publish(twist)
+        return simulator.simulation.plant.pose()[0] > place[0] + 0.05
+
+    wait_until(has_moved, "the rover to move", 60.0)
+    assert simulator.simulation.steering[0] == 0.06
+    wait_until(lambda: simulator.simulation.steering[0] == 0.0, "the speeds to be forgotten")
+
+
+def test_diagnostics_come_though_nothing_happens_and_say_where_the_rover_is(ros, terrain_file):
+    ear = Ear(ros)
+    start_simulator(ros, terrain_file)
+    wait_until(lambda: len(ear.heard.get("/diagnostics", ())) >= 2, "diagnostics")
+    status = ear.heard["/diagnostics"][-1].status[0]
+    assert status.level == status.OK
+    assert status.values[0].key == "position"
+    assert status.values[0].value.startswith(f"[{START_X}, 0.0, ")
+
+
+def test_a_wall_ahead_stops_it_with_the_reason_in_the_diagnostics(ros, tmp_path):
+    ear = Ear(ros)
+    file = tmp_path / "wall.npz"
+    save_terrain(file, make_terrain(wall_at(0.0), half=3.0))
+    simulator = start_simulator(ros, str(file), start_x=-0.7)
+    twist = TwistStamped()
+    twist.twist.linear.x = 0.09
+
+    def says_why():
+        ear.commands.publish(twist)
+        told = ear.heard.get("/diagnostics", ())
+        return [m.status[0] for m in told if m.status[0].level == m.status[0].ERROR]
+
+    [status, *_] = wait_until(says_why, "the reason", 60.0)
+    assert any(wheel in status.message for wheel in WHEELS)
+    assert simulator.simulation.plant.pose()[0] < 0.0
+
+
+def test_an_engine_that_is_none_is_refused_by_the_command_line(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["--engine", "horses"])
+    assert ended.value.code == 2
+    assert "horses" in capsys.readouterr().err

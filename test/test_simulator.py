@@ -8,7 +8,9 @@ from rough_grounds import plane
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover import load_rover
 from rover_physics.sweep import sweep_path
+from rover_physics.traction_rows import BalanceWriter
 from rover_planner.errors import PlanningError
+from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_engine import MujocoPlant
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -157,3 +159,48 @@ def test_noise_is_of_the_size_it_says_and_goes_with_the_map():
     known = np.isfinite(true.elevation)
     assert np.std((seen.elevation - true.elevation)[known]) == pytest.approx(0.01, rel=0.1)
     assert np.all(seen.elevation_std[known] == 0.01)
+
+
+def test_torques_shared_well_carry_the_rover_where_equal_ones_would_slip():
+    ground = make_terrain(lambda x, y: 0.15 * np.clip(x / 0.1, 0.0, 1.0) + 0.0 * y, half=2.0)
+    way = np.linspace(-0.6, 0.2, 81)
+    poses = np.column_stack([way, np.zeros_like(way), np.zeros_like(way)])
+    needed = {
+        policy: sweep_path(LSR1, ground, poses, friction=0.4, policy=policy)
+        for policy in ("equal", "optimal")
+    }
+    assert np.nanmax(needed["equal"].friction_utilisation) > 1.05
+    assert np.nanmax(needed["optimal"].friction_utilisation) < 1.0
+    plant = QuasiStaticPlant(LSR1, ground, (-0.5, 0.0, 0.0), friction=0.4)
+    for _ in range(round(12.0 / STEP)):
+        here = sweep_path(LSR1, ground, plant.pose()[None], friction=0.4, policy="optimal")
+        push = 6.0 * (0.08 - plant.state().velocity[0]) * LSR1.total_mass
+        plant.pull(here.torque[0] + push * LSR1.wheel.radius / 6.0, 0.0, STEP)
+    assert plant.pose()[0] > 0.1
+
+
+def test_a_rover_whose_wheels_spin_says_so():
+    ground = make_terrain(lambda x, y: 0.3 * np.maximum(x, 0.0) + 0.0 * y, half=3.0)
+    plant = QuasiStaticPlant(LSR1, ground, (-0.6, 0.0, 0.0), friction=0.1)
+    for _ in range(1000):
+        plant.pull(np.full(6, 1.0), 0.0, STEP)
+        if plant.state().stopped:
+            break
+    assert "wheels slip and the rover stays: rear_right" in plant.state().stopped
+
+
+def test_driving_forces_are_those_of_the_model_where_the_torques_are():
+    ground = wavy()
+    here = sweep_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), policy="optimal")
+    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, here.torque[0], 0.0)
+    assert forces.push == pytest.approx(0.0, abs=0.01)
+    assert forces.loads == pytest.approx(here.wheel_loads[0], abs=0.05)
+    assert not forces.sliding.any()
+
+
+def test_more_torque_pushes_by_as_much_and_loads_the_rear_wheels():
+    here = sweep_path(LSR1, plane(0.0, 0.0, half=2.0), np.zeros((1, 3)))
+    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, np.full(6, 0.3), 0.0)
+    assert forces.push == pytest.approx(18.0, rel=1e-6)
+    assert forces.loads.sum() == pytest.approx(LSR1.weight)
+    assert forces.loads[0] > here.wheel_loads[0, 0]

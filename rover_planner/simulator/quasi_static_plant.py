@@ -3,7 +3,7 @@
 Told a speed, it goes there if the model says that it can, and stops where not, with the model's
 reason. Told torques, the balance decides: what the wheels pull beyond what holds the rover on its
 slope moves its mass along, and what a wheel pulls beyond its friction is lost as slip. That speed
-is the only thing that has inertia here.
+is the only thing that has inertia here. Limits of attitude, suspension, clearance hold for both.
 """
 
 from dataclasses import fields, replace
@@ -11,21 +11,27 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.errors import ModelError
 from rover_physics.limits import find_reasons
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover
+from rover_physics.soil import coulomb_slip
 from rover_physics.sweep import sweep_path
 from rover_physics.terrain import Terrain
-from rover_physics.traction_rows import BalanceWriter, MeasuredState
+from rover_physics.traction_rows import BalanceWriter
 from rover_planner.errors import PlanningError
+from rover_planner.simulator.driving_forces import DrivingForces, find_driving_forces
 from rover_planner.simulator.plant import PlantState, quaternion
 
 Floats = NDArray[np.float64]
 DRAG = 0.5
 """Share of its speed that a rover without torque loses each second beyond rolling: gears [1/s]."""
 MOST_SLIP = 0.95
+CREEP = 1e-4
+"""Speed below which it does not steer [m/s]."""
+LEAST_WAY, PATIENCE = 0.02, 2.0
+"""Way [m] that a rover has to make in so much time [s], or it is said to be stuck."""
+NO_LIMIT = 1e9
 
 
 class QuasiStaticPlant:
@@ -54,6 +60,9 @@ class QuasiStaticPlant:
         self._rover, self._terrain = rover, terrain
         self._friction, self._policy = friction, policy
         self._writer = BalanceWriter(rover)
+        self._mass = self._writer.weight / rover.gravity
+        limits = replace(rover.limits, friction_utilisation=NO_LIMIT, torque_saturation=NO_LIMIT)
+        self._without_force_limits = replace(rover, limits=limits)
         self._pose = np.array(pose, dtype=float)
         first = self._predict(self._pose[None])
         reason = self._why_not(first)
@@ -65,6 +74,7 @@ class QuasiStaticPlant:
         self._torques = np.zeros(6)
         self._speed, self._yaw_rate, self._duration = 0.0, 0.0, 1.0
         self._stopped = ""
+        self._anchor, self._stalled = self._pose.copy(), 0.0
 
     def pose(self) -> Floats:
         """Return x, y [m] and yaw [rad] (3,) of the body origin."""
@@ -77,50 +87,48 @@ class QuasiStaticPlant:
 
     def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
         """Let torques (6,) [N m] act for a time [s]; `yaw_rate` is what steering asks for."""
-        limit = self._rover.wheel.max_torque
+        wheel, limit = self._rover.wheel, self._rover.wheel.max_torque
         self._torques = np.clip(torques, -limit, limit)
-        push, sliding = self._net_push()
-        mass = self._rover.total_mass
-        speed = self._speed + (push / mass - DRAG * self._speed) * duration
-        top = self._rover.wheel.max_speed * self._rover.wheel.radius
+        forces = find_driving_forces(
+            self._writer, wheel.radius, self._here, self._torques, float(np.sign(self._speed))
+        )
+        speed = self._speed + (forces.push / self._mass - DRAG * self._speed) * duration
+        top = wheel.max_speed * wheel.radius
         speed = float(np.clip(speed, -top, top))
         if self._speed * speed < 0.0:
             speed = 0.0  # it comes to rest before it rolls the other way
-        turning = yaw_rate if abs(speed) > 1e-4 else 0.0
-        self._move(speed, turning, duration)
-        racing = np.sign(torques) * self._rover.wheel.max_speed
-        self._wheel_rates = np.where(sliding, racing, self._wheel_rates)
+        turning = yaw_rate if abs(speed) > CREEP else 0.0
+        self._move(speed, turning, duration, forces)
+        racing = np.sign(torques) * wheel.max_speed
+        self._wheel_rates = np.where(forces.sliding, racing, self._wheel_rates)
+        self._watch_stall(forces, duration)
 
-    def _net_push(self) -> tuple[float, NDArray[np.bool_]]:
-        """Return the force along the way beyond equilibrium [N], and which wheels slide (6,)."""
-        here = self._here
-        tractions = self._torques / self._rover.wheel.radius
-        most = np.sqrt(
-            np.clip((here.friction[0] * here.wheel_loads[0]) ** 2 - here.lateral[0] ** 2, 0, None)
-        )
-        sliding = np.abs(tractions) > most
-        tractions = np.clip(tractions, -most, most)
-        axis = _axis(here)
-        offsets = (here.contact_points[0] - here.wheel_centres[0]) @ axis
-        state = MeasuredState(
-            float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
-            here.bogie_angle[0], here.contact_angle[0], offsets,
-        )  # fmt: skip
-        try:
-            rows = self._writer.write(state, 0.0)
-        except ModelError:
-            return 0.0, sliding
-        needed = rows.complete(tractions / rows.force_unit)[:6] * rows.force_unit
-        return float((tractions - needed).sum()), sliding
+    def _watch_stall(self, forces: DrivingForces, duration: float) -> None:
+        """Say why the rover stays where it is though its motors do all they can."""
+        saturated = np.abs(self._torques) >= 0.999 * self._rover.wheel.max_torque
+        moved = float(np.hypot(*(self._pose - self._anchor)[:2]))
+        if moved > LEAST_WAY or not (forces.sliding.any() or saturated.any()):
+            self._anchor, self._stalled = self._pose.copy(), 0.0
+            return
+        self._stalled += duration
+        if self._stalled < PATIENCE or self._stopped:
+            return
+        if forces.sliding.any():
+            self._stopped = f"wheels slip and the rover stays: {forces.name_sliding()}"
+        else:
+            self._stopped = "motors saturate and the rover stays"
 
-    def _move(self, speed: float, yaw_rate: float, duration: float) -> None:
+    def _move(
+        self, speed: float, yaw_rate: float, duration: float, forces: DrivingForces | None = None
+    ) -> None:
+        """Go on if the model lets the rover; `forces` have decided already whether it holds."""
         self._stopped = ""
         middle = self._pose[2] + 0.5 * yaw_rate * duration
         step = speed * duration
         way = np.array([step * np.cos(middle), step * np.sin(middle), yaw_rate * duration])
         there = self._pose + way
-        moved = self._predict(np.vstack([self._pose, there]))
-        reason = self._why_not(moved) if step or yaw_rate else ""
+        moved = self._predict(np.vstack([self._pose, there]), forces is not None)
+        reason = self._why_not(moved, forces is not None) if step or yaw_rate else ""
         if reason:
             self._stopped, self._speed, self._yaw_rate = reason, 0.0, 0.0
             self._before, self._duration = self._here, duration
@@ -133,23 +141,40 @@ class QuasiStaticPlant:
         ahead = np.array([np.cos(middle), np.sin(middle), 0.0])
         rolled = np.copysign(np.linalg.norm(ways, axis=1), ways @ ahead)
         turned = rolled / self._rover.wheel.radius
-        turned /= 1.0 - np.clip(self._here.slip_ratio[0], 0.0, MOST_SLIP)
+        turned /= 1.0 - np.clip(self._slip(forces), 0.0, MOST_SLIP)
         self._spin += turned
         self._wheel_rates = turned / duration
 
-    def _predict(self, poses: Floats) -> PathPrediction:
+    def _slip(self, forces: DrivingForces | None) -> Floats:
+        """Return the slip ratios (6,): the model's, or on firm ground those of the forces."""
+        here = self._here
+        if forces is None or np.any(here.motion_resistance[0] > 0.0):
+            return here.slip_ratio[0]
+        return np.array([coulomb_slip(used) for used in forces.utilisation.tolist()])
+
+    def _predict(self, poses: Floats, pulled: bool = False) -> PathPrediction:
+        """Ask the model; about a rover that is pulled, what the best of torques could do."""
+        policy = "optimal" if pulled else self._policy
         return sweep_path(
-            self._rover, self._terrain, poses, friction=self._friction, policy=self._policy
+            self._rover, self._terrain, poses, friction=self._friction, policy=policy
         )
 
-    def _why_not(self, prediction: PathPrediction) -> str:
-        """Return why the way to the last of some poses is not open, empty where it is."""
-        _, reasons = find_reasons(self._rover, prediction)
-        between = prediction.between
-        if not reasons[-1] and between is not None and len(between.poses):
+    def _why_not(self, prediction: PathPrediction, pulled: bool = False) -> str:
+        """Return why the way to the last of some poses is not open, empty where it is.
+
+        Whether wheels hold at a pose is for the forces to say where the rover is pulled. On the
+        way over a face, which has no width here, it is for the best of all torques.
+        """
+        rover, between = self._rover, prediction.between
+        at_end = prediction
+        if pulled:
+            rover = self._without_force_limits
+            at_end = replace(prediction, wheel_loads=np.abs(prediction.wheel_loads))
+        reason = find_reasons(rover, at_end)[1][-1]
+        if not reason and between is not None and len(between.poses):
             _, on_the_way = find_reasons(self._rover, between)
             return next((reason for reason in on_the_way if reason), "")
-        return reasons[-1]
+        return reason
 
     def state(self) -> PlantState:
         """Return what can be measured now."""
@@ -191,13 +216,6 @@ def _last_row(prediction: PathPrediction) -> PathPrediction:
 def _suspension(prediction: PathPrediction) -> Floats:
     """Return the angles of SUSPENSION_JOINTS (4,) [rad]."""
     return np.concatenate([prediction.rocker_angle[0], prediction.bogie_angle[0]])
-
-
-def _axis(prediction: PathPrediction) -> Floats:
-    """Return the direction (3,) of the wheel axes, map frame."""
-    left = prediction.wheel_centres[0, 3:].mean(axis=0)
-    right = prediction.wheel_centres[0, :3].mean(axis=0)
-    return (left - right) / np.linalg.norm(left - right)
 
 
 def _body_rates(

@@ -134,6 +134,10 @@ class Simulation:
         """Take torques (6,) [N m] in wheel order."""
         self._torques, self._torques_at = torques, now
 
+    def has_speeds(self, now: float) -> bool:
+        """Tell whether commanded speeds are in force: fresh, and no path is followed."""
+        return self._follower is None and now - self._wanted_at <= self.settings.timeout
+
     @property
     def follows_path(self) -> bool:
         """Whether there is a path that is not done."""
@@ -157,8 +161,7 @@ class Simulation:
             if self._follower.has_arrived(pose):
                 self._follower = None
             return wanted
-        fresh = now - self._wanted_at <= self.settings.timeout
-        return self._wanted if fresh else (0.0, 0.0)
+        return self._wanted if self.has_speeds(now) else (0.0, 0.0)
 
     def look(self) -> Terrain:
         """Return what the sensor sees of the ground around the rover."""

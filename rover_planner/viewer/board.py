@@ -3,9 +3,20 @@
 import html
 import math
 
+import numpy as np
+
 from rover_physics.names import WHEELS
 from rover_physics.rover import Rover
-from rover_planner.viewer.colours import LOAD, PASSABLE, PULL, REFUSED, css, of_use
+from rover_planner.viewer.colours import (
+    LOAD,
+    NOTE,
+    PASSABLE,
+    PULL,
+    REFUSED,
+    UNKNOWN,
+    css,
+    of_use,
+)
 from rover_planner.viewer.journey import Frame
 
 WIDTH, HEIGHT = 330, 250
@@ -31,7 +42,9 @@ def draw_board(rover: Rover, frame: Frame, state: str) -> str:
         f'aria-label="rover from above" font-family="sans-serif" font-size="10">'
         f"{''.join(parts)}</svg>"
     )
-    return f'<div id="board">{picture}{_legend()}{_numbers(frame, state)}</div>'
+    return (
+        f'<div id="board" style="padding:0 8px">{picture}{_legend()}{_numbers(frame, state)}</div>'
+    )
 
 
 def _body() -> str:
@@ -51,20 +64,20 @@ def _wheel(frame: Frame, wheel: int, x: float, y: float, side: str) -> str:
     return (
         f'<rect x="{x - 11:.0f}" y="{y - 26:.0f}" width="22" height="52" rx="5" '
         f'fill="{css(of_use(use))}" stroke="#333"><title>{WHEELS[wheel]}: friction utilisation '
-        f"{use:.2f}</title></rect>"
+        f"{_number(use, 2)}</title></rect>"
         + _bar(bars, y, float(frame.torque_saturation[wheel]), css(LOAD), "torque saturation")
         + _bar(bars + 16, y, abs(float(frame.slip_ratio[wheel])), css(PULL), "slip ratio")
         + f'<text x="{x:.0f}" y="{y + 38:.0f}" text-anchor="middle" fill="currentColor">'
-        f"{load:.1f} N</text>"
+        f"{_number(load, 1)} N</text>"
     )
 
 
 def _bar(x: float, y: float, share: float, colour: str, what: str) -> str:
-    height = BAR * min(max(share, 0.0), 1.0)
+    height = BAR * min(max(np.nan_to_num(share), 0.0), 1.0)
     over = f' stroke="{css(REFUSED)}" stroke-width="2"' if share > 1.0 else ' stroke="#999"'
     return (
         f'<rect x="{x:.0f}" y="{y - BAR / 2:.1f}" width="12" height="{BAR}" fill="none"{over}>'
-        f"<title>{what} {share:.2f}</title></rect>"
+        f"<title>{what} {_number(share, 2)}</title></rect>"
         f'<rect x="{x:.0f}" y="{y + BAR / 2 - height:.1f}" width="12" height="{height:.1f}" '
         f'fill="{colour}"/>'
         f'<text x="{x + 6:.0f}" y="{y - BAR / 2 - 3:.0f}" text-anchor="middle" font-size="8" '
@@ -73,6 +86,8 @@ def _bar(x: float, y: float, share: float, colour: str, what: str) -> str:
 
 
 def _short(share: float) -> str:
+    if math.isnan(share):
+        return "?"
     return f"{share:.2f}".lstrip("0") if share < 1.0 else f"{min(share, 99.0):.1f}"
 
 
@@ -91,13 +106,13 @@ def _gauge(ratio: float, limit: float) -> str:
             f'fill="none" stroke="{colour}" stroke-width="6"/>'
         )
 
-    tip_x, tip_y = point(ratio, radius - 2)
+    tip_x, tip_y = point(0.0 if math.isnan(ratio) else ratio, radius - 2)
     return (
         arc(0.0, limit, css(REFUSED))
         + arc(limit, most, css(PASSABLE))
         + f'<line x1="{x}" y1="{y}" x2="{tip_x:.1f}" y2="{tip_y:.1f}" stroke="#222" '
         'stroke-width="2.5"/>'
-        f'<text x="{x}" y="{y + 12}" text-anchor="middle" fill="#333">{ratio:.2f}</text>'
+        f'<text x="{x}" y="{y + 12}" text-anchor="middle" fill="#333">{_number(ratio, 2)}</text>'
         f'<text x="{x}" y="{y + 24}" text-anchor="middle" font-size="8" fill="#333">'
         "stability margin</text>"
     )
@@ -132,8 +147,13 @@ def _numbers(frame: Frame, state: str) -> str:
     )
     return (
         '<div style="display:grid;grid-template-columns:1fr 1fr;font-size:13px;'
-        f'line-height:1.5;margin-top:.3em">{cells}</div><div id="state">{html.escape(state)}</div>'
+        f'line-height:1.5;margin-top:.3em">{cells}</div>'
+        f'<div id="state" style="font-size:13px">{html.escape(state)}</div>'
     )
+
+
+def _number(value: float, digits: int) -> str:
+    return "?" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def _centimetres(length: float) -> str:
@@ -145,18 +165,29 @@ def _tilt(frame: Frame) -> float:
     return math.acos(min(max(math.cos(roll) * math.cos(pitch), -1.0), 1.0))
 
 
-def describe_verdict(traversable: bool, reason: str, refusal: str, judged_in: float | None) -> str:
-    """Return verdict, its reason, what was refused last and the time it took [s] as HTML."""
-    colour = css(PASSABLE if traversable else REFUSED)
-    word = "traversable" if traversable else "not traversable"
+def say_nothing_to_show(state: str) -> str:
+    """Return the board for a rover that stands nowhere, and what is waited for."""
+    return f'<div id="board"><div id="state" style="padding:8px">{html.escape(state)}</div></div>'
+
+
+def describe_verdict(traversable: bool | None, reason: str, refusal: str, judged: str) -> str:
+    """Return a verdict as HTML.
+
+    Args:
+        traversable: The verdict, None where there is none.
+        reason: Why, or what else there is to say.
+        refusal: Why the last change was refused, empty if it was not.
+        judged: What was judged, and how long that took.
+    """
+    colour = css(UNKNOWN if traversable is None else PASSABLE if traversable else REFUSED)
+    word = {None: "no verdict", True: "traversable", False: "not traversable"}[traversable]
     text = f"<b>{word}</b>" + (f": {html.escape(reason)}" if reason else "")
     lines = [f'<div style="border-left:5px solid {colour};padding-left:.5em">{text}</div>']
     if refusal:
         lines.append(
-            f'<div id="refusal" style="border-left:5px solid {css(PULL)};padding-left:.5em">'
+            f'<div id="refusal" style="border-left:5px solid {css(NOTE)};padding-left:.5em">'
             f"refused: {html.escape(refusal)}</div>"
         )
-    if judged_in is not None:
-        took = f"judged in {1e3 * judged_in:.0f} ms"
-        lines.append(f'<div style="opacity:.7;font-size:11px">{took}</div>')
-    return f'<div id="verdict" style="font-size:13px">{"".join(lines)}</div>'
+    if judged:
+        lines.append(f'<div style="opacity:.7;font-size:11px">{html.escape(judged)}</div>')
+    return f'<div id="verdict" style="font-size:13px;padding:0 8px">{"".join(lines)}</div>'

@@ -3,20 +3,26 @@
 import numpy as np
 from numpy.typing import NDArray
 
-PASSABLE = (0, 158, 115)
-"""Bluish green: a path that can be driven."""
-CHOSEN = (0, 114, 178)
-"""Blue: the path that is shown."""
+Colour = tuple[int, int, int]
+
+PASSABLE = (0, 114, 178)
+"""Blue: a path that can be driven, as in the pictures of the demo."""
 REFUSED = (213, 94, 0)
 """Vermillion: a path that is refused, and where."""
 LOAD = (86, 180, 233)
 """Sky blue: normal forces, torque saturation."""
 PULL = (230, 159, 0)
 """Orange: tangential forces, slip."""
+NOTE = (204, 121, 167)
+"""Reddish purple: what was refused to the visitor."""
+MIDDLE = (240, 228, 66)
+"""Yellow, half-way from blue to vermillion."""
 METAL, DARK, BODY = (150, 155, 160), (50, 52, 56), (225, 220, 205)
 UNKNOWN = (110, 110, 110)
-WHEELS = ("#0072b2", "#56b4e9", "#009e73", "#d55e00", "#e69f00", "#cc79a7")
-"""One for each wheel in the plots, in wheel order."""
+WHEELS = ("#0072b2", "#e69f00", "#cc79a7", "#0072b2", "#e69f00", "#cc79a7")
+"""One for the rear, middle and front wheels in the plots, in wheel order."""
+SIDE_DASHES = ((), (5.0, 3.0))
+"""Lines of the right side are drawn through, those of the left are dashed."""
 
 
 def ramp(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
@@ -30,15 +36,24 @@ def ramp(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uin
     return colours
 
 
-def of_use(share: float) -> tuple[int, int, int]:
-    """Return the colour of a share of friction: blue where little is used, vermillion at 1."""
+def of_use(share: float) -> Colour:
+    """Return the colour of a share of friction: blue where little is used, vermillion at 1.
+
+    Grey where it is not known.
+    """
+    if np.isnan(share):
+        return UNKNOWN
     t = float(np.clip(share, 0.0, 1.0))
-    low, middle, high = np.array(CHOSEN), np.array((240, 228, 66)), np.array(REFUSED)
-    mixed = low + 2 * t * (middle - low) if t < 0.5 else middle + (2 * t - 1) * (high - middle)
-    red, green, blue = np.round(mixed).astype(int).tolist()
+    return mix(PASSABLE, MIDDLE, 2 * t) if t < 0.5 else mix(MIDDLE, REFUSED, 2 * t - 1)
+
+
+def mix(first: Colour, second: Colour, share: float) -> Colour:
+    """Return a colour that is so much of the second, 0 to 1, and else of the first."""
+    start, end = np.array(first), np.array(second)
+    red, green, blue = np.round(start + share * (end - start)).astype(int).tolist()
     return red, green, blue
 
 
-def css(colour: tuple[int, int, int]) -> str:
+def css(colour: Colour) -> str:
     """Return a colour as web pages write it."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

@@ -91,10 +91,15 @@ class Journey:
         # A wheel that lifts off needs infinite friction; no picture can show more than this.
         return {name: np.clip(np.nan_to_num(values), -1e6, 1e6) for name, values in series.items()}
 
+    @staticmethod
+    def empty_times() -> Floats:
+        """Return the times of a journey that has not begun."""
+        return np.zeros(1)
+
     @property
     def times(self) -> Floats:
         """(length,) times of the waypoints [s]."""
-        return self._series["time"] if self.length else np.zeros(1)
+        return self._series["time"] if self.length else self.empty_times()
 
     @property
     def duration(self) -> float:

@@ -1,13 +1,16 @@
 """A node that listens to a rover and its planner, and keeps the latest for the page."""
 
+import contextlib
 import math
 import threading
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry, Path
+from nav_msgs.srv import GetPlan
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -16,7 +19,7 @@ from std_msgs.msg import Float64MultiArray
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.errors import MessageError
-from msg_adapters.paths import path_to_poses, yaw_from_quaternion
+from msg_adapters.paths import path_to_poses, stamped_pose, yaw_from_quaternion
 from msg_adapters.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
@@ -32,6 +35,30 @@ MEASURED = {"wheel_loads": "wheel_loads", "friction_utilisation": "friction_util
 """Topics of the controller, which count more than what was predicted."""
 
 
+@dataclass(frozen=True)
+class LiveVerdict:
+    """What the server said last."""
+
+    traversable: bool
+    """Whether there is a path that the rover can drive."""
+    reason: str
+    """Why not, or what else it said."""
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """What was heard last; None for what did not come."""
+
+    state: LiveState
+    """The rover."""
+    terrain: Terrain | None
+    """The map."""
+    plan: np.ndarray | None
+    """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
+    verdict: LiveVerdict | None
+    """The verdict on what the server was asked for."""
+
+
 class LiveListener(Node):
     """Keeps the latest state, map, plan and verdict; bad messages are passed over with a word."""
 
@@ -44,9 +71,10 @@ class LiveListener(Node):
         self._predicted: dict[str, np.ndarray] = {}
         self._terrain: Terrain | None = None
         self._plan: np.ndarray | None = None
-        self._verdict = ""
+        self._verdict: LiveVerdict | None = None
         self._measured: set[str] = set()
         self._first_time: float | None = None
+        self._planner = self.create_client(GetPlan, f"{SERVER}/can_traverse")
         sensors = sensor_qos()
         self.create_subscription(JointState, "joint_states", self._take_joints, sensors)
         self.create_subscription(Odometry, "odometry", self._take_odometry, sensors)
@@ -68,23 +96,45 @@ class LiveListener(Node):
             Float64MultiArray, f"{CONTROLLER}/contact_angles", self._take_angles, topic_qos()
         )
 
-    def latest(self) -> tuple[LiveState, Terrain | None, np.ndarray | None, str]:
-        """Return state, map, plan (n, 3) and verdict; None or "" for what did not come."""
+    def latest(self) -> Heard:
+        """Return what was heard last."""
         with self._lock:
             self._fill_from_prediction()
-            return self._state, self._terrain, self._plan, self._verdict
+            return Heard(self._state.copy(), self._terrain, self._plan, self._verdict)
+
+    def ask_for(self, place: np.ndarray) -> str:
+        """Ask the server for a plan from where the rover is to a place (2,) [m].
+
+        Returns:
+            Why it can't be asked, empty if it was; plan and verdict come on their topics.
+        """
+        with self._lock:
+            state = self._state.copy()
+        if state.position is None:
+            return "no odometry yet, so it is not known where to start"
+        if not self._planner.service_is_ready():
+            return f"no {SERVER}/can_traverse to ask"
+        yaw = float(np.arctan2(*(np.asarray(place) - state.position[:2])[::-1]))
+        start = (*state.position[:2], state.attitude[2])
+        request = GetPlan.Request(
+            start=stamped_pose(start, self._frame), goal=stamped_pose((*place, yaw), self._frame)
+        )
+        self._planner.call_async(request)
+        return ""
 
     def _fill_from_prediction(self) -> None:
         """Take from the plan what nothing measures, at the waypoint nearest to the rover."""
-        if self._plan is None or self._state.position is None or not len(self._plan):
+        state = self._state
+        if self._plan is None or state.position is None:
             return
-        away = np.hypot(*(self._plan[:, :2] - self._state.position[:2]).T)
+        away = np.hypot(*(self._plan[:, :2] - state.position[:2]).T)
         share = int(np.argmin(away)) / max(len(away) - 1, 1)
         for field, rows in self._predicted.items():
             if field in self._measured or not len(rows):
                 continue
-            row = np.nan_to_num(rows[round(share * (len(rows) - 1))])
-            setattr(self._state, field, float(row[0]) if field == "tip_over_ratio" else row)
+            row = rows[round(share * (len(rows) - 1))]
+            setattr(state, field, float(row[0]) if field == "tip_over_ratio" else row)
+            state.forces_from = state.forces_from or "forces as the server predicted them"
 
     def _take_joints(self, state: JointState) -> None:
         with self._lock:
@@ -148,8 +198,11 @@ class LiveListener(Node):
             self._plan = poses
 
     def _take_verdict(self, verdict: DiagnosticArray) -> None:
-        with self._lock:
-            self._verdict = verdict.status[0].message if verdict.status else ""
+        if verdict.status:
+            status = verdict.status[0]
+            passable = status.level != DiagnosticStatus.ERROR
+            with self._lock:
+                self._verdict = LiveVerdict(passable, status.message)
 
     def _take_angles(self, message: Float64MultiArray) -> None:
         if len(message.data) >= 6:
@@ -173,27 +226,40 @@ class LiveListener(Node):
             if len(message.data) == 6:
                 with self._lock:
                     self._measured.add(field)
-                    setattr(self._state, field, np.nan_to_num(np.array(message.data)))
+                    setattr(self._state, field, np.array(message.data))
+                    self._state.forces_from = "forces as the traction controller estimates them"
 
         return take
 
 
-def following(page: Any, context: Context | None = None) -> LiveListener:
-    """Let a page follow a live graph, by a node that is spun in the background."""
-    context = context or rclpy.get_default_context()
-    if not context.ok():
-        rclpy.init(context=context)
-    listener = LiveListener(context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(listener)
+class LiveLink:
+    """A listener that is spun in the background until it is closed."""
 
-    def spin() -> None:
-        try:
-            while context.ok():
-                executor.spin_once(timeout_sec=0.2)
-        except ExternalShutdownException:
-            return
+    def __init__(self, map_frame: str = "map", context: Context | None = None):
+        """Start to listen; without a context one of its own is made, and ended with it."""
+        self._own = context is None
+        self._context = context or Context()
+        if self._own:
+            rclpy.init(context=self._context)
+        self.listener = LiveListener(map_frame, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.listener)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
 
-    threading.Thread(target=spin, daemon=True).start()
-    page.follow(listener)
-    return listener
+    def close(self) -> None:
+        """Stop listening."""
+        self._ended.set()
+        self._executor.wake()
+        self._thread.join(5.0)
+        self._executor.shutdown()
+        self.listener.destroy_node()
+        if self._own:
+            self._context.try_shutdown()
+
+    def _spin(self) -> None:
+        # Not executor.spin(): now and then that sleeps through executor.shutdown().
+        with contextlib.suppress(ExternalShutdownException):
+            while not self._ended.is_set():
+                self._executor.spin_once(timeout_sec=0.2)

@@ -1,6 +1,7 @@
 """A rover as its topics tell of it: the latest of everything, as a frame of the page."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +16,13 @@ from rover_planner.viewer.journey import Frame
 Floats = NDArray[np.float64]
 
 
-def _six() -> Floats:
-    return np.zeros(6)
+def _unknown() -> Floats:
+    return np.full(6, np.nan)
 
 
 @dataclass
 class LiveState:
-    """The latest values; zero for what nothing tells of."""
+    """The latest values; NaN for what nothing tells of."""
 
     position: Floats | None = None
     """(3,) body origin [m], map frame; None before odometry came."""
@@ -33,22 +34,28 @@ class LiveState:
     """Angles [rad] by joint name."""
     efforts: dict[str, float] = field(default_factory=dict)
     """Torques [N m] by joint name."""
-    wheel_loads: Floats = field(default_factory=_six)
+    wheel_loads: Floats = field(default_factory=_unknown)
     """(6,) [N]"""
-    friction_utilisation: Floats = field(default_factory=_six)
+    friction_utilisation: Floats = field(default_factory=_unknown)
     """(6,)"""
-    slip_ratio: Floats = field(default_factory=_six)
+    slip_ratio: Floats = field(default_factory=_unknown)
     """(6,)"""
-    contact_angles: Floats = field(default_factory=_six)
-    """(6,) [rad]"""
-    tip_over_ratio: float = 1.0
+    contact_angles: Floats = field(default_factory=lambda: np.zeros(6))
+    """(6,) where the wheels touch, from their lowest points [rad]; 0 until something tells."""
+    tip_over_ratio: float = math.nan
     """Stability margin."""
+    forces_from: str = ""
+    """Where the forces come from, empty where nothing tells of them."""
     time: float = 0.0
     """Since the first message [s]."""
     distance: float = 0.0
     """Way since then [m]."""
     energy: float = 0.0
     """Work of the wheels since then [J]."""
+
+    def copy(self) -> "LiveState":
+        """Return a copy that no message changes any more."""
+        return replace(self, joints=dict(self.joints), efforts=dict(self.efforts))
 
 
 class LiveFigure:
@@ -73,7 +80,7 @@ class LiveFigure:
         radius = self._rover.wheel.radius
         s, c = np.sin(state.contact_angles)[:, None], np.cos(state.contact_angles)[:, None]
         contacts = centres + radius * (s * self._placement.forward - c * self._placement.up)
-        torques = np.array([state.efforts.get(name, 0.0) for name in WHEEL_JOINTS])
+        torques = np.array([state.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
         return Frame(
             time=state.time,
             distance=state.distance,

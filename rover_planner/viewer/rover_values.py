@@ -1,9 +1,9 @@
 """The values of a rover that can be changed while it is watched: names, units and ranges."""
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -49,55 +49,63 @@ def _plain(value: Any) -> Any:
 
 def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
     """List what can be changed of a rover, by the part that it belongs to."""
-    data, length = rover_to_dict(rover), rover.suspension.wheels["front"][0]
+    data = rover_to_dict(rover)
+    span = abs(rover.suspension.wheels["front"][0])
     radius = rover.wheel.radius
 
-    def value(label: str, unit: str, *key: str | int, span: float | None = None) -> RoverValue:
-        now = float(get_value(data, key))
-        if span is None:
-            low, high = 0.25 * now, 2.5 * now
-        else:
-            low, high = now - span, now + span
-        step = 10.0 ** (len(str(int((high - low) * 1000))) - 6)
-        return RoverValue((key,), f"{label} [{unit}]", _tidy(low, step), _tidy(high, step), step)
+    def length(label: str, *key: str | int, reach: float) -> RoverValue:
+        now = get_value(data, key)
+        return _make_value((key,), f"{label} [m]", now, now - reach, now + reach)
+
+    def amount(label: str, unit: str, *key: str | int, top: float = 0.0) -> RoverValue:
+        now = get_value(data, key)
+        return _make_value((key,), f"{label} [{unit}]", now, 0.2 * now, max(2.5 * now, top))
 
     names = ("rear", "middle", "front")
-    height = value("wheel height", "m", "suspension", "wheels", "rear", 2, span=1.5 * radius)
+    height = length("wheels z", "suspension", "wheels", "rear", 2, reach=1.5 * radius)
     all_wheels = tuple(("suspension", "wheels", name, 2) for name in names)
     wheels = [
-        value(f"{name} wheel x", "m", "suspension", "wheels", name, 0, span=abs(length))
-        for name in names
+        length(f"{name} wheel x", "suspension", "wheels", name, 0, reach=span) for name in names
     ]
-    return {
+    values = {
+        "Ground and drive": [
+            amount("friction", "-", "friction"),
+            amount("torque limit", "N m", "wheel", "max_torque"),
+            amount("speed", "m/s", "nominal_speed"),
+            amount("gravity", "m/s^2", "gravity"),
+        ],
         "Links": [
-            value("bogie pivot x", "m", "suspension", "bogie_pivot", 0, span=0.5 * abs(length)),
-            value("bogie pivot z", "m", "suspension", "bogie_pivot", 2, span=1.5 * radius),
+            length("bogie pivot x", "suspension", "bogie_pivot", 0, reach=span),
+            length("bogie pivot z", "suspension", "bogie_pivot", 2, reach=1.5 * radius),
             *wheels,
             dataclasses.replace(height, keys=all_wheels),
         ],
         "Wheels": [
-            value("radius", "m", "wheel", "radius"),
-            value("width", "m", "wheel", "width"),
-            value("torque limit", "N m", "wheel", "max_torque"),
-            value("mass", "kg", "wheel", "mass"),
+            amount("radius", "m", "wheel", "radius"),
+            amount("width", "m", "wheel", "width"),
         ],
         "Masses": [
-            value("body", "kg", "masses", "body", "mass"),
-            value("body centre x", "m", "masses", "body", "com", 0, span=0.5 * abs(length)),
-            value("body centre z", "m", "masses", "body", "com", 2, span=2.0 * radius),
-            value("rocker", "kg", "masses", "rocker", "mass"),
-            value("bogie", "kg", "masses", "bogie", "mass"),
-        ],
-        "Drive": [
-            value("friction", "-", "friction"),
-            value("speed", "m/s", "nominal_speed"),
-            value("gravity", "m/s^2", "gravity"),
+            amount("body", "kg", "masses", "body", "mass"),
+            length("body centre x", "masses", "body", "com", 0, reach=span),
+            length("body centre z", "masses", "body", "com", 2, reach=2.0 * radius),
+            amount("rocker", "kg", "masses", "rocker", "mass", top=1.0),
+            amount("bogie", "kg", "masses", "bogie", "mass", top=1.0),
+            amount("wheel", "kg", "wheel", "mass", top=1.0),
         ],
     }
+    if rover.manipulator is not None:
+        payload = amount("payload", "kg", "manipulator", "payload", top=0.4 * rover.total_mass)
+        values["Masses"].append(payload)
+    return values
 
 
-def _tidy(value: float, step: float) -> float:
-    return round(round(value / step) * step, 9)
+def _make_value(
+    keys: tuple[Key, ...], label: str, now: float, low: float, high: float
+) -> RoverValue:
+    """Return a value whose range is some hundred steps of one digit, `now` inside it."""
+    step = 10.0 ** math.floor(math.log10(0.005 * (high - low)))
+    low, high = math.floor(low / step + 0.01) * step, math.ceil(high / step - 0.01) * step
+    return RoverValue(keys, label, round(min(low, now), 9), round(max(high, now), 9), step)
 
 
 def get_value(data: Mapping[str, Any], key: Key) -> float:
@@ -140,15 +148,3 @@ def read_rover(text: str, source: str) -> Rover:
     except yaml.YAMLError as error:
         raise PlanningError(f"{source} is no YAML: {' '.join(str(error).split())}") from None
     return rover_from_dict(data, source)
-
-
-def save_rover(rover: Rover, path: Path) -> None:
-    """Write a rover file.
-
-    Raises:
-        PlanningError: The file cannot be written.
-    """
-    try:
-        path.write_text(write_rover(rover), encoding="utf-8")
-    except OSError as error:
-        raise PlanningError(f"cannot write {path}: {error.strerror}") from None

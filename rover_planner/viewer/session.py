@@ -4,6 +4,7 @@ import dataclasses
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from rover_planner.path_query import (
     PathQueryOptions,
     answer_path_query,
     check_path,
+    choose,
 )
 from rover_planner.viewer.journey import Journey
 from rover_planner.viewer.rover_values import Key, with_value
@@ -36,8 +38,8 @@ class Shown:
     """The path."""
     journey: Journey
     """What is played of it."""
-    judged_in: float
-    """How long the model took [s]."""
+    judged: str
+    """What was judged for it and how long that took; empty where nothing was."""
 
     @property
     def verdict(self) -> Verdict:
@@ -67,24 +69,46 @@ class ViewSession:
         self.arm_angles: dict[str, float] = {}
         self.refusal = ""
         """Why the last change was refused, empty where it was not."""
+        self.recorded = False
+        """Whether the path is a recorded one, so that no other is planned for it."""
         self.answer: PathAnswer
         self.shown: Shown
         self._plan()
 
     def _plan(self) -> None:
+        """Judge the candidate paths, or the one path where a recorded one is looked at."""
         began = time.perf_counter()
-        self.answer = answer_path_query(
-            self.rover, self.terrain, self.start, self.goal, self.options, self.arm_angles
-        )
-        self._show(self.answer.chosen, time.perf_counter() - began)
+        if self.recorded:
+            poses = self.shown.candidate.poses
+            only = check_path(self.rover, self.terrain, poses, self.options, self.arm_angles)
+            self.answer = choose((only,))
+        else:
+            self.answer = answer_path_query(
+                self.rover, self.terrain, self.start, self.goal, self.options, self.arm_angles
+            )
+        passable = sum(one.verdict.traversable for one in self.answer.candidates)
+        total = len(self.answer.candidates)
+        words = f"{passable} of {total} candidate paths passable, judged in"
+        if self.recorded:
+            words = "recorded path judged again in"
+        self._show(self.answer.chosen, f"{words} {_milliseconds(began)}")
 
-    def _show(self, candidate: Candidate, taken: float) -> None:
+    def _show(self, candidate: Candidate, judged: str) -> None:
         journey = Journey(self.rover, candidate.prediction, candidate.verdict)
-        self.shown = Shown(candidate, journey, taken)
+        self.shown = Shown(candidate, journey, judged)
+
+    def model_arguments(self) -> dict[str, Any]:
+        """Return the arguments of `sweep_path` that hold now."""
+        options = self.options
+        return {
+            **options.ground_and_load(),
+            "policy": options.policy,
+            "joint_angles": self.arm_angles,
+        }
 
     def show_candidate(self, index: int) -> None:
         """Show another candidate of the last answer, by its index."""
-        self._show(self.answer.candidates[index], self.shown.judged_in)
+        self._show(self.answer.candidates[index], self.shown.judged)
 
     def plan_to(self, goal: NDArray[np.float64]) -> bool:
         """Plan to a place (2,) [m], arriving on the straight way; return whether it was taken."""
@@ -98,7 +122,7 @@ class ViewSession:
         return self._take_places(placed, (self.goal[0], self.goal[1], yaw))
 
     def _take_places(self, start: Pose, goal: Pose) -> bool:
-        return self._try(start=start, goal=goal)
+        return self._try(start=start, goal=goal, recorded=False)
 
     def take_options(self, **changes: object) -> bool:
         """Change fields of PathQueryOptions and plan anew; return whether it was taken."""
@@ -155,7 +179,8 @@ class ViewSession:
             self.refusal = str(error)
             return False
         self.rover, self.arm_angles, self.refusal = rover, arm_angles, ""
-        self._show(candidate, time.perf_counter() - began)
+        words = f"path of {candidate.length:.1f} m judged again in {_milliseconds(began)}"
+        self._show(candidate, words)
         return True
 
     def replay(self, prediction: PathPrediction, reasons: Sequence[str]) -> None:
@@ -170,11 +195,23 @@ class ViewSession:
         )
         candidate = Candidate(prediction.poses, prediction, verdict, (0.0, 0.0))
         self.answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
-        self._show(candidate, 0.0)
+        self.start, self.goal = (_as_pose(prediction.poses[row]) for row in (0, -1))
+        self.recorded = True
+        self._show(candidate, "recorded")
 
     def plan_again(self) -> bool:
         """Judge all candidates anew, after the rover was changed; return whether that worked."""
         return self._try()
+
+
+def _milliseconds(began: float) -> str:
+    """Return the time since `began` as text."""
+    return f"{1e3 * (time.perf_counter() - began):.0f} ms"
+
+
+def _as_pose(pose: NDArray[np.float64]) -> Pose:
+    x, y, yaw = pose.tolist()
+    return x, y, yaw
 
 
 def _facing(start: Pose, goal: NDArray[np.float64]) -> Pose:
