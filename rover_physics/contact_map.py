@@ -59,7 +59,7 @@ class MapContactFinder:
             ModelError: A wheel is beyond the map, over unknown ground, or not near the ground.
         """
         q = np.array([pose[2], state.roll, state.pitch, state.rocker_angle, *state.bogie_angles])
-        angles, gaps, pose = np.full(6, np.nan), np.empty(6), np.asarray(pose, dtype=float)
+        angles, gaps, pose = np.zeros(6), np.empty(6), np.asarray(pose, dtype=float)
         _find_angles(
             self._grid, self._linkages, self._placements, 1.0 if forward else -1.0, pose, q,
             self._found, gaps, angles,

@@ -14,8 +14,11 @@ The cone sqrt(T^2 + S^2) <= u mu N is nothing that a quadratic programme can hol
   smallest peak is found by a sequence of programmes, as Dinkelbach does for ratios. A controller,
   whose last answer is near, needs one or two of them.
 - The cone is round. It is replaced by SIDES of its tangents, one of them where the last forces
-  point. Where the sequence settles that is exact; elsewhere the polygon is outside the cone, by
-  15 % at most, so what is reported is the utilisation by the round cone.
+  point. Where the sequence settles that is exact; elsewhere the polygon is outside the cone.
+
+So an answer is looked at by the round cone and the product, both from the last forces on towards
+it, and the best place on that line is taken (`traction_merit`): the peak never rises from one
+programme to the next, and what is reported is the utilisation by the round cone.
 
 The change from the last forces is weighed as well: it makes the programme well conditioned, and
 it vanishes where the sequence settles, so that it costs nothing there (a proximal point method).
@@ -33,7 +36,7 @@ from rover_physics.errors import ModelError
 from rover_physics.kernels import kernel
 from rover_physics.traction_rows import WHEEL_COUNT, BalanceRows
 
-SIDES = 6
+SIDES = 4
 """Tangents around each friction cone."""
 SHARE, SLOPE, PEAK = 12, 13, 14
 """Columns of s0, s1 and u; before them T and N."""
@@ -146,7 +149,7 @@ def check_limits(friction: np.ndarray, most_pull: float) -> None:
 def _write_start(last, peak, unit, scale, shift, start):
     """Write the units of the variables, and the last answer in them."""
     for k in range(VARIABLES):
-        scale[k] = peak if k == PEAK or k == FRICTION_SLACK else unit
+        scale[k] = peak if k in (PEAK, FRICTION_SLACK) else unit
         start[k] = (last[k] - shift[k]) / unit if k < PEAK else 0.0
     start[PEAK] = 1.0
 
@@ -156,7 +159,7 @@ def _write_costs(peak, effort, change, slack, start, P, q):
     """Write the diagonal and the linear part of the cost."""
     for k in range(VARIABLES):
         P[k], q[k] = REGULARISATION, 0.0
-        if k < 6 or k == SHARE or k == SLOPE:
+        if k < 6 or k in (SHARE, SLOPE):
             P[k] = change + (effort if k < 6 else REGULARISATION)
             q[k] = -change * start[k]
         if k >= FRICTION_SLACK:

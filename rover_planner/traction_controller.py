@@ -20,7 +20,13 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
-from msg_adapters.commands import effort_commands, joint_order, twist_to_speeds, wheel_values
+from msg_adapters.commands import (
+    effort_commands,
+    joint_order,
+    set_values,
+    twist_to_speeds,
+    wheel_values,
+)
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
@@ -98,6 +104,11 @@ class TractionController(Node):
         self._used = self.create_publisher(Float64MultiArray, "~/friction_utilisation", qos)
         self._angles = self.create_publisher(Float64MultiArray, "~/contact_angles", qos)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos)
+        # Messages are filled anew, not made anew: publishing copies them.
+        zeros = np.zeros(len(WHEEL_JOINTS))
+        self._contacts = np.zeros((2, len(WHEEL_JOINTS)))
+        self._efforts, self._of_wheels = effort_commands(zeros, self._order), wheel_values(zeros)
+        self._of_contacts = wheel_values(self._contacts, "angle, deviation")
 
     def _create_subscriptions(self) -> None:
         qos = sensor_qos()
@@ -163,16 +174,20 @@ class TractionController(Node):
         except Exception as error:
             # A fault of this program must not leave the wheels with their last torque.
             update = self._service.rest(f"internal error: {type(error).__name__}: {error}")
-        self._commands.publish(effort_commands(update.torques, self._order))
+        self._send(self._commands, self._efforts, update.torques[self._order])
         if update.answer is not None and update.estimate is not None:
             estimate, answer = update.estimate, update.answer
-            self._loads.publish(wheel_values(answer.loads))
-            self._used.publish(wheel_values(answer.utilisation))
-            deviations = np.sqrt(np.diag(estimate.covariance))
-            angles = np.array([estimate.angles, deviations])
-            self._angles.publish(wheel_values(angles, "angle, deviation"))
+            self._send(self._loads, self._of_wheels, answer.loads)
+            self._send(self._used, self._of_wheels, answer.utilisation)
+            self._contacts[0] = estimate.angles
+            np.sqrt(estimate.covariance.diagonal(), out=self._contacts[1])
+            self._send(self._angles, self._of_contacts, self._contacts)
         self._statistics.take(update, start, time.perf_counter())
         self._tell(update)
+
+    def _send(self, publisher, message: Float64MultiArray, values: np.ndarray) -> None:
+        set_values(message, values)
+        publisher.publish(message)
 
     def _tell(self, update: TractionUpdate) -> None:
         """Say once what changed."""
