@@ -13,6 +13,7 @@ import rclpy.logging
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -37,6 +38,7 @@ from msg_adapters.traction_status import traction_diagnostics
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters import TRACTION_CONTROLLER, check_changes, declare_parameters
 from rover_planner.qos import map_subscriptions_qos, sensor_qos, topic_qos
+from rover_planner.realtime import take_priority
 from rover_planner.refusals import BAD_INPUT
 from rover_planner.traction_service import (
     TractionService,
@@ -48,6 +50,8 @@ from rover_planner.traction_statistics import TractionStatistics
 NODE_NAME = "traction_controller"
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 DIAGNOSTICS_PERIOD = 1.0
+ARRIVAL_TIME = Duration(seconds=0.2)
+"""Longest wait for the zeros of a node that ends to arrive."""
 
 
 class TractionController(Node):
@@ -76,10 +80,17 @@ class TractionController(Node):
         """Times, counts and what came last."""
         return self._statistics
 
+    def take_priority(self) -> None:
+        """Let this process run before others, if a parameter asks for it; say so if it can't."""
+        refusal = take_priority(self._values["realtime_priority"])
+        if refusal:
+            self.get_logger().warning(refusal)
+
     def stop(self) -> None:
-        """Send zero torques and update no more."""
+        """Send zero torques, wait until they have arrived, and update no more."""
         self._timer.cancel()
-        self._commands.publish(effort_commands(np.zeros(len(WHEEL_JOINTS)), self._order))
+        self._send(self._commands, self._efforts, np.zeros(len(WHEEL_JOINTS)))
+        self._commands.wait_for_all_acked(ARRIVAL_TIME)
 
     def destroy_node(self) -> None:
         """Send zero torques and end."""
@@ -236,6 +247,7 @@ def main(arguments: list[str] | None = None) -> int:
             "compiling kernels; the first start takes longest"
         )
         node = TractionController()
+        node.take_priority()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         gc.collect()

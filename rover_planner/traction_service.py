@@ -219,6 +219,10 @@ class TractionService:
             rows, warning = self._writer.write(self._level_state(), push), str(error)
         answer = self._share(rows)
         torques = self._finish(answer, rows, duration)
+        if not np.isfinite(torques).all():
+            return self.rest(
+                f"torques {torques.tolist()} N m came out; they must be finite", start
+            )
         return TractionUpdate(torques, "", warning, answer, estimate, time.perf_counter() - start)
 
     def rest(self, fault: str, start: float | None = None) -> TractionUpdate:
