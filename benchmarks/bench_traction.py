@@ -17,6 +17,8 @@ from rover_planner.qos import topic_qos
 
 RATE = 100.0
 DURATION = 60.0
+PRIORITY = 50
+"""Of the controller (SCHED_FIFO), as ros2_control has it; where it is not granted, none."""
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
 
 
@@ -55,7 +57,7 @@ def measure() -> list[Figure]:
         reader = DiagnosticsReader(planner.node)
         processes.start_server(ground, candidate_count=1)
         planner.ask(SERVER, START, GOAL)
-        processes.start_rover(ground, RATE, START)
+        processes.start_rover(ground, RATE, START, PRIORITY)
         before = reader.wait_for_updates(int(RATE))
         stop = threading.Event()
         asked = threading.Thread(target=_ask_on, args=(planner, stop))

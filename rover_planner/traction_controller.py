@@ -36,6 +36,8 @@ from msg_adapters.joints import joint_positions, joint_velocities
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.traction_status import traction_diagnostics
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.terrain import Terrain
+from rover_planner.map_intake import MapIntake, PreparedMap, prepare_map
 from rover_planner.parameters import TRACTION_CONTROLLER, check_changes, declare_parameters
 from rover_planner.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.realtime import take_priority
@@ -50,6 +52,8 @@ from rover_planner.traction_statistics import TractionStatistics
 NODE_NAME = "traction_controller"
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 DIAGNOSTICS_PERIOD = 1.0
+SWITCH_INTERVAL = 2e-4
+"""How long the thread that makes maps ready may keep the interpreter from an update [s]."""
 ARRIVAL_TIME = Duration(seconds=0.2)
 """Longest wait for the zeros of a node that ends to arrive."""
 
@@ -66,6 +70,7 @@ class TractionController(Node):
         self._statistics = TractionStatistics(1.0 / self._values["rate"])
         self._fault, self._warning = "", ""
         self._create_publishers()
+        self._maps = MapIntake(self._prepare_map, self._refuse_map)
         self._create_subscriptions()
         self.add_on_set_parameters_callback(
             check_changes(TRACTION_CONTROLLER, self._values, settings_from_parameters)
@@ -96,16 +101,19 @@ class TractionController(Node):
         """Send zero torques and end."""
         if self.context.ok():
             self.stop()
+        self._maps.close()
         super().destroy_node()
 
     def _warm_up(self) -> None:
         """Compile and run everything once, so that the first update is no slower than others."""
         service = TractionService(settings_from_parameters(self._values))
         joints = dict.fromkeys(JOINTS, 0.0)
+        service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
         for now in (0.0, 0.01):
             service.take_joints(joints, dict.fromkeys(JOINTS, 0.1), now)
             service.take_attitude(0.0, 0.0, np.zeros(3), now)
             service.take_command(0.01, 0.0, now)
+            service.take_odometry(np.zeros(4), 0.0, now)
             service.update(now)
 
     def _create_publishers(self) -> None:
@@ -131,8 +139,9 @@ class TractionController(Node):
         for qos in profiles:
             events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
             self.create_subscription(
-                PointCloud2, "elevation_cloud", self._take_cloud, qos, event_callbacks=events
-            )
+                PointCloud2, "elevation_cloud", self._maps.offer, qos, event_callbacks=events,
+                raw=True,
+            )  # fmt: skip
 
     def _apply_parameters(self, parameters) -> None:
         changes = {p.name: p.value for p in parameters if p.name in self._values}
@@ -168,19 +177,23 @@ class TractionController(Node):
             self._service.refuse("odometry", str(error))
             self.get_logger().warning(f"odometry not used: {error}", throttle_duration_sec=5.0)
 
-    def _take_cloud(self, cloud: PointCloud2) -> None:
-        try:
-            check_frame(cloud.header.frame_id, self._values["map_frame"], "elevation_cloud")
-            terrain = terrain_from_point_cloud(
-                cloud, self._values["map_resolution"], self._values["cell_height"]
-            )
-            self._service.take_terrain(terrain)
-        except BAD_INPUT as error:
-            self.get_logger().error(f"elevation_cloud refused, the last map stays: {error}")
+    def _prepare_map(self, cloud: PointCloud2) -> PreparedMap:
+        """Make a map of a cloud, in the thread of the intake."""
+        check_frame(cloud.header.frame_id, self._values["map_frame"], "elevation_cloud")
+        terrain = terrain_from_point_cloud(
+            cloud, self._values["map_resolution"], self._values["cell_height"]
+        )
+        return prepare_map(self._service.settings.rover, terrain)
+
+    def _refuse_map(self, error: str) -> None:
+        self.get_logger().error(f"elevation_cloud refused, the last map stays: {error}")
 
     def _update(self) -> None:
         start = time.perf_counter()
         try:
+            prepared = self._maps.take()
+            if prepared is not None:
+                self._service.take_map(prepared)
             update = self._service.update(_now())
         except Exception as error:
             # A fault of this program must not leave the wheels with their last torque.
@@ -252,6 +265,7 @@ def main(arguments: list[str] | None = None) -> int:
         executor.add_node(node)
         gc.collect()
         gc.freeze()
+        sys.setswitchinterval(SWITCH_INTERVAL)
         while not stop.wanted:
             executor.spin_once(timeout_sec=0.1)
     except BAD_INPUT as error:

@@ -22,6 +22,7 @@ from rover_physics.terrain import Terrain
 from rover_physics.traction_rows import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction_solver import TractionAnswer, TractionWorkspace, solve_traction
 from rover_planner.input_watch import InputWatch
+from rover_planner.map_intake import PreparedMap, prepare_map
 from rover_planner.traction_loops import LoopGains, PushLoop, StallWatch, limit_rate, rolling_rates
 
 Floats = NDArray[np.float64]
@@ -195,8 +196,14 @@ class TractionService:
 
     def take_terrain(self, terrain: Terrain) -> None:
         """Take a map; it is used while odometry comes."""
-        self._terrain = terrain
-        self._finder = MapContactFinder(self._settings.rover, terrain)
+        self.take_map(prepare_map(self._settings.rover, terrain))
+
+    def take_map(self, prepared: PreparedMap) -> None:
+        """Take a map that was made ready before; anew if it was for another rover."""
+        rover = self._settings.rover
+        if prepared.rover is not rover:
+            prepared = prepare_map(rover, prepared.terrain)
+        self._terrain, self._finder = prepared.terrain, prepared.finder
 
     def refuse(self, name: str, error: str) -> None:
         """Note that an input came that cannot be used."""

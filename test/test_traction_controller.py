@@ -8,16 +8,20 @@ import subprocess
 import sys
 
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from ros_fixtures import domain_id, wait_until
-from sensor_msgs.msg import Imu, JointState
+from rough_grounds import plane
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
+from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.qos import sensor_qos, topic_qos
+from rover_planner.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.traction_controller import TractionController
 
 RATE = 50.0
@@ -170,3 +174,24 @@ def test_a_process_that_is_told_to_end_sends_zeros_last(rover, how):
         process.kill()
         process.wait()
     wait_until(lambda: rover.commands[-1] == 0.0, "zeros")
+
+
+def test_a_map_is_used_though_it_comes_twice_and_a_bad_one_leaves_it(ros, rover, controller):
+    cloud = terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time())
+    sender = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    odometry = rover.create_publisher(Odometry, "odometry", sensor_qos())
+    place = Odometry(child_frame_id="base_link")
+    place.header.frame_id = "map"
+    place.pose.pose.position.z = 0.3
+    sender.publish(cloud)
+
+    def source_is_map():
+        odometry.publish(place)
+        last = controller.statistics.last
+        return last.estimate is not None and last.estimate.source == "map"
+
+    wait_until(source_is_map, "the map")
+    cloud.header.frame_id = "elsewhere"
+    sender.publish(cloud)
+    wait_until(lambda: rover.said("elevation_cloud refused"), "the refusal in the log")
+    wait_until(source_is_map, "the last map")
