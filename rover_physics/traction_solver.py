@@ -156,11 +156,16 @@ def solve_traction(
     if programmes == 0:
         x = rows.complete(np.zeros(WHEEL_COUNT))
     table, unit = np.empty((5, WHEEL_COUNT)), rows.force_unit
+    torques, loads, tractions, lateral, utilisation = table
     peak, least, pull = write_forces(
         rows.along, friction, unit, wheel_radius, max_torque, x, table
     )
     return TractionAnswer(
-        *table,
+        torques=torques,
+        loads=loads,
+        tractions=tractions,
+        lateral=lateral,
+        utilisation=utilisation,
         friction_slack=max(peak - 1.0, 0.0),
         load_slack=max(-least, 0.0),
         torque_slack=max(wheel_radius * pull - max_torque, 0.0),
