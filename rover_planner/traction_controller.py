@@ -76,9 +76,14 @@ class TractionController(Node):
             check_changes(TRACTION_CONTROLLER, self._values, settings_from_parameters)
         )
         self.add_post_set_parameters_callback(self._apply_parameters)
-        self._timer = self.create_timer(1.0 / self._values["rate"], self._update)
+        self._timer = self.create_timer(1.0 / self._values["rate"], self.update)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
+
+    @property
+    def service(self) -> TractionService:
+        """What takes measurements."""
+        return self._service
 
     @property
     def statistics(self) -> TractionStatistics:
@@ -188,7 +193,8 @@ class TractionController(Node):
     def _refuse_map(self, error: str) -> None:
         self.get_logger().error(f"elevation_cloud refused, the last map stays: {error}")
 
-    def _update(self) -> None:
+    def update(self) -> None:
+        """Estimate, build, solve and publish; the timer asks for it."""
         start = time.perf_counter()
         try:
             prepared = self._maps.take()
