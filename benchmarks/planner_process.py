@@ -95,12 +95,17 @@ class Processes:
         words = [w for name, value in parameters.items() for w in ("-p", f"{name}:={value}")]
         return self._start("rover_planner.traverse_server", "--ros-args", *words)
 
-    def start_rover(self, terrain: Terrain, rate: float, start: Sequence[float]) -> None:
-        """Start a simulated rover that drives straight on, and the controller of its torques."""
+    def start_rover(
+        self, terrain: Terrain, rate: float, start: Sequence[float], priority: int = 0
+    ) -> None:
+        """Start a simulated rover that drives straight on, and the controller of its torques.
+
+        `priority` is the controller's parameter realtime_priority.
+        """
         file = self._folder / "rover_terrain.npz"
         save_terrain(file, terrain)
         for module, parameters in (
-            ("rover_planner.traction_controller", {"rate": rate}),
+            ("rover_planner.traction_controller", {"rate": rate, "realtime_priority": priority}),
             (
                 "rover_planner.rover_simulator",
                 {

@@ -20,7 +20,7 @@ from rover_physics.kernels import kernel
 from rover_physics.linkage import pack_linkage, rocker_sign
 from rover_physics.manipulator import body_mass_and_com
 from rover_physics.names import WHEELS
-from rover_physics.records import new_record, record_type
+from rover_physics.records import array_of, new_record, record_type
 from rover_physics.rover import Rover
 
 WHEEL_COUNT = len(WHEELS)
@@ -112,19 +112,22 @@ class MotionContactEstimator:
 
     def __init__(self, rover: Rover):
         """Prepare for a rover on level ground."""
-        self._linkage = pack_linkage(rover, *body_mass_and_com(rover))
+        self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
         names = ("rear", "middle", "front")
         low, high = (names.index(name) for name in rover.suspension.bogie_wheels)
         own = names.index(rover.suspension.rocker_wheel)
-        self._filter = new_record(
-            FILTER,
-            covariance=SPREAD**2 * np.eye(WHEEL_COUNT),
-            first=[high, own, 3 + high, 3 + own, 3 + own],
-            second=[low, low, 3 + low, 3 + low, own],
+        self._filters = array_of(
+            new_record(
+                FILTER,
+                covariance=SPREAD**2 * np.eye(WHEEL_COUNT),
+                first=[high, own, 3 + high, 3 + own, 3 + own],
+                second=[low, low, 3 + low, 3 + low, own],
+            )
         )
-        self._motion = motion = new_record(MOTION)
+        self._motions = array_of(new_record(MOTION))
         # Looking up a field of a record takes as long as writing it.
-        self._angles, self._covariance = self._filter.angles, self._filter.covariance
+        state, motion = self._filters[0], self._motions[0]
+        self._angles, self._covariance = state.angles, state.covariance
         self._attitude, self._joints = motion.attitude, motion.joints
         self._joint_rates = motion.joint_rates
         self._wheel_rates, self._body_rates = motion.wheel_rates, motion.body_rates
@@ -145,13 +148,14 @@ class MotionContactEstimator:
         self._joints[0], self._joints[1:] = motion.rocker_angle, motion.bogie_angles
         self._joint_rates[0], self._joint_rates[1:] = motion.rocker_rate, motion.bogie_rates
         self._wheel_rates[:], self._body_rates[:] = motion.wheel_rates, motion.body_rates
-        _update(self._linkage, self._motion, duration, self._filter)
+        _update(self._linkages, self._motions, duration, self._filters)
         return self.estimate
 
 
 @kernel
-def _update(linkage, motion, duration, state):
+def _update(linkages, motions, duration, filters):
     """Place the wheels, let the angles drift, and correct them if the rover moves."""
+    linkage, motion, state = linkages[0], motions[0], filters[0]
     roll, pitch = motion.attitude[0], motion.attitude[1]
     level = np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(roll))
     _place(linkage, motion, state)

@@ -15,7 +15,7 @@ from rover_physics.kernels import kernel
 from rover_physics.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.manipulator import body_mass_and_com
 from rover_physics.names import WHEELS
-from rover_physics.records import new_record
+from rover_physics.records import array_of, new_record
 from rover_physics.rover import Rover
 from rover_physics.terrain import Terrain
 from rover_physics.traction_rows import MeasuredState
@@ -37,10 +37,11 @@ class MapContactFinder:
 
     def __init__(self, rover: Rover, terrain: Terrain):
         """Prepare for a rover and a map."""
-        self._linkage = pack_linkage(rover, *body_mass_and_com(rover))
+        self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
+        self._radius = rover.wheel.radius
         self._grid = heights_of(pack_ground(terrain))
         self._resolution = terrain.resolution
-        self._placement = new_record(PLACEMENT)
+        self._placements = array_of(new_record(PLACEMENT))
         self._found = np.empty((3, PLACES, 2))
 
     def find(
@@ -58,23 +59,48 @@ class MapContactFinder:
             ModelError: A wheel is beyond the map, over unknown ground, or not near the ground.
         """
         q = np.array([pose[2], state.roll, state.pitch, state.rocker_angle, *state.bogie_angles])
-        angles, gaps = np.empty(6), np.empty(6)
-        grid, linkage, placement, found = self._grid, self._linkage, self._placement, self._found
-        place(linkage, pose[0], pose[1], pose[3], q, placement)
-        _measure_gaps(grid, linkage, placement, found, gaps)
-        q[0] -= np.median(gaps)
-        if np.isfinite(q[0]):
-            place(linkage, pose[0], pose[1], pose[3], q, placement)
-            _find_nearest(grid, linkage, placement, 1.0 if forward else -1.0, found, angles)
+        angles, gaps, pose = np.zeros(6), np.empty(6), np.asarray(pose, dtype=float)
+        _find_angles(
+            self._grid, self._linkages, self._placements, 1.0 if forward else -1.0, pose, q,
+            self._found, gaps, angles,
+        )  # fmt: skip
         known = np.isfinite(gaps) & np.isfinite(angles)
         if not known.all():
             raise ModelError(
                 f"{WHEELS[int(np.argmin(known))]} of a rover at {np.round(pose[:2], 2)} m is over "
                 "ground that the map does not have"
             )
-        radius = self._linkage.radius
-        error = np.hypot(deviation, 0.3 * self._resolution) / radius
+        error = np.hypot(deviation, 0.3 * self._resolution) / self._radius
         return ContactEstimate(angles, (OWN_ERROR**2 + error**2) * np.eye(6), "map")
+
+
+@kernel
+def _find_angles(grid, linkages, placements, ahead, pose, q, found, gaps, angles):
+    """Write gaps [m] at the given height, and angles [rad] at the height that the map tells."""
+    linkage, placement = linkages[0], placements[0]
+    place(linkage, pose[0], pose[1], pose[3], q, placement)
+    _measure_gaps(grid, linkage, placement, found, gaps)
+    q[0] -= _median(gaps)
+    if np.isfinite(q[0]):
+        place(linkage, pose[0], pose[1], pose[3], q, placement)
+        _find_nearest(grid, linkage, placement, ahead, found, angles)
+
+
+@kernel
+def _median(values):
+    """Return the median of (6,) values, NaN where one is."""
+    lower = upper = np.nan
+    for i in range(6):
+        if values[i] != values[i]:
+            return np.nan
+        rank = 0
+        for j in range(6):
+            rank += values[j] < values[i] or (values[j] == values[i] and j < i)
+        if rank == 2:
+            lower = values[i]
+        if rank == 3:
+            upper = values[i]
+    return 0.5 * (lower + upper)
 
 
 @kernel

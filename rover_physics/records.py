@@ -25,3 +25,14 @@ def new_record(kind: np.dtype, **values: Any) -> Any:
     for name, value in values.items():
         record[name] = value
     return record
+
+
+def array_of(record: Any) -> np.ndarray:
+    """Return an array (1,) that holds a copy of a record.
+
+    Handing a record from Python to a kernel takes some 15 us, since its whole type is described
+    anew each time; an array of it less than one. `array[0]` is the record itself, not a copy.
+    """
+    array = np.zeros(1, record.dtype)
+    array[0] = record
+    return array

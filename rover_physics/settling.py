@@ -31,7 +31,7 @@ RELAXED_FURTHER = 0.25
 """The same after each attempt that failed: wedged between tread and face, gaps are small."""
 RELAXATION = 0.3
 TURNED_OVER = 1.45
-"""Roll or pitch [rad] beyond which the search is given up: the rover stands on end or on a side."""
+"""Roll or pitch [rad] beyond which the search is given up: the rover is on its end or side."""
 
 
 @kernel

@@ -14,8 +14,11 @@ The cone sqrt(T^2 + S^2) <= u mu N is nothing that a quadratic programme can hol
   smallest peak is found by a sequence of programmes, as Dinkelbach does for ratios. A controller,
   whose last answer is near, needs one or two of them.
 - The cone is round. It is replaced by SIDES of its tangents, one of them where the last forces
-  point. Where the sequence settles that is exact; elsewhere the polygon is outside the cone, by
-  8 % at most, so what is reported is the utilisation by the round cone.
+  point. Where the sequence settles that is exact; elsewhere the polygon is outside the cone.
+
+So an answer is looked at by the round cone and the product, both from the last forces on towards
+it, and the best place on that line is taken (`traction_merit`): the peak never rises from one
+programme to the next, and what is reported is the utilisation by the round cone.
 
 The change from the last forces is weighed as well: it makes the programme well conditioned, and
 it vanishes where the sequence settles, so that it costs nothing there (a proximal point method).
@@ -31,9 +34,9 @@ import numpy as np
 
 from rover_physics.errors import ModelError
 from rover_physics.kernels import kernel
-from rover_physics.traction_rows import FORCES, WHEEL_COUNT, BalanceRows
+from rover_physics.traction_rows import WHEEL_COUNT, BalanceRows
 
-SIDES = 8
+SIDES = 4
 """Tangents around each friction cone."""
 SHARE, SLOPE, PEAK = 12, 13, 14
 """Columns of s0, s1 and u; before them T and N."""
@@ -123,51 +126,54 @@ def build_traction_qp(
     """
     weights = weights or TractionWeights()
     check_limits(friction, most_pull)
-    qp = TractionQP(
-        P=np.full(VARIABLES, REGULARISATION),
-        q=np.zeros(VARIABLES),
-        A=np.zeros((ROWS, VARIABLES)),
-        lower=np.full(ROWS, -np.inf),
-        upper=np.full(ROWS, np.inf),
-        scale=np.empty(VARIABLES),
-        shift=np.zeros(VARIABLES),
-        start=np.zeros(VARIABLES),
-    )
+    vectors, A, bounds = np.zeros((5, VARIABLES)), np.zeros((ROWS, VARIABLES)), np.empty((2, ROWS))
     peak = min(max(reference.peak, LEAST_PEAK), MOST_PEAK)
-    unit = peak * float(np.mean(friction))
-    qp.scale[:PEAK], qp.scale[PEAK:] = unit, peak
-    qp.scale[LOAD_SLACK:] = unit
+    unit = peak * float(friction.sum()) / WHEEL_COUNT
+    P, q, scale, shift, start = vectors
     _write_constraints(
         rows.A, rows.b, rows.along, friction, most_pull, reference.x, peak, unit,
-        qp.A, qp.lower, qp.upper, qp.shift,
+        A, bounds[0], bounds[1], shift,
     )  # fmt: skip
-    qp.start[:FORCES] = (reference.x - qp.shift[:FORCES]) / unit
-    qp.start[PEAK] = 1.0
-    _write_costs(qp, weights)
-    return qp
+    _write_start(reference.x, peak, unit, scale, shift, start)
+    _write_costs(weights.peak, weights.effort, weights.change, weights.slack, start, P, q)
+    return TractionQP(P, q, A, bounds[0], bounds[1], scale, shift, start)
 
 
 def check_limits(friction: np.ndarray, most_pull: float) -> None:
     """Raise ModelError where a friction coefficient (6,) or the largest pull is not above 0."""
-    if not (np.min(friction) > 0.0 and most_pull > 0.0):
+    if not (friction.min() > 0.0 and most_pull > 0.0):
         raise ModelError(f"friction {friction} and largest pull {most_pull} must all be above 0")
 
 
-def _write_costs(qp: TractionQP, weights: TractionWeights) -> None:
-    qp.P[:6] = weights.effort + weights.change
-    qp.P[SHARE : SLOPE + 1] = REGULARISATION + weights.change
-    qp.q[:6] = -weights.change * qp.start[:6]
-    qp.q[SHARE : SLOPE + 1] = -weights.change * qp.start[SHARE : SLOPE + 1]
-    qp.P[PEAK] = weights.peak
-    qp.P[FRICTION_SLACK:] = 0.1 * weights.slack
-    qp.q[FRICTION_SLACK:] = weights.slack
+@kernel
+def _write_start(last, peak, unit, scale, shift, start):
+    """Write the units of the variables, and the last answer in them."""
+    for k in range(VARIABLES):
+        scale[k] = peak if k in (PEAK, FRICTION_SLACK) else unit
+        start[k] = (last[k] - shift[k]) / unit if k < PEAK else 0.0
+    start[PEAK] = 1.0
+
+
+@kernel
+def _write_costs(peak, effort, change, slack, start, P, q):
+    """Write the diagonal and the linear part of the cost."""
+    for k in range(VARIABLES):
+        P[k], q[k] = REGULARISATION, 0.0
+        if k < 6 or k in (SHARE, SLOPE):
+            P[k] = change + (effort if k < 6 else REGULARISATION)
+            q[k] = -change * start[k]
+        if k >= FRICTION_SLACK:
+            P[k], q[k] = 0.1 * slack, slack
+    P[PEAK] = peak
 
 
 @kernel
 def _write_constraints(
     balance, wanted, along, friction, most_pull, last, peak, unit, A, lower, upper, shift
 ):
-    """Write all rows, each divided by `unit`, and the shift of the loads."""
+    """Write all rows, each divided by `unit`, and the shift of the loads; A comes as zeros."""
+    lower[:] = -np.inf
+    upper[:] = np.inf
     for wheel in range(6):
         shift[6 + wheel] = max(last[6 + wheel], LEAST_LOAD)
     for row in range(9):

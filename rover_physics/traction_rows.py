@@ -17,7 +17,7 @@ from rover_physics.errors import ModelError
 from rover_physics.kernels import kernel
 from rover_physics.linkage import PLACEMENT, pack_linkage, place, place_masses
 from rover_physics.manipulator import body_mass_and_com
-from rover_physics.records import new_record, record_type
+from rover_physics.records import array_of, new_record, record_type
 from rover_physics.rover import Rover
 from rover_physics.touch import TOUCH
 
@@ -78,12 +78,7 @@ class BalanceRows:
             tractions: (6,) in force units; what all have in common follows from the balance.
         """
         x = np.empty(FORCES)
-        x[:6] = tractions - tractions[5]
-        x[6:12] = 0.0
-        x[12:14] = 0.0
-        rest = self.b - self.A[:, :6] @ x[:6]
-        x[:6] += rest[8]
-        x[6:14] = rest[:8]
+        _complete(self.A, self.b, tractions, x)
         return x
 
 
@@ -97,6 +92,8 @@ ROWS_WORK = record_type(
     ("push", float),
 )
 """Work space of `BalanceWriter`."""
+GIVEN = 6
+"""Numbers of a state that are handed over together: attitude, suspension, push."""
 
 
 class BalanceWriter:
@@ -116,9 +113,8 @@ class BalanceWriter:
         self._linkage = pack_linkage(rover, mass, com)
         self._linkage.has_tool_load = True
         self._linkage.tool[0] = _centre_of_mass(self._linkage)
-        self._work = work = new_record(ROWS_WORK)
-        # Looking up a field of a record takes as long as writing it.
-        self._q, self._angles, self._offsets = work.q, work.angles, work.offsets
+        self._linkages, self._works = array_of(self._linkage), array_of(new_record(ROWS_WORK))
+        self._given = np.zeros(GIVEN)
         self.weight = float(self._linkage.mass * self._linkage.gravity)
         """Weight of the rover with its payload in [N]."""
 
@@ -133,19 +129,17 @@ class BalanceWriter:
             ModelError: The equations do not determine the forces: the contact angles contradict
                 one another so that the rover could not roll.
         """
-        work, unit, q = self._work, self.weight / WHEEL_COUNT, self._q
-        q[0], q[1], q[2], q[3] = 0.0, state.roll, state.pitch, state.rocker_angle
-        q[4:6] = state.bogie_angles
-        self._angles[:] = state.contact_angles
-        self._offsets[:] = state.contact_offsets
-        work["push"] = net_traction
+        given = self._given
+        given[0], given[1], given[2] = state.roll, state.pitch, state.rocker_angle
+        given[3:5], given[5] = state.bogie_angles, net_traction
         A, b, along = np.zeros((9, FORCES)), np.empty(9), np.empty(6)
-        if not _write_rows(self._linkage, work, A, b, along):
+        angles, offsets = state.contact_angles, state.contact_offsets
+        if not _write_state(self._linkages, self._works, given, angles, offsets, A, b, along):
             raise ModelError(
-                f"contact angles {np.round(self._angles, 3).tolist()} rad leave the balance "
+                f"contact angles {np.round(angles, 3).tolist()} rad leave the balance "
                 "without a solution; they must be such that all wheels can roll at once"
             )
-        return BalanceRows(A, b, along, unit)
+        return BalanceRows(A, b, along, self.weight / WHEEL_COUNT)
 
 
 def _centre_of_mass(linkage: Any) -> np.ndarray:
@@ -155,6 +149,31 @@ def _centre_of_mass(linkage: Any) -> np.ndarray:
     total = total + linkage.bogie_mass * linkage.bogie_coms.sum(axis=0)
     total = total + linkage.wheel_mass * linkage.wheels.sum(axis=0)
     return total / linkage.mass
+
+
+@kernel
+def _complete(A, b, tractions, x):
+    """Write x (14,) that keeps all nine equations A x = b, with these differences of tractions."""
+    for row in range(9):
+        rest = b[row]
+        for wheel in range(6):
+            rest -= A[row, wheel] * (tractions[wheel] - tractions[5])
+        if row < 8:
+            x[6 + row] = rest
+    for wheel in range(6):
+        x[wheel] = tractions[wheel] - tractions[5] + rest
+
+
+@kernel
+def _write_state(linkages, works, given, angles, offsets, A, b, along):
+    """Write the nine equations at a measured state; False where they are singular."""
+    work = works[0]
+    work.q[0], work.push = 0.0, given[5]
+    for k in range(5):
+        work.q[1 + k] = given[k]
+    for wheel in range(6):
+        work.angles[wheel], work.offsets[wheel] = angles[wheel], offsets[wheel]
+    return _write_rows(linkages[0], work, A, b, along)
 
 
 @kernel

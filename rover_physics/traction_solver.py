@@ -7,7 +7,6 @@ import osqp
 from scipy import sparse
 
 from rover_physics.traction import (
-    LEAST_LOAD,
     ROWS,
     VARIABLES,
     Reference,
@@ -16,14 +15,28 @@ from rover_physics.traction import (
     build_traction_qp,
     check_limits,
 )
+from rover_physics.traction_merit import find_best_between, measure_peak, write_forces
 from rover_physics.traction_rows import FORCES, WHEEL_COUNT, BalanceRows
 
-TOLERANCE = 1e-5
-"""Of OSQP, absolute and relative. Its default of 1e-3 leaves rows 1e-2 of the weight open."""
+SETTINGS = {
+    # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
+    "eps_abs": 1e-4,
+    "eps_rel": 1e-4,
+    # The programme is scaled already; a scaling of its own, anew each time, spoils the start.
+    "scaling": 0,
+    "rho": 3.0,
+    "adaptive_rho_interval": 100,
+    "check_termination": 5,
+    "polishing": False,
+    "warm_starting": True,
+    "verbose": False,
+}
+"""Of OSQP."""
 MOST_ITERATIONS = 4000
 SETTLED = 0.02
 """Change of the scaled tractions, which are of order one, at which a sequence has settled."""
-SOLVED = osqp.SolverStatus.OSQP_SOLVED
+SOLVED = 1
+"""OSQP's status_val of a solved problem; the first versions have no name for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +79,7 @@ class TractionWorkspace:
         unbounded = np.full(ROWS, np.inf)
         self._solver.setup(
             sparse.eye(VARIABLES, format="csc"), np.zeros(VARIABLES), pattern,
-            -unbounded, unbounded,
-            eps_abs=TOLERANCE, eps_rel=TOLERANCE, max_iter=most_iterations, check_termination=5,
-            polishing=False, warm_starting=True, verbose=False,
+            -unbounded, unbounded, max_iter=most_iterations, **SETTINGS,
         )  # fmt: skip
 
     def solve(self, qp: TractionQP) -> tuple[np.ndarray, int, str, bool]:
@@ -77,7 +88,8 @@ class TractionWorkspace:
         Returns:
             Variables (18,), iterations, OSQP's words for its status, whether it was solved.
         """
-        self._solver.update(Px=qp.P, Ax=qp.A.ravel()[self._cells], q=qp.q, l=qp.lower, u=qp.upper)
+        values = qp.A.ravel()[self._cells]
+        self._solver.update(Px=qp.P, Ax=values, q=qp.q, l=qp.lower, u=qp.upper)
         self._solver.warm_start(x=qp.start)
         result = self._solver.solve(raise_error=False)
         solved = result.info.status_val == SOLVED and bool(np.isfinite(result.x).all())
@@ -125,10 +137,10 @@ def solve_traction(
     """
     most_pull = max_torque / (wheel_radius * rows.force_unit)
     check_limits(friction, most_pull)
-    pulls = np.zeros(WHEEL_COUNT) if last is None else last / rows.force_unit
-    x = rows.complete(pulls)
+    weights = weights or TractionWeights()
+    x = rows.complete(np.zeros(WHEEL_COUNT) if last is None else last / rows.force_unit)
     peak = measure_peak(rows, friction, x)
-    best, best_merit, status, iterations, programmes = None, np.inf, "", 0, 0
+    status, iterations, programmes = "", 0, 0
     while programmes < most_programmes:
         qp = build_traction_qp(rows, friction, most_pull, Reference(x, peak), weights)
         y, count, status, solved = workspace.solve(qp)
@@ -136,53 +148,29 @@ def solve_traction(
         if not solved:
             break
         programmes += 1
-        x = rows.complete((qp.scale * y + qp.shift)[:WHEEL_COUNT])
-        peak = measure_peak(rows, friction, x)
-        merit = peak + _excess(x, most_pull)
-        if merit < best_merit:
-            best, best_merit = x, merit
-        if np.abs(y[:WHEEL_COUNT] - qp.start[:WHEEL_COUNT]).max() <= SETTLED:
+        unit = float(qp.scale[0])
+        aim = rows.complete(unit * y[:WHEEL_COUNT])
+        x, peak, moved = find_best_between(rows, friction, most_pull, weights, x, aim)
+        if moved <= SETTLED * unit:
             break
-    fallback = best is None and most_programmes > 0
-    x = rows.complete(np.zeros(WHEEL_COUNT)) if best is None else best
-    forces = _describe(rows, friction, x, max_torque, wheel_radius)
-    return TractionAnswer(
-        **forces, iterations=iterations, programmes=programmes, fallback=fallback, status=status
+    if programmes == 0:
+        x = rows.complete(np.zeros(WHEEL_COUNT))
+    table, unit = np.empty((5, WHEEL_COUNT)), rows.force_unit
+    torques, loads, tractions, lateral, utilisation = table
+    peak, least, pull = write_forces(
+        rows.along, friction, unit, wheel_radius, max_torque, x, table
     )
-
-
-def measure_utilisation(rows: BalanceRows, friction: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return sqrt(T^2 + S^2) / (mu N) (6,) of x (14,), with loads of LEAST_LOAD at least."""
-    across = np.hypot(x[:6], x[12] + x[13] * rows.along)
-    return across / (friction * np.maximum(x[6:12], LEAST_LOAD))
-
-
-def measure_peak(rows: BalanceRows, friction: np.ndarray, x: np.ndarray) -> float:
-    """Return the largest of `measure_utilisation`."""
-    return float(measure_utilisation(rows, friction, x).max())
-
-
-def _excess(x: np.ndarray, most_pull: float) -> float:
-    """Return by how much contact and torque limits are broken, in force units."""
-    pull, lift = np.abs(x[:6]).max() - most_pull, -x[6:12].min()
-    return 10.0 * float(max(pull - 1e-4 * most_pull, 0.0) + max(lift, 0.0))
-
-
-def _describe(
-    rows: BalanceRows, friction: np.ndarray, x: np.ndarray, max_torque: float, radius: float
-) -> dict:
-    """Return the forces of an answer in SI units and what is left of the limits."""
-    T, N = rows.force_unit * x[:6], rows.force_unit * x[6:12]
-    S = rows.force_unit * (x[12] + x[13] * rows.along)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        utilisation = np.where(N > 0.0, np.hypot(T, S) / (friction * N), np.inf)
-    return {
-        "torques": np.clip(radius * T, -max_torque, max_torque),
-        "loads": N,
-        "tractions": T,
-        "lateral": S,
-        "utilisation": utilisation,
-        "friction_slack": max(float(utilisation.max()) - 1.0, 0.0),
-        "load_slack": max(-float(N.min()), 0.0),
-        "torque_slack": max(radius * float(np.abs(T).max()) - max_torque, 0.0),
-    }
+    return TractionAnswer(
+        torques=torques,
+        loads=loads,
+        tractions=tractions,
+        lateral=lateral,
+        utilisation=utilisation,
+        friction_slack=max(peak - 1.0, 0.0),
+        load_slack=max(-least, 0.0),
+        torque_slack=max(wheel_radius * pull - max_torque, 0.0),
+        iterations=iterations,
+        programmes=programmes,
+        fallback=programmes == 0 and most_programmes > 0,
+        status=status,
+    )

@@ -5,9 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.kernels import kernel
+
 Floats = NDArray[np.float64]
 OVERSPEED = 1.3
 """Mean rate of the wheels, over the wanted one, that is still taken for rolling."""
+SLOWEST, FASTEST = 0.2, 2.0
+"""Bounds of a wheel's speed over the mean that rolling asks for."""
 STALLED = 0.3
 """Share of the wanted rate below which the rover does not get on."""
 STALL_TIME, STALL_DELAY, RECOVERY_TIME = 1.0, 0.5, 1.5
@@ -52,8 +56,11 @@ class PushLoop:
         """
         step = self._integral_gain * error * duration
         if not (limited and step * self._integral > 0.0):
-            self._integral = float(np.clip(self._integral + step, -self._most, self._most))
-        return float(np.clip(self._gain * error + self._integral, -self._most, self._most))
+            self._integral = self._limit(self._integral + step)
+        return self._limit(self._gain * error + self._integral)
+
+    def _limit(self, push: float) -> float:
+        return min(max(push, -self._most), self._most)
 
 
 class StallWatch:
@@ -90,9 +97,21 @@ def rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:
         ratios: (6,) speeds of the wheels' centres, relative to their mean; a wheel that has to
             go backwards or far ahead is more likely one whose contact angle is wrong.
     """
-    ratios = np.clip(ratios, 0.2, 2.0)
-    most = OVERSPEED * abs(wanted)
-    return ratios * (np.clip(wheel_rates.mean(), -most, most) / ratios.mean())
+    rolling = np.empty(len(ratios))
+    _write_rolling(wheel_rates, ratios, OVERSPEED * abs(wanted), rolling)
+    return rolling
+
+
+@kernel
+def _write_rolling(wheel_rates, ratios, most, rolling):
+    total = count = 0.0
+    for wheel in range(len(ratios)):
+        rolling[wheel] = min(max(ratios[wheel], SLOWEST), FASTEST)
+        total += wheel_rates[wheel]
+        count += rolling[wheel]
+    total = min(max(total, -most * len(ratios)), most * len(ratios))
+    for wheel in range(len(ratios)):
+        rolling[wheel] *= total / count
 
 
 def limit_rate(torques: Floats, last: Floats, most: float) -> Floats:
@@ -100,6 +119,16 @@ def limit_rate(torques: Floats, last: Floats, most: float) -> Floats:
 
     All changes are scaled alike, so that what the wheels share stays shared.
     """
-    change = torques - last
-    largest = float(np.abs(change).max())
-    return torques if largest <= most else last + change * (most / largest)
+    limited = np.empty(len(torques))
+    _write_limited(torques, last, most, limited)
+    return limited
+
+
+@kernel
+def _write_limited(torques, last, most, limited):
+    largest = 0.0
+    for wheel in range(len(torques)):
+        largest = max(largest, abs(torques[wheel] - last[wheel]))
+    share = 1.0 if largest <= most else most / largest
+    for wheel in range(len(torques)):
+        limited[wheel] = last[wheel] + share * (torques[wheel] - last[wheel])

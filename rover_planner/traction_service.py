@@ -22,6 +22,7 @@ from rover_physics.terrain import Terrain
 from rover_physics.traction_rows import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction_solver import TractionAnswer, TractionWorkspace, solve_traction
 from rover_planner.input_watch import InputWatch
+from rover_planner.map_intake import PreparedMap, prepare_map
 from rover_planner.traction_loops import LoopGains, PushLoop, StallWatch, limit_rate, rolling_rates
 
 Floats = NDArray[np.float64]
@@ -118,6 +119,7 @@ class TractionService:
         self._positions = np.zeros(len(SUSPENSION_JOINTS))
         self._rates: Floats | None = None
         self._wheel_rates = np.zeros(len(WHEEL_JOINTS))
+        self._mean_rate = 0.0
         self._attitude = (0.0, 0.0)
         self._body_rates: Floats | None = None
         self._wanted = (0.0, 0.0)
@@ -172,6 +174,7 @@ class TractionService:
             return
         self._positions = np.array([positions[name] for name in SUSPENSION_JOINTS])
         self._wheel_rates = np.array([velocities[name] for name in WHEEL_JOINTS])
+        self._mean_rate = float(self._wheel_rates.sum()) / len(WHEEL_JOINTS)
         known = all(name in velocities for name in SUSPENSION_JOINTS)
         self._rates = np.array([velocities[name] for name in SUSPENSION_JOINTS]) if known else None
         self._watch.take("joint_states", now)
@@ -193,8 +196,14 @@ class TractionService:
 
     def take_terrain(self, terrain: Terrain) -> None:
         """Take a map; it is used while odometry comes."""
-        self._terrain = terrain
-        self._finder = MapContactFinder(self._settings.rover, terrain)
+        self.take_map(prepare_map(self._settings.rover, terrain))
+
+    def take_map(self, prepared: PreparedMap) -> None:
+        """Take a map that was made ready before; anew if it was for another rover."""
+        rover = self._settings.rover
+        if prepared.rover is not rover:
+            prepared = prepare_map(rover, prepared.terrain)
+        self._terrain, self._finder = prepared.terrain, prepared.finder
 
     def refuse(self, name: str, error: str) -> None:
         """Note that an input came that cannot be used."""
@@ -217,6 +226,10 @@ class TractionService:
             rows, warning = self._writer.write(self._level_state(), push), str(error)
         answer = self._share(rows)
         torques = self._finish(answer, rows, duration)
+        if not np.isfinite(torques).all():
+            return self.rest(
+                f"torques {torques.tolist()} N m came out; they must be finite", start
+            )
         return TractionUpdate(torques, "", warning, answer, estimate, time.perf_counter() - start)
 
     def rest(self, fault: str, start: float | None = None) -> TractionUpdate:
@@ -275,7 +288,7 @@ class TractionService:
 
     def _push(self, duration: float) -> float:
         """Return the wanted net traction [N] by the mean travel of the wheels."""
-        speed = float(self._wheel_rates.mean()) * self._settings.rover.wheel.radius
+        speed = self._mean_rate * self._settings.rover.wheel.radius
         return self._speed.update(self._wanted[0] - speed, duration, self._limited)
 
     def _share(self, rows: BalanceRows) -> TractionAnswer:
@@ -301,10 +314,11 @@ class TractionService:
             wanted = self._wanted[0] / settings.rover.wheel.radius
             rolling = rolling_rates(self._wheel_rates, rows.wheel_speeds, wanted)
             torques -= gains.slip * (self._wheel_rates - rolling)
-            share = self._stall.update(float(self._wheel_rates.mean()), wanted, duration)
-            servo = gains.slip * SERVO_STIFFNESS * (wanted - self._wheel_rates)
-            torques += share * (servo - torques)
-        torques = np.clip(torques, -settings.max_torque, settings.max_torque)
+            share = self._stall.update(self._mean_rate, wanted, duration)
+            if share > 0.0:
+                servo = gains.slip * SERVO_STIFFNESS * (wanted - self._wheel_rates)
+                torques += share * (servo - torques)
+        torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)
         self._torques = limit_rate(torques, self._torques, gains.torque_rate * duration)
         return self._torques
 

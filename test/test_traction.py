@@ -12,9 +12,10 @@ from traction_states import rough_states, state_of
 from rover_physics.errors import ModelError
 from rover_physics.rover import load_rover
 from rover_physics.sweep import sweep_path
-from rover_physics.traction import CONES, LIMIT, Reference, build_traction_qp
+from rover_physics.traction import CONES, LIMIT, Reference, TractionWeights, build_traction_qp
+from rover_physics.traction_merit import find_best_between, measure_peak
 from rover_physics.traction_rows import BalanceWriter, MeasuredState
-from rover_physics.traction_solver import TractionWorkspace, measure_peak, solve_traction
+from rover_physics.traction_solver import TractionWorkspace, solve_traction
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FRICTION = np.full(6, 0.8)
@@ -167,6 +168,38 @@ def test_a_wheel_that_has_to_lift_is_told_with_its_missing_load():
     assert not answer.fallback
     assert answer.load_slack == pytest.approx(-answer.loads.min()) and answer.load_slack > 1.0
     assert np.isinf(answer.utilisation.max()) and np.isinf(answer.friction_slack)
+
+
+def test_the_peak_never_rises_from_one_programme_to_the_next():
+    writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
+    for prediction, i in rough_states(LSR1, 50):
+        rows = writer.write(state_of(prediction, i), 0.0)
+        last, peak = None, measure_peak(rows, FRICTION, rows.complete(np.zeros(6)))
+        for _ in range(6):
+            answer = solve_traction(
+                workspace, rows, FRICTION, 2.0, 0.1, last=last, most_programmes=1
+            )
+            assert not answer.fallback
+            assert answer.utilisation.max() <= peak * (1.0 + 1e-3)
+            last, peak = answer.tractions, answer.utilisation.max()
+
+
+def test_the_best_place_on_the_line_is_no_worse_than_any_other_and_keeps_the_balance():
+    rng, weights = np.random.default_rng(5), TractionWeights(effort=0.0)
+    for prediction, i in rough_states(LSR1, 30):
+        rows = BalanceWriter(LSR1).write(state_of(prediction, i), 0.0)
+        start, aim = (rows.complete(0.1 * rng.standard_normal(6)) for _ in range(2))
+        x, peak, _ = find_best_between(rows, FRICTION, 12.0, weights, start, aim)
+        assert rows.A @ x == pytest.approx(rows.b, abs=1e-12)
+        assert peak == measure_peak(rows, FRICTION, x)
+        places = [start + t * (aim - start) for t in np.linspace(0.0, 1.5, 301)]
+        lifted = [min(place[6:12].min(), 0.0) for place in places]
+        least = min(
+            measure_peak(rows, FRICTION, place)
+            for place, lift in zip(places, lifted, strict=True)
+            if lift == 0.0
+        )
+        assert peak <= 1.01 * least
 
 
 def test_limits_of_torque_turn_to_wheels_with_torque_left():

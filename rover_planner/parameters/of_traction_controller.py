@@ -17,6 +17,13 @@ TRACTION_CONTROLLER = (
         "rate", 50.0, "Updates per second.", "1/s", bounds=(10.0, 500.0), read_only=True
     ),
     ParameterSpec(
+        "realtime_priority",
+        0,
+        "Precedence of this process over ordinary ones (SCHED_FIFO), where granted; 0 for none.",
+        bounds=(0, 99),
+        read_only=True,
+    ),
+    ParameterSpec(
         "timeout",
         0.08,
         "Age from which joint states, attitude and cmd_vel are stale; torques are then zero.",
