@@ -78,7 +78,7 @@ class StallWatch:
         """Return the share of the servos, 0 to 1.
 
         Args:
-            rate: Mean rate of the wheels [rad/s].
+            rate: Median rate of the wheels [rad/s]; those that spin raise their mean.
             wanted: The rate that is wanted of it [rad/s].
             duration: Since the last call [s].
         """

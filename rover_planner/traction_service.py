@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -314,7 +315,8 @@ class TractionService:
             wanted = self._wanted[0] / settings.rover.wheel.radius
             rolling = rolling_rates(self._wheel_rates, rows.wheel_speeds, wanted)
             torques -= gains.slip * (self._wheel_rates - rolling)
-            share = self._stall.update(self._mean_rate, wanted, duration)
+            # Wheels that spin turn faster than the rover goes: the median is nearer to that.
+            share = self._stall.update(median(self._wheel_rates.tolist()), wanted, duration)
             if share > 0.0:
                 servo = gains.slip * SERVO_STIFFNESS * (wanted - self._wheel_rates)
                 torques += share * (servo - torques)

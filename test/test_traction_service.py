@@ -224,6 +224,15 @@ def test_rolling_has_the_mean_that_is_measured_but_not_that_of_spinning_wheels()
     assert rolling_rates(np.full(6, 9.0), ratios, 0.3) == pytest.approx(0.39 * ratios)
 
 
+def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():
+    rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.0)
+    rig.velocities |= dict.fromkeys(("front_right_wheel", "front_left_wheel"), 1.0)
+    standing = [0, 1, 3, 4]
+    before, after = rig.run(10).torques, rig.run(200).torques
+    assert after[standing].min() > 2.0 * before[standing].max() > 0.0
+
+
 def test_servos_take_over_only_where_the_rover_does_not_get_on():
     watch = StallWatch()
     assert watch.update(0.3, 0.3, 5.0) == 0.0
