@@ -136,7 +136,10 @@ def _scan_carefully(grid, samples, placement, wheel, exact, first, last, stride,
                     status = UNKNOWN_GROUND
                 continue
             _note_sample(wheel, m, k, stride, gap, touch)
-            if exact and gap < best + EXACT_REACH * radius:
+            if exact and gap < best + EXACT_REACH * radius and _may_come_near(
+                elevation, samples, forward, up, scale, gx, gy,
+                centres[wheel, 2] + across * R[2, 1], s, c, best,
+            ):  # fmt: skip
                 gap = refine_from(grid, samples, placement, wheel, m, s, c, touch)
             if gap < best:
                 best, best_m = gap, m
@@ -144,3 +147,30 @@ def _scan_carefully(grid, samples, placement, wheel, exact, first, last, stride,
     if exact:
         touch.nearest[wheel] = best_m
     return status
+
+
+@kernel
+def _may_come_near(elevation, samples, forward, up, scale, gx, gy, z, s, c, best):
+    """Tell whether a search of a circle from its sample at (s, c) may come near to `best` [m].
+
+    The sample is over (gx, gy), in cells, and the middle of the circle at the height z [m]. Not
+    where the highest cell below the stretch that is searched, a spacing to both sides, stays too
+    far below the lowest place of that stretch.
+    """
+    if not up[2] > 0.0:
+        return True
+    turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
+    c_most, s_most = 1.0, min(1.0, abs(s) + turn_s)
+    if abs(s) > turn_s:
+        c_most = c * turn_c + abs(s) * turn_s
+    way = 1.01 * turn_s * samples.radius * scale  # the arc is a little longer than its sine
+    reach_x = way * (abs(forward[0]) * c_most + abs(up[0]) * s_most)
+    reach_y = way * (abs(forward[1]) * c_most + abs(up[1]) * s_most)
+    ny, nx = elevation.shape
+    top = -np.inf
+    for i in range(max(int(gy - reach_y), 0), min(int(gy + reach_y) + 2, ny)):
+        for j in range(max(int(gx - reach_x), 0), min(int(gx + reach_x) + 2, nx)):
+            if elevation[i, j] > top:
+                top = elevation[i, j]
+    lowest = z - samples.radius * c_most * up[2]
+    return lowest - top < best + CIRCLE_REACH * samples.radius
