@@ -118,7 +118,7 @@ def _legend() -> str:
     )
     return (
         f'<div id="plots-legend" style="font-size:11px;padding:0 8px">{keys}'
-        "&mdash; right, &ndash;&ndash; left; across: distance [m]</div>"
+        "solid: right, dashed: left; across: distance [m]</div>"
     )
 
 
