@@ -1,6 +1,7 @@
 """The loops around the shared torques: speed, heading, wheels that slip, and rate of change."""
 
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from rover_physics.kernels import kernel
 
 Floats = NDArray[np.float64]
 OVERSPEED = 1.3
-"""Mean rate of the wheels, over the wanted one, that is still taken for rolling."""
+"""Rate of the wheels, over the wanted one, that is still taken for rolling."""
 SLOWEST, FASTEST = 0.2, 2.0
 """Bounds of a wheel's speed over the mean that rolling asks for."""
 STALLED = 0.3
@@ -89,29 +90,19 @@ class StallWatch:
 
 
 def rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:
-    """Return the rates (6,) at which wheels roll without slip, with the mean of those measured.
+    """Return the rates (6,) at which the wheels would roll without slip.
+
+    They go with the median of the measured ones: two wheels that spin do not move it.
 
     Args:
         wheel_rates: (6,) measured [rad/s].
-        wanted: Mean that is wanted [rad/s]; a mean far beyond it is that of wheels that slip.
+        wanted: Mean that is wanted [rad/s]; rates far beyond it are those of wheels that slip.
         ratios: (6,) speeds of the wheels' centres, relative to their mean; a wheel that has to
             go backwards or far ahead is more likely one whose contact angle is wrong.
     """
-    rolling = np.empty(len(ratios))
-    _write_rolling(wheel_rates, ratios, OVERSPEED * abs(wanted), rolling)
-    return rolling
-
-
-@kernel
-def _write_rolling(wheel_rates, ratios, most, rolling):
-    total = count = 0.0
-    for wheel in range(len(ratios)):
-        rolling[wheel] = min(max(ratios[wheel], SLOWEST), FASTEST)
-        total += wheel_rates[wheel]
-        count += rolling[wheel]
-    total = min(max(total, -most * len(ratios)), most * len(ratios))
-    for wheel in range(len(ratios)):
-        rolling[wheel] *= total / count
+    ratios = np.minimum(np.maximum(ratios, SLOWEST), FASTEST)
+    most = OVERSPEED * abs(wanted)
+    return ratios * min(max(median((wheel_rates / ratios).tolist()), -most), most)
 
 
 def limit_rate(torques: Floats, last: Floats, most: float) -> Floats:

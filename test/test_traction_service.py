@@ -218,9 +218,12 @@ def test_all_changes_are_limited_alike():
     assert limited == pytest.approx([0.5, 0.25, 0.0, 0.0, 0.0, -0.25])
 
 
-def test_rolling_has_the_mean_that_is_measured_but_not_that_of_spinning_wheels():
+def test_rolling_goes_with_the_wheels_but_not_with_those_that_spin():
     ratios = np.array([1.0, 1.2, 0.8, 1.0, 1.0, 1.0])
-    assert rolling_rates(np.full(6, 0.3), ratios, 0.3) == pytest.approx(0.3 * ratios)
+    rates = 0.3 * ratios
+    assert rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
+    rates[[2, 5]] = 9.0
+    assert rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
     assert rolling_rates(np.full(6, 9.0), ratios, 0.3) == pytest.approx(0.39 * ratios)
 
 
