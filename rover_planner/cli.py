@@ -10,6 +10,7 @@ import typer
 
 from rover_physics.errors import RoverError
 from rover_planner.errors import DemoError, PlanningError
+from rover_planner.extras import need
 from rover_planner.study_command import study
 from rover_planner.view_command import view
 
@@ -236,6 +237,7 @@ def figure4(
     rover: Annotated[str, typer.Option(help="Preset name or rover file.")] = "lsr1",
 ) -> None:
     """Draw Figure 4 of the paper: how the torque of one wheel changes the loads of all."""
+    need("matplotlib", "the picture")
     from rover_physics.rover import load_rover
     from rover_planner.figure4 import draw_figure4
     from rover_planner.progress import show_progress

@@ -5,6 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rover_planner.errors import PlanningError
+from rover_planner.extras import need
+
 if TYPE_CHECKING:
     from rover_planner.studies.runner import StudyResult, Trial
     from rover_planner.studies.study_file import Study
@@ -18,10 +21,10 @@ def study(
 
     Exit code 0 when it ran; 2 for bad input.
     """
+    need("matplotlib", "the picture of a study")
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
 
-    from rover_planner.errors import PlanningError
     from rover_planner.studies.runner import count_trials, run_study
     from rover_planner.studies.study_file import load_study
     from rover_planner.studies.study_plot import draw_study

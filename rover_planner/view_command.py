@@ -1,13 +1,13 @@
 """The command `rover_planner view`: the page that shows the rover on a terrain."""
 
 import contextlib
-import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rover_planner.errors import PlanningError
+from rover_planner.extras import need
 
 if TYPE_CHECKING:
     from rover_physics.rover import Rover
@@ -59,11 +59,9 @@ def view(
         raise PlanningError("--follow and --prediction exclude each other: live or recorded")
     if prediction is not None and terrain is None:
         raise PlanningError("--prediction needs TERRAIN, the map that the prediction is about")
-    _need("viser", "the page needs viser: pip install 'rover_planner[view]'")
+    need("viser", "the page")
     if follow:
-        _need(
-            "rclpy", "--follow needs ROS 2 Jazzy: source it, or pip install 'rover_planner[ros]'"
-        )
+        need("rclpy", "--follow")
     from rover_physics.rover import load_rover
     from rover_planner.viewer.session import ViewSession
 
@@ -82,12 +80,6 @@ def view(
         with contextlib.suppress(KeyboardInterrupt):
             page.wait()
     typer.echo("ended")
-
-
-def _need(module: str, text: str) -> None:
-    """Refuse to start where a module is missing."""
-    if importlib.util.find_spec(module) is None:
-        raise PlanningError(text)
 
 
 def _compile() -> None:
