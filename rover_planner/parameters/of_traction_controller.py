@@ -1,9 +1,8 @@
 """Parameters of `/traction_controller`."""
 
-from msg_adapters.elevation import CELL_HEIGHTS
 from rover_physics.names import WHEEL_JOINTS
+from rover_planner.parameters.of_maps import MAP_INTAKE
 from rover_planner.parameters.spec import ParameterSpec
-from rover_planner.qos import MAP_DURABILITIES
 
 TRACTION_CONTROLLER = (
     ParameterSpec("rover", "lsr1", "Rover that is driven: a preset's name or a rover file."),
@@ -88,25 +87,6 @@ TRACTION_CONTROLLER = (
         "Frame of map and odometry; what comes in another frame is refused.",
         read_only=True,
     ),
-    ParameterSpec(
-        "map_resolution",
-        0.0,
-        "Cell size for clouds; 0 takes their spacing where they are a regular grid.",
-        "m",
-        bounds=(0.0, 10.0),
-    ),
-    ParameterSpec(
-        "cell_height",
-        "max",
-        "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
-        choices=CELL_HEIGHTS,
-    ),
-    ParameterSpec(
-        "map_durability",
-        "either",
-        "Publishers of the map that are heard, by their durability.",
-        choices=MAP_DURABILITIES,
-        read_only=True,
-    ),
+    *MAP_INTAKE,
 )
 """Parameters of `/traction_controller`."""

@@ -1,9 +1,8 @@
 """Parameters of `/traverse_server`."""
 
-from msg_adapters.elevation import CELL_HEIGHTS
 from rover_physics.uncertainty import SIGMAS
+from rover_planner.parameters.of_maps import MAP_INTAKE
 from rover_planner.parameters.spec import ParameterSpec
-from rover_planner.qos import MAP_DURABILITIES
 
 TRAVERSE_SERVER = (
     ParameterSpec("rover", "lsr1", "Rover to ask about: a preset's name or a rover file."),
@@ -72,26 +71,7 @@ TRAVERSE_SERVER = (
         "Frame of the map; requests in another frame are refused.",
         read_only=True,
     ),
-    ParameterSpec(
-        "map_resolution",
-        0.0,
-        "Cell size for clouds; 0 takes their spacing where they are a regular grid.",
-        "m",
-        bounds=(0.0, 10.0),
-    ),
-    ParameterSpec(
-        "cell_height",
-        "max",
-        "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
-        choices=CELL_HEIGHTS,
-    ),
-    ParameterSpec(
-        "map_durability",
-        "either",
-        "Publishers of the map that are heard, by their durability.",
-        choices=MAP_DURABILITIES,
-        read_only=True,
-    ),
+    *MAP_INTAKE,
     ParameterSpec(
         "unknown_cells",
         "refuse",
