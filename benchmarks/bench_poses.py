@@ -6,7 +6,7 @@ from grounds import all_grounds, random_poses, reference_ground
 from measure import Figure, median_time, median_times
 
 from rover_physics.evaluation import WORK, evaluate, new_results, new_work
-from rover_physics.ground import find_roof, height_inside, heights_of
+from rover_physics.ground import find_roof, height_inside
 from rover_physics.linkage import place
 from rover_physics.model_setup import Setup, set_up
 from rover_physics.rover import load_rover
@@ -25,18 +25,18 @@ OTHER_POSE = 1e-3
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
-def settle_all(grid, linkages, samplings, poses, works, results):
+def settle_all(grounds, linkages, samplings, poses, works, results):
     """Settle the rover at poses (n, 3) and do nothing else."""
     work = works[0]
     for i in range(len(poses)):
         results[i].status = settle(
-            grid, linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
+            grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
             results[i].q, work.placement, work.touch, work.J, work.step,
         )  # fmt: skip
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
-def settle_along(grid, linkages, samplings, poses, works, results):
+def settle_along(grounds, linkages, samplings, poses, works, results):
     """Settle the rover at poses (n, 3) of a path, each from the one before it."""
     work = works[0]
     for i in range(len(poses)):
@@ -44,22 +44,22 @@ def settle_along(grid, linkages, samplings, poses, works, results):
         if i > 0 and results[i - 1].status == SETTLED:
             q[:] = results[i - 1].q
             results[i].status = settle_from(
-                grid, linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
+                grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
                 q, work.placement, work.touch, work.J, work.step,
             )  # fmt: skip
         else:
             results[i].status = settle(
-                grid, linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
+                grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
                 q, work.placement, work.touch, work.J, work.step,
             )  # fmt: skip
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
-def look_up_all(elevation, cells):
+def look_up_all(grounds, cells):
     """Look up the heights at `cells` (n, 2) and return the highest."""
-    highest = -np.inf
+    ground, highest = grounds[0], -np.inf
     for k in range(len(cells)):
-        highest = max(highest, height_inside(elevation, cells[k, 0], cells[k, 1]))
+        highest = max(highest, height_inside(ground, cells[k, 0], cells[k, 1]))
     return highest
 
 
@@ -67,7 +67,7 @@ def run_settling(setup: Setup, poses: np.ndarray, kernel=settle_all) -> np.ndarr
     """Settle at all poses and return the results."""
     records = [np.array([record]) for record in (setup.linkage, setup.samples)]
     works, results = np.full(1, new_work(), WORK), new_results(len(poses))
-    kernel(heights_of(setup.ground), *records, poses, works, results)
+    kernel(setup.ground.records, *records, poses, works, results)
     return results
 
 
@@ -79,9 +79,10 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
     of settled poses.
     """
     results = evaluate(*setup, poses)
-    grid, samples = heights_of(setup.ground), setup.samples
+    ground, samples = setup.ground.records[0], setup.samples
+    corner = np.array([ground.x0, ground.y0])
     sines, cosines = samples.sines[: samples.rows], samples.cosines[: samples.rows]
-    laterals, radius, scale = samples.laterals[: samples.circles], samples.radius, grid[4]
+    laterals, radius, scale = samples.laterals[: samples.circles], samples.radius, ground.inverse_resolution
     cells = []
     settled = results[results["status"] == SETTLED]
     work = new_work()
@@ -92,9 +93,9 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
         rim = radius * (sines[:, None] * placed.forward - cosines[:, None] * placed.up)
         for centre in placed.centres:
             points = centre + rim[:, None] + laterals[:, None] * axis
-            at = (points[..., :2] - [grid[2], grid[3]]) * scale
-            middle = (centre[:2] - [grid[2], grid[3]]) * scale
-            roof = find_roof(grid, middle[0], middle[1], samples.reach * scale)
+            at = (points[..., :2] - corner) * scale
+            middle = (centre[:2] - corner) * scale
+            roof = find_roof(ground, middle[0], middle[1], samples.reach * scale)
             if np.isfinite(roof):
                 cells.append(at[points[..., 2] <= roof])
     return np.concatenate(cells), len(settled)
@@ -168,7 +169,7 @@ def measure_floor(rover) -> list[Figure]:
         setup = set_up(rover, reference_ground(name))
         poses = random_poses(reference_ground(name), FLOOR_POSES)
         cells, settled = cells_looked_up(setup, poses)
-        floor = median_time(lambda: look_up_all(setup.ground.elevation, cells), 21)  # noqa: B023
+        floor = median_time(lambda: look_up_all(setup.ground.records, cells), 21)  # noqa: B023
         full = median_time(lambda: evaluate(*setup, poses), 21)  # noqa: B023
         figures += [
             Figure("floor", f"{name}: look-ups per pose", len(cells) / settled, ""),

@@ -3,12 +3,12 @@
 import numpy as np
 
 from rover_physics.clearance import POINTS, point_of_underside
-from rover_physics.ground import height_at_cell, look_up
+from rover_physics.ground import elevation_of, height_at_cell, look_up
 from rover_physics.kernels import kernel
 
 
 @kernel
-def bound_clearance(grid, error, linkage, spread, bounds):
+def bound_clearance(ground, error, linkage, spread, bounds):
     """Write the smallest and largest possible clearance [m] into bounds (2,); NaN over nothing.
 
     Above each cell the underside is lowest where each wheel is at the end of its interval that
@@ -27,37 +27,38 @@ def bound_clearance(grid, error, linkage, spread, bounds):
     shift = turn * (abs(belly[0]) + reach * (np.hypot(R[0, 2], R[1, 2]) + turn))
     bend = turn * turn * reach
     slope_x, slope_y = -R[0, 2] / R[2, 2], -R[1, 2] / R[2, 2]
-    cell = 1.0 / grid.inverse_resolution
+    cell = 1.0 / ground.inverse_resolution
     extent = np.hypot(half + reach, belly[0]) + shift
-    first_j = max(int(np.ceil((origin[0] - extent - grid.x0) / cell)), 0)
-    last_j = min(int(np.floor((origin[0] + extent - grid.x0) / cell)), grid.elevation.shape[1] - 1)
-    first_i = max(int(np.ceil((origin[1] - extent - grid.y0) / cell)), 0)
-    last_i = min(int(np.floor((origin[1] + extent - grid.y0) / cell)), grid.elevation.shape[0] - 1)
+    first_j = max(int(np.ceil((origin[0] - extent - ground.x0) / cell)), 0)
+    last_j = min(int(np.floor((origin[0] + extent - ground.x0) / cell)), ground.columns - 1)
+    first_i = max(int(np.ceil((origin[1] - extent - ground.y0) / cell)), 0)
+    last_i = min(int(np.floor((origin[1] + extent - ground.y0) / cell)), ground.rows - 1)
     least, most = np.inf, np.inf
     for i in range(first_i, last_i + 1):
-        dy = grid.y0 + i * cell - origin[1]
+        dy = ground.y0 + i * cell - origin[1]
         for j in range(first_j, last_j + 1):
-            dx = grid.x0 + j * cell - origin[0]
+            dx = ground.x0 + j * cell - origin[0]
             z = belly[0] / R[2, 2] + slope_x * dx + slope_y * dy
             along = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * z
             across = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * z
             inside = min(along - belly[1], belly[2] - along, across - belly[3], belly[4] - across)
-            height = grid.elevation[i, j]
+            height = elevation_of(ground, i, j)
             if inside < -shift or height != height:
                 continue
             above = origin[2] + z - height
             lowered, raised = _plane_change(R, spread, dx, dy, z)
-            least = min(least, above - error[i, j] + lowered - bend)
+            wrong = elevation_of(error, i, j)
+            least = min(least, above - wrong + lowered - bend)
             if inside >= shift:
-                most = min(most, above + error[i, j] + raised + bend)
+                most = min(most, above + wrong + raised + bend)
     if most == np.inf:
-        least, most = _bound_points(grid, error, spread, belly, shift, bend, least)
+        least, most = _bound_points(ground, error, spread, belly, shift, bend, least)
     if least < np.inf:
         bounds[0], bounds[1] = least, most
 
 
 @kernel
-def _bound_points(grid, error, spread, belly, shift, bend, least):
+def _bound_points(ground, error, spread, belly, shift, bend, least):
     """Return smaller of `least` and the least clearance below POINTS, and the most there [m].
 
     For outlines with no known cell inside, where `belly_clearance` looks at these points.
@@ -66,11 +67,11 @@ def _bound_points(grid, error, spread, belly, shift, bend, least):
     most = np.inf
     for k in range(POINTS):
         x, y, z = point_of_underside(R, origin, belly, k)
-        height, slope_x, slope_y = look_up(grid, x, y)
+        height, slope_x, slope_y = look_up(ground, x, y)
         if height != height:
             continue
-        gx = (x - grid.x0) * grid.inverse_resolution
-        gy = (y - grid.y0) * grid.inverse_resolution
+        gx = (x - ground.x0) * ground.inverse_resolution
+        gy = (y - ground.y0) * ground.inverse_resolution
         wrong = height_at_cell(error, gx, gy) + bend + shift * (abs(slope_x) + abs(slope_y))
         lowered, raised = _plane_change(R, spread, x - origin[0], y - origin[1], z - origin[2])
         least = min(least, z - height + lowered - wrong)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rover_physics.circle_search import search_circle
 from rover_physics.contact import COMPLIANCE
-from rover_physics.ground import height_at_cell, is_cell_on_map
+from rover_physics.ground import elevation_of, height_at_cell, is_cell_on_map
 from rover_physics.kernels import kernel
 from rover_physics.records import record_type
 from rover_physics.wheel_samples import MOST_ANGLES, MOST_CIRCLES
@@ -46,11 +46,12 @@ CONTACTS = record_type(
 
 
 @kernel
-def bound_contacts(grid, error, samples, placement, angles, points, reach, contacts):
+def bound_contacts(ground, error, samples, placement, angles, points, reach, contacts):
     """Write the possible contacts of all wheels of a placed rover into `contacts`.
 
-    `error` (ny, nx) bounds the error of each cell's height [m]; angles (6,) [rad] and points
-    (6, 3) [m] are the nominal contacts; reach (6,) bounds how far the wheels move along [m].
+    `error` is a GROUND whose elevation bounds the error of each cell's height [m]; angles (6,)
+    [rad] and points (6, 3) [m] are the nominal contacts; reach (6,) bounds how far the wheels move
+    along [m].
     """
     R, rim = placement.R, contacts.rim
     for wheel in range(6):
@@ -62,45 +63,46 @@ def bound_contacts(grid, error, samples, placement, angles, points, reach, conta
         contacts.lateral[wheel] = lateral
         contacts.lateral_low[wheel] = contacts.lateral_high[wheel] = lateral
         rim.reach = reach[wheel]
-        rim.largest_error = _find_largest_error(grid, error, samples, placement, wheel)
+        rim.largest_error = _find_largest_error(ground, error, samples, placement, wheel)
         if max(rim.largest_error, rim.reach) > 0.0:
-            _look_around(grid, samples, placement, wheel, angle, rim)
-            _widen(grid, error, samples, placement, wheel, contacts)
+            _look_around(ground, samples, placement, wheel, angle, rim)
+            _widen(ground, error, samples, placement, wheel, contacts)
 
 
 @kernel
-def _find_largest_error(grid, error, samples, placement, wheel):
+def _find_largest_error(ground, error, samples, placement, wheel):
     """Return the largest error [m] of a height within reach of a wheel."""
-    reach = samples.reach * grid.inverse_resolution
-    gx = (placement.centres[wheel, 0] - grid.x0) * grid.inverse_resolution
-    gy = (placement.centres[wheel, 1] - grid.y0) * grid.inverse_resolution
+    reach = samples.reach * ground.inverse_resolution
+    gx = (placement.centres[wheel, 0] - ground.x0) * ground.inverse_resolution
+    gy = (placement.centres[wheel, 1] - ground.y0) * ground.inverse_resolution
     largest = 0.0
-    for i in range(max(int(gy - reach), 0), min(int(gy + reach) + 2, error.shape[0])):
-        for j in range(max(int(gx - reach), 0), min(int(gx + reach) + 2, error.shape[1])):
-            if error[i, j] > largest:
-                largest = error[i, j]
+    for i in range(max(int(gy - reach), 0), min(int(gy + reach) + 2, error.rows)):
+        for j in range(max(int(gx - reach), 0), min(int(gx + reach) + 2, error.columns)):
+            wrong = elevation_of(error, i, j)
+            if wrong > largest:
+                largest = wrong
     return largest
 
 
 @kernel
-def _look_around(grid, samples, placement, wheel, angle, rim):
+def _look_around(ground, samples, placement, wheel, angle, rim):
     """Write the gaps of all samples of a wheel, and where each circle comes nearest."""
     s, c = np.sin(angle), np.cos(angle)
     for m in range(samples.circles):
-        gap, gx, gy = _gap_at(grid, samples, placement, wheel, m, s, c)
+        gap, gx, gy = _gap_at(ground, samples, placement, wheel, m, s, c)
         rim.nearest[m], rim.nearest_angle[m] = np.inf, angle
         if gap == gap:
             rim.nearest[m] = gap
         for k in range(samples.rows):
             gap, gx, gy = _gap_at(
-                grid, samples, placement, wheel, m, samples.sines[k], samples.cosines[k]
+                ground, samples, placement, wheel, m, samples.sines[k], samples.cosines[k]
             )
             rim.gap[m, k] = gap
-        _find_lowest(grid, samples, placement, wheel, m, rim)
+        _find_lowest(ground, samples, placement, wheel, m, rim)
 
 
 @kernel
-def _find_lowest(grid, samples, placement, wheel, m, rim):
+def _find_lowest(ground, samples, placement, wheel, m, rim):
     """Write where the gap of circle m is smallest near each sample that is below its neighbours.
 
     Beside a face or on an edge much lies between two samples.
@@ -113,7 +115,7 @@ def _find_lowest(grid, samples, placement, wheel, m, rim):
         if gap != gap or gap > before or gap > after:
             continue
         gap, s, c = search_circle(
-            grid, samples, placement, wheel, samples.laterals[m],
+            ground, samples, placement, wheel, samples.laterals[m],
             samples.sines[k], samples.cosines[k],
         )  # fmt: skip
         angle = np.arctan2(s, c)
@@ -123,17 +125,18 @@ def _find_lowest(grid, samples, placement, wheel, m, rim):
 
 
 @kernel
-def _gap_at(grid, samples, placement, wheel, m, s, c):
+def _gap_at(ground, samples, placement, wheel, m, s, c):
     """Return the gap [m] at one point of the rim, NaN off known ground, and its place in cells."""
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     across, radius = samples.laterals[m], samples.radius
     x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
     y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
     z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
-    gx, gy = (x - grid.x0) * grid.inverse_resolution, (y - grid.y0) * grid.inverse_resolution
-    if not is_cell_on_map(grid.elevation, gx, gy):
+    gx = (x - ground.x0) * ground.inverse_resolution
+    gy = (y - ground.y0) * ground.inverse_resolution
+    if not is_cell_on_map(ground, gx, gy):
         return np.nan, gx, gy
-    return z - height_at_cell(grid.elevation, gx, gy), gx, gy
+    return z - height_at_cell(ground, gx, gy), gx, gy
 
 
 @kernel
@@ -146,14 +149,14 @@ def _error_between(error, ax, ay, bx, by):
     for place in range(2):
         gx, gy = (ax, ay) if place == 0 else (bx, by)
         other_x, other_y = (bx, by) if place == 0 else (ax, ay)
-        i = min(int(gy), error.shape[0] - 2)
-        j = min(int(gx), error.shape[1] - 2)
+        i = min(int(gy), error.rows - 2)
+        j = min(int(gx), error.columns - 2)
         for row in range(i, i + 2):
             for column in range(j, j + 2):
                 here = _weight(gx, gy, row, column)
                 there = _weight(other_x, other_y, row, column)
                 if place == 0 or there == 0.0:
-                    change = (here - there) * error[row, column]
+                    change = (here - there) * elevation_of(error, row, column)
                     total += change * change
     return np.sqrt(total)
 
@@ -170,7 +173,7 @@ def _angle_of_row(samples, k):
 
 
 @kernel
-def _widen(grid, error, samples, placement, wheel, contacts):
+def _widen(ground, error, samples, placement, wheel, contacts):
     """Widen the contact of a wheel to all points of its rim that may touch."""
     rim = contacts.rim
     best = 0
@@ -180,11 +183,11 @@ def _widen(grid, error, samples, placement, wheel, contacts):
     give = COMPLIANCE * samples.radius
     first, last, largest = contacts.lateral[wheel], contacts.lateral[wheel], 0.0
     for m in range(samples.circles):
-        reach = _error_to_circle(grid, error, samples, placement, wheel, m, best, rim)
+        reach = _error_to_circle(ground, error, samples, placement, wheel, m, best, rim)
         largest = max(largest, reach)
         if rim.nearest[m] - rim.nearest[best] <= reach + give:
             first, last = min(first, samples.laterals[m]), max(last, samples.laterals[m])
-            _widen_angles(grid, error, samples, placement, wheel, m, contacts)
+            _widen_angles(ground, error, samples, placement, wheel, m, contacts)
     # Circles closer to each other than the give share the load: small errors shift it a little.
     share = min(1.0, largest / give)
     middle = contacts.lateral[wheel]
@@ -193,11 +196,11 @@ def _widen(grid, error, samples, placement, wheel, contacts):
 
 
 @kernel
-def _error_to_circle(grid, error, samples, placement, wheel, m, best, rim):
+def _error_to_circle(ground, error, samples, placement, wheel, m, best, rim):
     """Return a bound on the error [m] between the gaps of the nearest points of two circles."""
     here, there = rim.nearest_angle[m], rim.nearest_angle[best]
-    gap, ax, ay = _gap_at(grid, samples, placement, wheel, m, np.sin(here), np.cos(here))
-    gap, bx, by = _gap_at(grid, samples, placement, wheel, best, np.sin(there), np.cos(there))
+    gap, ax, ay = _gap_at(ground, samples, placement, wheel, m, np.sin(here), np.cos(here))
+    gap, bx, by = _gap_at(ground, samples, placement, wheel, best, np.sin(there), np.cos(there))
     return np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, here, there))
 
 
@@ -210,19 +213,19 @@ def _shift_between(rim, angle, other):
 
 
 @kernel
-def _widen_angles(grid, error, samples, placement, wheel, m, contacts):
+def _widen_angles(ground, error, samples, placement, wheel, m, contacts):
     """Widen the angles of a wheel to those at which circle m may touch."""
     rim = contacts.rim
     nearest = rim.nearest_angle[m]
     contacts.angle_low[wheel] = min(contacts.angle_low[wheel], nearest)
     contacts.angle_high[wheel] = max(contacts.angle_high[wheel], nearest)
     for side in range(2):
-        inside, outside = _find_farthest(grid, error, samples, placement, wheel, m, side, rim)
+        inside, outside = _find_farthest(ground, error, samples, placement, wheel, m, side, rim)
         if contacts.angle_low[wheel] <= outside <= contacts.angle_high[wheel]:
             continue
         for _ in range(HALVINGS):
             middle = 0.5 * (inside + outside)
-            if _may_touch(grid, error, samples, placement, wheel, m, middle, nearest, rim):
+            if _may_touch(ground, error, samples, placement, wheel, m, middle, nearest, rim):
                 inside = middle
             else:
                 outside = middle
@@ -231,7 +234,7 @@ def _widen_angles(grid, error, samples, placement, wheel, m, contacts):
 
 
 @kernel
-def _find_farthest(grid, error, samples, placement, wheel, m, side, rim):
+def _find_farthest(ground, error, samples, placement, wheel, m, side, rim):
     """Return the last sampled angle [rad] at which circle m may touch, and the next outwards.
 
     Behind the nearest point (side 0) or ahead of it (1); samples count with the smallest gap
@@ -252,10 +255,10 @@ def _find_farthest(grid, error, samples, placement, wheel, m, side, rim):
         if lowest != lowest and rim.gap[m, k] - rim.nearest[m] > doubt:
             continue
         if lowest == lowest and _may_touch(
-            grid, error, samples, placement, wheel, m, lowest, nearest, rim
+            ground, error, samples, placement, wheel, m, lowest, nearest, rim
         ):
             return lowest, _clip_angle(max(away * angle, away * lowest + spacing) * away)
-        if _may_touch(grid, error, samples, placement, wheel, m, angle, nearest, rim):
+        if _may_touch(ground, error, samples, placement, wheel, m, angle, nearest, rim):
             return angle, _clip_angle(angle + away * spacing)
     return nearest, outside
 
@@ -266,16 +269,16 @@ def _clip_angle(angle):
 
 
 @kernel
-def _may_touch(grid, error, samples, placement, wheel, m, angle, nearest, rim):
+def _may_touch(ground, error, samples, placement, wheel, m, angle, nearest, rim):
     """Tell whether circle m may touch at `angle` [rad] rather than on the way to `nearest`."""
     s, c = np.sin(angle), np.cos(angle)
-    gap, ax, ay = _gap_at(grid, samples, placement, wheel, m, s, c)
+    gap, ax, ay = _gap_at(ground, samples, placement, wheel, m, s, c)
     if gap != gap:
         return False
     for rung in range(RUNGS):
         other = angle + (nearest - angle) * ((rung + 1.0) / RUNGS) ** 2
         s, c = np.sin(other), np.cos(other)
-        lower, bx, by = _gap_at(grid, samples, placement, wheel, m, s, c)
+        lower, bx, by = _gap_at(ground, samples, placement, wheel, m, s, c)
         if not gap - lower > 0.0:
             continue
         doubt = np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, angle, other))

@@ -15,7 +15,7 @@ import numpy as np
 
 from rover_physics.equilibrium import FREE_FORCES, balance_forces
 from rover_physics.evaluation import find_tip_over
-from rover_physics.ground import friction_at, soil_row_at
+from rover_physics.ground import SOIL_NUMBERS, copy_soil, friction_at, soil_row_at
 from rover_physics.kernels import kernel
 from rover_physics.linkage import place, place_masses
 from rover_physics.records import record_type
@@ -55,6 +55,7 @@ BOX = record_type(
     ("mu_high", float, (6,)),  # largest one
     ("soils", np.int64, (6, MOST_SOILS)),  # rows of the soils that it may touch
     ("soil_count", np.int64, (6,)),  # number of these
+    ("soil", float, (SOIL_NUMBERS,)),  # one of them
     ("aim", float, (OUTPUTS,)),  # weights of the outputs in the sum that is taken to its extreme
     ("gain", float, (INPUTS,)),  # change of that sum with one input at its better end
     ("end", float, (INPUTS,)),  # that end
@@ -111,7 +112,7 @@ def _fill_box(spread, contacts, box):
 def _find_grounds(ground, samples, settings, placement, contacts, box):
     """Write friction and soils of all cells that each wheel of a placed rover may touch."""
     cell = 1.0 / ground.inverse_resolution
-    layered = ground.friction.shape[0] > 0 or ground.soil.shape[0] > 0
+    layered = ground.friction != 0 or ground.soil != 0
     for wheel in range(6):
         left, right, near, far = _find_footprint(samples, placement, wheel, contacts)
         box.mu_low[wheel], box.mu_high[wheel] = np.inf, 0.0
@@ -222,8 +223,9 @@ def _worst_use(ground, linkage, settings, wheel, N, T, S, box):
     weight = linkage.mass * linkage.gravity
     worst = 0.0
     for k in range(box.soil_count[wheel]):
+        copy_soil(ground, box.soils[wheel, k], box.soil)
         solved = solve_wheel(
-            ground.soils[box.soils[wheel, k]], box.mu_low[wheel], linkage.radius, linkage.width,
+            box.soil, box.mu_low[wheel], linkage.radius, linkage.width,
             weight * N, settings.direction * weight * T, weight * S,
         )  # fmt: skip
         worst = max(worst, solved[5])

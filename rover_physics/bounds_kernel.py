@@ -17,7 +17,7 @@ from rover_physics.bounds_pose import (
 )
 from rover_physics.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.evaluation import CHUNK, MOST_CHUNKS
-from rover_physics.ground import Grid
+from rover_physics.ground import copy_soil
 from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.linkage import place
 from rover_physics.records import new_record, record_type
@@ -69,9 +69,9 @@ def find_bounds(setup, low, high, error, poses, nominal) -> Any:
 
     Args:
         setup: The `Setup` of the sweep.
-        low: Grid of the lowest ground.
-        high: Grid of the highest ground.
-        error: (ny, nx) how far both are from the ground in between [m].
+        low: The lowest ground.
+        high: The highest ground.
+        error: A Ground whose elevation is how far both are from the ground in between [m].
         poses: (n, 3) x, y [m] and yaw [rad].
         nominal: (n,) NOMINAL, what was predicted on the ground in between.
     """
@@ -80,21 +80,22 @@ def find_bounds(setup, low, high, error, poses, nominal) -> Any:
     for name in ("held_height", "held_angle"):
         works["spread"]["model"]["touch"][name] = np.nan
     records = (np.array([record]) for record in setup[1:])
+    grounds = (ground.records for ground in (low, high, error))
     with threads_worth(BOUNDS_EFFORT * len(poses)):
-        bound_poses(setup.ground, low, high, error, *records, poses, nominal, works, bounds)
+        bound_poses(setup.ground.records, *grounds, *records, poses, nominal, works, bounds)
     return bounds
 
 
 @sweep_kernel
 def bound_poses(
-    ground, low, high, error, linkages, samplings, settings, poses, nominal, works, bounds
+    grounds, low, high, error, linkages, samplings, settings, poses, nominal, works, bounds
 ):
     """Bound the poses into `bounds` in chunks, as many as there are work spaces."""
     n, chunks = poses.shape[0], works.size
     for chunk in prange(chunks):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             bounds[i].status = bound_pose(
-                ground, low, high, error, linkages[0], samplings[0], settings[0],
+                grounds[0], low[0], high[0], error[0], linkages[0], samplings[0], settings[0],
                 poses[i], nominal[i], works[chunk], bounds[i],
             )  # fmt: skip
 
@@ -107,17 +108,16 @@ def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nomin
         return NOT_SETTLED
     for k in range(6):
         spread.q[k] = nominal.q[k]
-    grid = Grid(ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution)
-    outcome = bound_configuration(grid, low, high, linkage, samples, pose, spread)
+    outcome = bound_configuration(ground, low, high, linkage, samples, pose, spread)
     if outcome != BOUNDED:
         return outcome
     placement = spread.model.placement
     place(linkage, pose[0], pose[1], pose[2], spread.q, placement)
     bound_contacts(
-        grid, error, samples, placement, nominal.contact_angle, nominal.contact_points,
+        ground, error, samples, placement, nominal.contact_angle, nominal.contact_points,
         spread.reach, contacts,
     )  # fmt: skip
-    bound_clearance(grid, error, linkage, spread, result.belly_clearance)
+    bound_clearance(ground, error, linkage, spread, result.belly_clearance)
     if not bound_forces(ground, linkage, samples, settings, pose, spread, contacts, box):
         return SINGULAR
     _write_configuration(spread, result)
@@ -160,12 +160,12 @@ def _write_wheel(ground, linkage, settings, wheel, box, result):
     most = max(abs(backward), abs(forward))
     least = min(abs(backward), abs(forward)) if backward * forward > 0.0 else 0.0
     result.wheel_loads[wheel, 0], result.wheel_loads[wheel, 1] = lightest, heaviest
-    resistance, shallowest, deepest = 0.0, 0.0, 0.0
+    resistance, shallowest, deepest, soil = 0.0, 0.0, 0.0, box.soil
     if settings.on_soil:
         least = 0.0
         shallowest = np.inf
         for k in range(box.soil_count[wheel]):
-            soil = ground.soils[box.soils[wheel, k]]
+            copy_soil(ground, box.soils[wheel, k], soil)
             light = solve_wheel(soil, 1.0, linkage.radius, linkage.width, lightest, 0.0, 0.0)
             heavy = solve_wheel(soil, 1.0, linkage.radius, linkage.width, heaviest, 0.0, 0.0)
             shallowest, deepest = min(shallowest, light[1]), max(deepest, heavy[1])

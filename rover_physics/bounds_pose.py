@@ -61,12 +61,12 @@ SPREAD = record_type(
 
 
 @kernel
-def bound_configuration(grid, low, high, linkage, samples, pose, spread):
+def bound_configuration(ground, low, high, linkage, samples, pose, spread):
     """Write into `spread` how far its nominal q may change between two surfaces.
 
     pose (3,) is x, y [m] and yaw [rad]. Returns BOUNDED or what keeps it from being bounded.
     """
-    outcome = _find_heights(grid, low, high, linkage, samples, pose, spread)
+    outcome = _find_heights(ground, low, high, linkage, samples, pose, spread)
     if outcome != BOUNDED:
         return outcome
     if _may_change_level(low, high, linkage, samples, spread):
@@ -84,7 +84,7 @@ def bound_configuration(grid, low, high, linkage, samples, pose, spread):
 
 
 @kernel
-def _find_heights(grid, low, high, linkage, samples, pose, spread):
+def _find_heights(ground, low, high, linkage, samples, pose, spread):
     """Write the response and the interval of each wheel's height; leave the nominal touch."""
     work = spread.model
     placement, touch = work.placement, work.touch
@@ -100,7 +100,7 @@ def _find_heights(grid, low, high, linkage, samples, pose, spread):
                 spread.low[wheel] = -touch.gap[wheel]
             else:
                 spread.high[wheel] = -touch.gap[wheel]
-        outcome = _touch_on(grid, samples, placement, wheel, touch)
+        outcome = _touch_on(ground, samples, placement, wheel, touch)
         if outcome != BOUNDED:
             return outcome
         gap = touch.gap[wheel]
@@ -223,12 +223,12 @@ def _shift(ax, ay, az, point, pivot, forward):
 
 
 @kernel
-def _touch_on(grid, samples, placement, wheel, touch):
+def _touch_on(ground, samples, placement, wheel, touch):
     """Find the touch of a wheel on one surface."""
-    outcome = find_touch(grid, samples, placement, wheel, QUICK, touch)
+    outcome = find_touch(ground, samples, placement, wheel, QUICK, touch)
     if outcome != TOUCHING or touch.gap[wheel] != touch.gap[wheel]:
         return OFF_MAP_NEAR if outcome == OFF_MAP else UNKNOWN_NEAR
-    find_touch(grid, samples, placement, wheel, FULL, touch)
+    find_touch(ground, samples, placement, wheel, FULL, touch)
     return BOUNDED
 
 

@@ -18,7 +18,7 @@ BESIDE_SHARE = 0.8
 
 
 @kernel
-def search_circle(grid, samples, placement, wheel, across, s, c):
+def search_circle(ground, samples, placement, wheel, across, s, c):
     """Return the smallest gap [m] of a circle near the angle of (s, c), and where: sine, cosine.
 
     On a plane the circle touches in the direction of the plane's normal, so the first trials look
@@ -43,7 +43,7 @@ def search_circle(grid, samples, placement, wheel, across, s, c):
     back_gap, ahead_gap, back_rate, ahead_rate = np.inf, np.inf, 0.0, 0.0
     for trial in range(REFINEMENTS):
         height, slope_x, slope_y = look_up(
-            grid, x + radius * (s * ahead_x - c * up_x), y + radius * (s * ahead_y - c * up_y)
+            ground, x + radius * (s * ahead_x - c * up_x), y + radius * (s * ahead_y - c * up_y)
         )
         gap = z - radius * c * up_z - height
         rise = slope_x * ahead_x + slope_y * ahead_y
@@ -83,9 +83,9 @@ def search_circle(grid, samples, placement, wheel, across, s, c):
 
 
 @kernel
-def refine_from(grid, samples, placement, wheel, m, s, c, touch):
+def refine_from(ground, samples, placement, wheel, m, s, c, touch):
     """Search circle m near (s, c), keep what is nearer than before, and return the gap found."""
-    gap, s, c = search_circle(grid, samples, placement, wheel, samples.laterals[m], s, c)
+    gap, s, c = search_circle(ground, samples, placement, wheel, samples.laterals[m], s, c)
     if gap < touch.circle_gap[wheel, m]:
         touch.circle_gap[wheel, m] = gap
         touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
@@ -93,17 +93,17 @@ def refine_from(grid, samples, placement, wheel, m, s, c, touch):
 
 
 @kernel
-def refine_circle(grid, samples, placement, wheel, m, touch):
+def refine_circle(ground, samples, placement, wheel, m, touch):
     """Search circle m anew from where it was nearest."""
     s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
     touch.circle_gap[wheel, m] = np.inf
-    refine_from(grid, samples, placement, wheel, m, s, c, touch)
+    refine_from(ground, samples, placement, wheel, m, s, c, touch)
     if touch.circle_gap[wheel, m] == np.inf:
         touch.circle_gap[wheel, m] = np.nan
 
 
 @kernel
-def refine_others(grid, samples, placement, wheel, touch):
+def refine_others(ground, samples, placement, wheel, touch):
     """Look closer at the circles with samples that come near to the smallest gap."""
     reach = touch.noted_gap[wheel] + CIRCLE_REACH * samples.radius
     nearest = touch.nearest[wheel]
@@ -118,23 +118,23 @@ def refine_others(grid, samples, placement, wheel, touch):
             if abs(s * c0 - c * s0) < samples.spacing_sine and not lower:
                 s, c = s0, c0
             if m != nearest or s != s0:
-                refine_from(grid, samples, placement, wheel, m, s, c, touch)
+                refine_from(ground, samples, placement, wheel, m, s, c, touch)
         if touch.second_gap[wheel, m] <= reach:
             k = touch.second_row[wheel, m]
             s, c = samples.sines[k], samples.cosines[k]
-            refine_from(grid, samples, placement, wheel, m, s, c, touch)
+            refine_from(ground, samples, placement, wheel, m, s, c, touch)
         if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
             touch.nearest[wheel] = m
     reach = touch.circle_gap[wheel, touch.nearest[wheel]] + BESIDE_REACH * samples.radius
     for m in range(samples.circles):
         if touch.circle_gap[wheel, m] <= reach:
-            _look_beside(grid, samples, placement, wheel, m, touch)
+            _look_beside(ground, samples, placement, wheel, m, touch)
             if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
                 touch.nearest[wheel] = m
 
 
 @kernel
-def _look_beside(grid, samples, placement, wheel, m, touch):
+def _look_beside(ground, samples, placement, wheel, m, touch):
     """Search circle m from between the samples, too, where the ground comes nearer there.
 
     Over a plane the gap grows away from the smallest with the rise of the circle; where it grows
@@ -154,5 +154,5 @@ def _look_beside(grid, samples, placement, wheel, m, touch):
         x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
         y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
         z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
-        if z - look_up(grid, x, y)[0] < limit:
-            refine_from(grid, samples, placement, wheel, m, s, c, touch)
+        if z - look_up(ground, x, y)[0] < limit:
+            refine_from(ground, samples, placement, wheel, m, s, c, touch)

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rover_physics.ground import BLOCK, look_up
+from rover_physics.addresses import read_float
+from rover_physics.ground import BLOCK, elevation_of, look_up
 from rover_physics.kernels import kernel
 
 HALF = 0.5 * (BLOCK - 1)
@@ -37,44 +38,50 @@ class Underside(NamedTuple):
 
 
 @kernel
-def belly_clearance(grid, ceiling, linkage, placement):
+def belly_clearance(ground, linkage, placement):
     """Return the smallest height [m] of the underside above the known ground below it.
 
     Looked up at all cell centres within the outline of the underside; where none is known there,
     as between large cells, at nine points of it, and NaN where they too are unknown. The block of
     cells that may come nearest is looked at first; others are passed over whose highest ground,
-    as `ceiling` has it, stays farther below than what is found already.
+    stays farther below than what is found already.
     """
     R, origin, belly = placement.R, placement.origin, linkage.belly
     if not R[2, 2] > 0.0:
         return np.nan
-    plane = _describe_underside(grid, R, origin, belly)
-    low_i, high_i, low_j, high_j = _blocks_below(grid, R, origin, belly, ceiling)
+    plane = _describe_underside(ground, R, origin, belly)
+    low_i, high_i, low_j, high_j = _blocks_below(ground, R, origin, belly)
     nearest, nearest_i, nearest_j = np.inf, low_i, low_j
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
-            bound = _lowest_above(plane, bi, bj) - ceiling[bi, bj]
+            bound = _lowest_above(plane, bi, bj) - _ceiling_of(ground, bi, bj)
             if bound < nearest and _is_below(plane, belly, bi, bj):
                 nearest, nearest_i, nearest_j = bound, bi, bj
     smallest = np.inf
     if nearest < np.inf:
-        smallest = _clear_block(grid.elevation, plane, belly, nearest_i, nearest_j, np.inf)
+        smallest = _clear_block(ground, plane, belly, nearest_i, nearest_j, np.inf)
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
-            if _lowest_above(plane, bi, bj) - ceiling[bi, bj] < smallest and _is_below(
+            if _lowest_above(plane, bi, bj) - _ceiling_of(ground, bi, bj) < smallest and _is_below(
                 plane, belly, bi, bj
             ):
-                smallest = _clear_block(grid.elevation, plane, belly, bi, bj, smallest)
-    return smallest if smallest < np.inf else _clear_points(grid, R, origin, belly)
+                smallest = _clear_block(ground, plane, belly, bi, bj, smallest)
+    return smallest if smallest < np.inf else _clear_points(ground, R, origin, belly)
 
 
 @kernel
-def _clear_points(grid, R, origin, belly):
+def _ceiling_of(ground, bi, bj):
+    """Return the highest known ground [m] of a block, -inf where none is known."""
+    return read_float(ground.ceiling, bi * ground.block_columns + bj)
+
+
+@kernel
+def _clear_points(ground, R, origin, belly):
     """Return the smallest clearance [m] below POINTS of the underside, NaN if none is known."""
     smallest = np.inf
     for k in range(POINTS):
         x, y, z = point_of_underside(R, origin, belly, k)
-        clearance = z - look_up(grid, x, y)[0]
+        clearance = z - look_up(ground, x, y)[0]
         if clearance < smallest:
             smallest = clearance
     return smallest if smallest < np.inf else np.nan
@@ -93,9 +100,9 @@ def point_of_underside(R, origin, belly, k):
 
 
 @kernel
-def _describe_underside(grid, R, origin, belly):
-    cell = 1.0 / grid.inverse_resolution
-    dx, dy = grid.x0 - origin[0], grid.y0 - origin[1]
+def _describe_underside(ground, R, origin, belly):
+    cell = 1.0 / ground.inverse_resolution
+    dx, dy = ground.x0 - origin[0], ground.y0 - origin[1]
     rise_x, rise_y = -R[0, 2] / R[2, 2], -R[1, 2] / R[2, 2]
     z = belly[0] / R[2, 2] + rise_x * dx + rise_y * dy
     z_i, z_j = rise_y * cell, rise_x * cell
@@ -135,12 +142,12 @@ def _is_below(plane, belly, bi, bj):
 
 
 @kernel
-def _clear_block(elevation, plane, belly, bi, bj, smallest):
+def _clear_block(ground, plane, belly, bi, bj, smallest):
     """Return the smaller of `smallest` and the clearance [m] above the cells of a block."""
-    for i in range(BLOCK * bi, min(BLOCK * (bi + 1), elevation.shape[0])):
+    for i in range(BLOCK * bi, min(BLOCK * (bi + 1), ground.rows)):
         z = plane.z + plane.z_i * i
-        for j in range(BLOCK * bj, min(BLOCK * (bj + 1), elevation.shape[1])):
-            clearance = z + plane.z_j * j - elevation[i, j]
+        for j in range(BLOCK * bj, min(BLOCK * (bj + 1), ground.columns)):
+            clearance = z + plane.z_j * j - elevation_of(ground, i, j)
             if clearance < smallest:
                 along = plane.along + plane.along_i * i + plane.along_j * j
                 across = plane.across + plane.across_i * i + plane.across_j * j
@@ -150,7 +157,7 @@ def _clear_block(elevation, plane, belly, bi, bj, smallest):
 
 
 @kernel
-def _blocks_below(grid, R, origin, belly, ceiling):
+def _blocks_below(ground, R, origin, belly):
     """Return the smallest and largest row and column of the blocks around the underside."""
     low_x = low_y = np.inf
     high_x = high_y = -np.inf
@@ -161,11 +168,11 @@ def _blocks_below(grid, R, origin, belly, ceiling):
         y = origin[1] + R[1, 0] * along + R[1, 1] * across + R[1, 2] * belly[0]
         low_x, high_x = min(low_x, x), max(high_x, x)
         low_y, high_y = min(low_y, y), max(high_y, y)
-    scale = grid.inverse_resolution
-    last_i, last_j = ceiling.shape[0] - 1, ceiling.shape[1] - 1
+    scale = ground.inverse_resolution
+    last_i, last_j = ground.block_rows - 1, ground.block_columns - 1
     return (
-        max(int(np.floor((low_y - grid.y0) * scale)) // BLOCK, 0),
-        min(int(np.ceil((high_y - grid.y0) * scale)) // BLOCK, last_i),
-        max(int(np.floor((low_x - grid.x0) * scale)) // BLOCK, 0),
-        min(int(np.ceil((high_x - grid.x0) * scale)) // BLOCK, last_j),
+        max(int(np.floor((low_y - ground.y0) * scale)) // BLOCK, 0),
+        min(int(np.ceil((high_y - ground.y0) * scale)) // BLOCK, last_i),
+        max(int(np.floor((low_x - ground.x0) * scale)) // BLOCK, 0),
+        min(int(np.ceil((high_x - ground.x0) * scale)) // BLOCK, last_j),
     )

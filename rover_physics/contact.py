@@ -21,7 +21,7 @@ that share the load. On a plane a wheel thus touches in its middle, not on an ed
 
 
 @kernel
-def find_touch(grid, samples, placement, wheel, scope, touch):
+def find_touch(ground, samples, placement, wheel, scope, touch):
     """Find where `wheel` is nearest to the ground and write it into row `wheel` of `touch`.
 
     `scope` says how thoroughly: COARSE looks at every other sample of the middle circle, QUICK
@@ -37,17 +37,17 @@ def find_touch(grid, samples, placement, wheel, scope, touch):
         _hold(placement, wheel, touch)
         return status
     if scope != NEAR and scope != AGAIN:
-        status = scan_rim(grid, samples, placement, wheel, scope, touch)
+        status = scan_rim(ground, samples, placement, wheel, scope, touch)
         if touch.noted_gap[wheel] == np.inf:
             touch.gap[wheel] = np.nan
             return status
         if scope in (COARSE, QUICK):
             _take_sample(samples, wheel, touch)
     if scope in (QUICK, NEAR):
-        refine_circle(grid, samples, placement, wheel, touch.nearest[wheel], touch)
+        refine_circle(ground, samples, placement, wheel, touch.nearest[wheel], touch)
     elif scope in (FULL, AGAIN):
-        refine_others(grid, samples, placement, wheel, touch)
-    _write_touch(grid, samples, placement, wheel, scope != COARSE, touch)
+        refine_others(ground, samples, placement, wheel, touch)
+    _write_touch(ground, samples, placement, wheel, scope != COARSE, touch)
     return status
 
 
@@ -63,14 +63,14 @@ def _take_sample(samples, wheel, touch):
 
 
 @kernel
-def _write_touch(grid, samples, placement, wheel, with_normal, touch):
+def _write_touch(ground, samples, placement, wheel, with_normal, touch):
     """Write gap, point and where asked for the normal of a wheel on its nearest circle."""
     m = touch.nearest[wheel]
     touch.gap[wheel] = touch.circle_gap[wheel, m]
     s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
     write_point(samples, placement, wheel, s, c, samples.laterals[m], touch)
     if with_normal:
-        height, slope_x, slope_y = look_up(grid, touch.point[wheel, 0], touch.point[wheel, 1])
+        height, slope_x, slope_y = look_up(ground, touch.point[wheel, 0], touch.point[wheel, 1])
         write_normal(placement, wheel, s, c, slope_x, slope_y, touch)
 
 

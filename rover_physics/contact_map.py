@@ -10,7 +10,7 @@ import numpy as np
 
 from rover_physics.contact_estimate import ContactEstimate
 from rover_physics.errors import ModelError
-from rover_physics.ground import height_at_cell, heights_of, is_cell_on_map, pack_ground
+from rover_physics.ground import height_at_cell, is_cell_on_map, pack_ground
 from rover_physics.kernels import kernel
 from rover_physics.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.manipulator import body_mass_and_com
@@ -39,7 +39,7 @@ class MapContactFinder:
         """Prepare for a rover and a map."""
         self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
         self._radius = rover.wheel.radius
-        self._grid = heights_of(pack_ground(terrain))
+        self._ground = pack_ground(terrain)
         self._resolution = terrain.resolution
         self._placements = array_of(new_record(PLACEMENT))
         self._found = np.empty((3, PLACES, 2))
@@ -61,8 +61,8 @@ class MapContactFinder:
         q = np.array([pose[2], state.roll, state.pitch, state.rocker_angle, *state.bogie_angles])
         angles, gaps, pose = np.zeros(6), np.empty(6), np.asarray(pose, dtype=float)
         _find_angles(
-            self._grid, self._linkages, self._placements, 1.0 if forward else -1.0, pose, q,
-            self._found, gaps, angles,
+            self._ground.records, self._linkages, self._placements,
+            1.0 if forward else -1.0, pose, q, self._found, gaps, angles,
         )  # fmt: skip
         known = np.isfinite(gaps) & np.isfinite(angles)
         if not known.all():
@@ -75,15 +75,15 @@ class MapContactFinder:
 
 
 @kernel
-def _find_angles(grid, linkages, placements, ahead, pose, q, found, gaps, angles):
+def _find_angles(grounds, linkages, placements, ahead, pose, q, found, gaps, angles):
     """Write gaps [m] at the given height, and angles [rad] at the height that the map tells."""
-    linkage, placement = linkages[0], placements[0]
+    ground, linkage, placement = grounds[0], linkages[0], placements[0]
     place(linkage, pose[0], pose[1], pose[3], q, placement)
-    _measure_gaps(grid, linkage, placement, found, gaps)
+    _measure_gaps(ground, linkage, placement, found, gaps)
     q[0] -= _median(gaps)
     if np.isfinite(q[0]):
         place(linkage, pose[0], pose[1], pose[3], q, placement)
-        _find_nearest(grid, linkage, placement, ahead, found, angles)
+        _find_nearest(ground, linkage, placement, ahead, found, angles)
 
 
 @kernel
@@ -104,21 +104,21 @@ def _median(values):
 
 
 @kernel
-def _measure_gaps(grid, linkage, placement, found, gaps):
+def _measure_gaps(ground, linkage, placement, found, gaps):
     """Write how far the ground is off each wheel's middle circle [m], NaN where unknown."""
     for wheel in range(6):
-        _scan_profile(grid, placement, wheel, 0.0, linkage.radius, found, 0)
+        _scan_profile(ground, placement, wheel, 0.0, linkage.radius, found, 0)
         gaps[wheel] = found[0, 0, 0] - linkage.radius
 
 
 @kernel
-def _find_nearest(grid, linkage, placement, ahead, found, angles):
+def _find_nearest(ground, linkage, placement, ahead, found, angles):
     """Write for each wheel the angle most ahead of those where it is about nearest."""
     for wheel in range(6):
         nearest = np.inf
         for across in range(3):
             offset = 0.5 * (across - 1) * linkage.width
-            _scan_profile(grid, placement, wheel, offset, linkage.radius, found, across)
+            _scan_profile(ground, placement, wheel, offset, linkage.radius, found, across)
             nearest = min(nearest, found[across, 0, 0])
         limit = nearest + NEARLY * linkage.radius
         angles[wheel] = np.nan
@@ -130,7 +130,7 @@ def _find_nearest(grid, linkage, placement, ahead, found, angles):
 
 
 @kernel
-def _scan_profile(grid, placement, wheel, offset, radius, found, across):
+def _scan_profile(ground, placement, wheel, offset, radius, found, across):
     """Look along the ground in the plane of a wheel, `offset` [m] from its middle.
 
     Writes into found[across] (PLACES, 2) distance [m] from the wheel's centre and contact angle
@@ -147,11 +147,11 @@ def _scan_profile(grid, placement, wheel, offset, radius, found, across):
     count, falling, last, last_angle = 0, False, np.inf, 0.0
     for k in range(-STEPS, STEPS + 1):
         x1 = k * step
-        gx = (cx + x1 * forward[0] - grid.x0) * grid.inverse_resolution
-        gy = (cy + x1 * forward[1] - grid.y0) * grid.inverse_resolution
+        gx = (cx + x1 * forward[0] - ground.x0) * ground.inverse_resolution
+        gy = (cy + x1 * forward[1] - ground.y0) * ground.inverse_resolution
         height = np.nan
-        if is_cell_on_map(grid.elevation, gx, gy):
-            height = height_at_cell(grid.elevation, gx, gy)
+        if is_cell_on_map(ground, gx, gy):
+            height = height_at_cell(ground, gx, gy)
         if height != height:
             found[across, 0, 0] = np.nan
             return

@@ -7,7 +7,7 @@ from numba import prange
 
 from rover_physics.clearance import belly_clearance
 from rover_physics.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
-from rover_physics.ground import Grid, friction_at
+from rover_physics.ground import SOIL_NUMBERS, friction_at
 from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.linkage import PLACEMENT, place_masses
 from rover_physics.records import new_record, record_type
@@ -81,7 +81,7 @@ WORK = record_type(
     ("centre", float, (3,)),
     ("force", float, (3,)),
     ("moment", float, (3,)),
-    ("soil_rows", np.int64, (6,)),
+    ("soils", float, (6, SOIL_NUMBERS)),
     ("best", float, (3, 6)),
 )
 """Work space of one thread."""
@@ -117,12 +117,12 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     with threads_worth(effort * len(poses)) as threads:
         chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-len(poses) // CHUNK))
         works = np.repeat(NEW_WORK, chunks)
-        evaluate_poses(ground, *records, poses, held, works, results)
+        evaluate_poses(ground.records, *records, poses, held, works, results)
     return results
 
 
 @sweep_kernel
-def evaluate_poses(ground, linkages, samplings, settings, poses, held, works, results):
+def evaluate_poses(grounds, linkages, samplings, settings, poses, held, works, results):
     """Evaluate the poses into `results` in chunks, as many as there are work spaces.
 
     Records can't be handed to the threads but as arrays, here of one element.
@@ -131,7 +131,7 @@ def evaluate_poses(ground, linkages, samplings, settings, poses, held, works, re
     for chunk in prange(chunks):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             evaluate_pose(
-                ground, linkages[0], samplings[0], settings[0],
+                grounds[0], linkages[0], samplings[0], settings[0],
                 poses, held, i, works[chunk], results,
             )  # fmt: skip
 
@@ -144,9 +144,8 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
     for wheel in range(6 if held.shape[0] > 0 else 0):
         touch.held_height[wheel] = held[i, wheel, 0]
         touch.held_angle[wheel] = held[i, wheel, 1]
-    grid = Grid(ground.elevation, ground.roof, ground.x0, ground.y0, ground.inverse_resolution)
     status = settle(
-        grid, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
+        ground, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
         q, placement, touch, work.J, work.step,
     )  # fmt: skip
     if status == SETTLED:
@@ -163,7 +162,7 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
     angle, measure = find_tip_over(linkage, work)
     result.tip_over_ratio = angle / settings.flat_angle
     result.tip_over_force_angle = measure / settings.flat_measure
-    result.belly_clearance = belly_clearance(grid, ground.ceiling, linkage, placement)
+    result.belly_clearance = belly_clearance(ground, linkage, placement)
 
 
 @kernel
@@ -196,7 +195,7 @@ def _write_forces(ground, linkage, settings, work, result):
         mu = search.mu[wheel]
         sinkage, resistance = 0.0, 0.0
         if settings.on_soil:
-            soil = ground.soils[work.soil_rows[wheel]]
+            soil = work.soils[wheel]
             slip, sinkage, resistance, pull, torque, utilisation = solve_wheel(
                 soil, mu, linkage.radius, linkage.width, N, settings.direction * T, S
             )

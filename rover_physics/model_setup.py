@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.errors import ModelError
 from rover_physics.evaluation import SETTINGS, find_tip_over, new_work
-from rover_physics.ground import Ground, pack_ground
+from rover_physics.ground import Ground, pack_ground, with_soils
 from rover_physics.linkage import pack_linkage, place, place_masses
 from rover_physics.manipulator import body_mass_and_com, pack_tool
 from rover_physics.records import new_record
@@ -79,7 +79,7 @@ def set_up(
         flat_angle=flat_angle,
         flat_measure=flat_measure,
     )
-    ground = pack_ground(terrain)._replace(soils=_pack_soils(terrain.soil_names, soil))
+    ground = with_soils(pack_ground(terrain), _pack_soils(terrain.soil_names, soil))
     return Setup(ground, pack_linkage(rover, mass, com, tool), samples, settings)
 
 

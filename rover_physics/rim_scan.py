@@ -3,7 +3,13 @@
 import numpy as np
 
 from rover_physics.circle_search import refine_from
-from rover_physics.ground import find_roof, height_at_cell, height_inside, is_cell_on_map
+from rover_physics.ground import (
+    elevation_of,
+    find_roof,
+    height_at_cell,
+    height_inside,
+    is_cell_on_map,
+)
 from rover_physics.kernels import kernel
 from rover_physics.touch import (
     CIRCLE_REACH,
@@ -22,7 +28,7 @@ a face much can lie between two samples."""
 
 
 @kernel
-def scan_rim(grid, samples, placement, wheel, scope, touch):
+def scan_rim(ground, samples, placement, wheel, scope, touch):
     """Sample the rim; write the nearest samples into `touch` and return the worst status."""
     first, last, stride = 0, samples.circles - 1, 1
     if scope == COARSE:
@@ -32,25 +38,25 @@ def scan_rim(grid, samples, placement, wheel, scope, touch):
         touch.first_row[wheel, m] = touch.second_row[wheel, m] = FAR_ROW
         touch.first_gap[wheel, m] = touch.second_gap[wheel, m] = np.inf
     if scope != EXACT:
-        scale = grid.inverse_resolution
-        centre_x = (placement.centres[wheel, 0] - grid.x0) * scale
-        centre_y = (placement.centres[wheel, 1] - grid.y0) * scale
-        roof = find_roof(grid, centre_x, centre_y, samples.reach * scale)
+        scale = ground.inverse_resolution
+        centre_x = (placement.centres[wheel, 0] - ground.x0) * scale
+        centre_y = (placement.centres[wheel, 1] - ground.y0) * scale
+        roof = find_roof(ground, centre_x, centre_y, samples.reach * scale)
         if roof < np.inf:
             reach = CIRCLE_REACH * samples.radius if scope == FULL else 0.0
             _scan_inside(
-                grid, samples, placement, wheel, roof, reach,
+                ground, samples, placement, wheel, roof, reach,
                 first, last, stride, touch,
             )  # fmt: skip
             return TOUCHING
     return _scan_carefully(
-        grid, samples, placement, wheel, scope == EXACT,
+        ground, samples, placement, wheel, scope == EXACT,
         first, last, stride, touch,
     )  # fmt: skip
 
 
 @kernel
-def _scan_inside(grid, samples, placement, wheel, roof, reach, first, last, stride, touch):
+def _scan_inside(ground, samples, placement, wheel, roof, reach, first, last, stride, touch):
     """Sample a rim that is well over known ground, none of it higher than `roof` [m].
 
     Rows of samples at one angle are visited from the lowest upwards, until even the roof is
@@ -58,14 +64,14 @@ def _scan_inside(grid, samples, placement, wheel, roof, reach, first, last, stri
     the compiler must take it that anything written may lie anywhere.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
-    elevation, scale, radius = grid.elevation, grid.inverse_resolution, samples.radius
+    scale, radius = ground.inverse_resolution, samples.radius
     laterals = samples.laterals
     rows, middle = (samples.rows - 1) // stride + 1, samples.rows // 2
     ahead_x, ahead_y = scale * radius * forward[0], scale * radius * forward[1]
     down_x, down_y, down_z = scale * radius * up[0], scale * radius * up[1], radius * up[2]
     across = laterals[first]
-    x = (centres[wheel, 0] - grid.x0 + across * R[0, 1]) * scale
-    y = (centres[wheel, 1] - grid.y0 + across * R[1, 1]) * scale
+    x = (centres[wheel, 0] - ground.x0 + across * R[0, 1]) * scale
+    y = (centres[wheel, 1] - ground.y0 + across * R[1, 1]) * scale
     z = centres[wheel, 2] + across * R[2, 1]
     width = 0.0
     if last > first:
@@ -83,7 +89,7 @@ def _scan_inside(grid, samples, placement, wheel, roof, reach, first, last, stri
         gy = y + s * ahead_y - c * down_y
         gz = z - c * down_z
         for m in range(first, last + 1):
-            gap = gz - height_inside(elevation, gx, gy)
+            gap = gz - height_inside(ground, gx, gy)
             gx += step_x
             gy += step_y
             gz += step_z
@@ -107,13 +113,13 @@ def _note_sample(wheel, m, k, stride, gap, touch):
 
 
 @kernel
-def _scan_carefully(grid, samples, placement, wheel, exact, first, last, stride, touch):
+def _scan_carefully(ground, samples, placement, wheel, exact, first, last, stride, touch):
     """Sample a rim that may be over unknown ground, beyond the map or beside a face.
 
     Where `exact`, each sample that may be near is refined at once. Returns the worst status.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
-    elevation, scale, radius = grid.elevation, grid.inverse_resolution, samples.radius
+    scale, radius = ground.inverse_resolution, samples.radius
     status, best, best_m = TOUCHING, np.inf, first
     if exact:
         touch.circle_gap[wheel, :] = np.inf
@@ -125,22 +131,22 @@ def _scan_carefully(grid, samples, placement, wheel, exact, first, last, stride,
             across = samples.laterals[m]
             x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
             y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
-            gx, gy = (x - grid.x0) * scale, (y - grid.y0) * scale
-            if not is_cell_on_map(elevation, gx, gy):
+            gx, gy = (x - ground.x0) * scale, (y - ground.y0) * scale
+            if not is_cell_on_map(ground, gx, gy):
                 status = OFF_MAP
                 continue
             gap = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
-            gap -= height_at_cell(elevation, gx, gy)
+            gap -= height_at_cell(ground, gx, gy)
             if gap != gap:
                 if status == TOUCHING:
                     status = UNKNOWN_GROUND
                 continue
             _note_sample(wheel, m, k, stride, gap, touch)
             if exact and gap < best + EXACT_REACH * radius and _may_come_near(
-                elevation, samples, forward, up, scale, gx, gy,
+                ground, samples, forward, up, gx, gy,
                 centres[wheel, 2] + across * R[2, 1], s, c, best,
             ):  # fmt: skip
-                gap = refine_from(grid, samples, placement, wheel, m, s, c, touch)
+                gap = refine_from(ground, samples, placement, wheel, m, s, c, touch)
             if gap < best:
                 best, best_m = gap, m
     touch.noted_gap[wheel], touch.noted_circle[wheel] = best, best_m
@@ -150,7 +156,7 @@ def _scan_carefully(grid, samples, placement, wheel, exact, first, last, stride,
 
 
 @kernel
-def _may_come_near(elevation, samples, forward, up, scale, gx, gy, z, s, c, best):
+def _may_come_near(ground, samples, forward, up, gx, gy, z, s, c, best):
     """Tell whether a search of a circle from its sample at (s, c) may come near to `best` [m].
 
     The sample is over (gx, gy), in cells, and the middle of the circle at the height z [m]. Not
@@ -163,14 +169,14 @@ def _may_come_near(elevation, samples, forward, up, scale, gx, gy, z, s, c, best
     c_most, s_most = 1.0, min(1.0, abs(s) + turn_s)
     if abs(s) > turn_s:
         c_most = c * turn_c + abs(s) * turn_s
-    way = 1.01 * turn_s * samples.radius * scale  # the arc is a little longer than its sine
+    way = 1.01 * turn_s * samples.radius * ground.inverse_resolution  # the arc is a little longer than its sine
     reach_x = way * (abs(forward[0]) * c_most + abs(up[0]) * s_most)
     reach_y = way * (abs(forward[1]) * c_most + abs(up[1]) * s_most)
-    ny, nx = elevation.shape
     top = -np.inf
-    for i in range(max(int(gy - reach_y), 0), min(int(gy + reach_y) + 2, ny)):
-        for j in range(max(int(gx - reach_x), 0), min(int(gx + reach_x) + 2, nx)):
-            if elevation[i, j] > top:
-                top = elevation[i, j]
+    for i in range(max(int(gy - reach_y), 0), min(int(gy + reach_y) + 2, ground.rows)):
+        for j in range(max(int(gx - reach_x), 0), min(int(gx + reach_x) + 2, ground.columns)):
+            height = elevation_of(ground, i, j)
+            if height > top:
+                top = height
     lowest = z - samples.radius * c_most * up[2]
     return lowest - top < best + CIRCLE_REACH * samples.radius

@@ -35,7 +35,7 @@ TURNED_OVER = 1.45
 
 
 @kernel
-def settle(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Settle the rover with its body origin at (x, y) [m] heading `yaw` [rad]; q (6,) is written.
 
     Starts from the suspension at rest, so the answer depends on nothing but the pose. J (6, 6) and
@@ -43,40 +43,40 @@ def settle(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """
     q[:] = 0.0
     place(linkage, x, y, yaw, q, placement)
-    status, worst = _touch_all(grid, samples, placement, COARSE, touch)
+    status, worst = _touch_all(ground, samples, placement, COARSE, touch)
     if np.isnan(worst):
         return status
     _descend(linkage, placement, touch, q, 1.0, J, step)
-    return settle_from(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+    return settle_from(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step)
 
 
 @kernel
-def settle_from(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def settle_from(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Settle the rover as `settle` does, but from the q that is given, such as a neighbour's.
 
     Faster than from rest, but over edges it depends on q which of several poses is found.
     """
     place(linkage, x, y, yaw, q, placement)
-    status, worst = _touch_all(grid, samples, placement, QUICK, touch)
+    status, worst = _touch_all(ground, samples, placement, QUICK, touch)
     if status != TOUCHING:
         return status
     worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
         scope = AGAIN if worst <= NOTES_HOLD * linkage.radius else FULL
-        _newton(grid, linkage, samples, x, y, yaw, q, placement, NEAR, touch, J, step)
-        status, worst = _touch_all(grid, samples, placement, scope, touch)
+        _newton(ground, linkage, samples, x, y, yaw, q, placement, NEAR, touch, J, step)
+        status, worst = _touch_all(ground, samples, placement, scope, touch)
         if worst <= GAP_TOLERANCE or np.isnan(worst):
             break
     for attempt in range(RECOVERIES):
         if worst <= GAP_TOLERANCE or np.isnan(worst) or status != TOUCHING:
             break
-        _touch_all(grid, samples, placement, EXACT, touch)
+        _touch_all(ground, samples, placement, EXACT, touch)
         if attempt > 0:
             relaxed = RELAXED * linkage.radius * RELAXED_FURTHER ** (attempt - 1)
             scope = EXACT if attempt == RECOVERIES - 1 else QUICK
-            _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
-        _newton(grid, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
-        status, worst = _touch_all(grid, samples, placement, EXACT, touch)
+            _relax(relaxed, scope, ground, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+        _newton(ground, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
+        status, worst = _touch_all(ground, samples, placement, EXACT, touch)
         if _has_turned_over(q):
             return NOT_SETTLED
     if status != TOUCHING:
@@ -89,12 +89,12 @@ def settle_from(grid, linkage, samples, x, y, yaw, q, placement, touch, J, step)
 
 
 @kernel
-def _touch_all(grid, samples, placement, scope, touch):
+def _touch_all(ground, samples, placement, scope, touch):
     """Return the status of the worst wheel and the largest absolute gap [m]."""
     worst = 0.0
     status = TOUCHING
     for wheel in range(6):
-        of_wheel = find_touch(grid, samples, placement, wheel, scope, touch)
+        of_wheel = find_touch(ground, samples, placement, wheel, scope, touch)
         if of_wheel == OFF_MAP or status == TOUCHING:
             status = of_wheel
         gap = abs(touch.gap[wheel])
@@ -106,7 +106,7 @@ def _touch_all(grid, samples, placement, scope, touch):
 
 
 @kernel
-def _newton(grid, linkage, samples, x, y, yaw, q, placement, scope, touch, J, step):
+def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, step):
     """Newton's method on the gaps with a halving line search; returns the largest left."""
     worst = 0.0
     for wheel in range(6):
@@ -124,7 +124,7 @@ def _newton(grid, linkage, samples, x, y, yaw, q, placement, scope, touch, J, st
                 q[i] -= (fraction - taken) * step[i, 0]
             taken = fraction
             place(linkage, x, y, yaw, q, placement)
-            status, improved = _touch_all(grid, samples, placement, scope, touch)
+            status, improved = _touch_all(ground, samples, placement, scope, touch)
             if improved < (1.0 - 0.1 * fraction) * worst:
                 break
             fraction *= 0.5
@@ -135,7 +135,7 @@ def _newton(grid, linkage, samples, x, y, yaw, q, placement, scope, touch, J, st
 
 
 @kernel
-def _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def _relax(relaxed, scope, ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """Let the wheels fall or rise by part of their gaps until none is above `relaxed` [m].
 
     Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
@@ -144,10 +144,10 @@ def _relax(relaxed, scope, grid, linkage, samples, x, y, yaw, q, placement, touc
     for _ in range(RELAXATION_STEPS):
         _descend(linkage, placement, touch, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
-        status, worst = _touch_all(grid, samples, placement, scope, touch)
+        status, worst = _touch_all(ground, samples, placement, scope, touch)
         if not worst > relaxed or _has_turned_over(q):
             break
-    _touch_all(grid, samples, placement, EXACT, touch)
+    _touch_all(ground, samples, placement, EXACT, touch)
 
 
 @kernel

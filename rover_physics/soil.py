@@ -11,10 +11,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.ground import SOIL_NUMBERS
 from rover_physics.kernels import kernel
 from rover_physics.soil_file import COULOMB_MODEL, Soil, load_soils, soil_named
 
-MODEL, FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(8)
+MODEL, FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(SOIL_NUMBERS)
 """Columns of a packed soil."""
 COULOMB, BEKKER_WONG = 0.0, 1.0
 """Values of the column MODEL."""
@@ -46,7 +47,7 @@ def pack_soils(
         SoilError: A name that is not among the soils.
     """
     known = load_soils() if soils is None and (names or default is not None) else soils
-    table = np.zeros((1 + len(names), 8))
+    table = np.zeros((1 + len(names), SOIL_NUMBERS))
     table[:, FRICTION] = np.nan
     for row, name in enumerate((default, *names)):
         if name is not None:

@@ -1,6 +1,6 @@
 """Wheel forces where the ground may be soil: friction and resistance depend on the loads there."""
 
-from rover_physics.ground import soil_row_at
+from rover_physics.ground import copy_soil, soil_row_at
 from rover_physics.kernels import kernel
 from rover_physics.soil import effective_friction, solve_wheel
 from rover_physics.torques import EQUAL, minimise_friction, take_equal_torques
@@ -20,18 +20,18 @@ def share_forces_on_soil(ground, linkage, settings, work):
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         x, y = work.touch.point[wheel, 0], work.touch.point[wheel, 1]
-        work.soil_rows[wheel] = soil_row_at(ground, x, y)
+        copy_soil(ground, soil_row_at(ground, x, y), work.soils[wheel])
     take_equal_torques(work.balance, search)
     if settings.policy == EQUAL:
         return
-    least = _needed(ground, linkage, settings, work)
+    least = _needed(linkage, settings, work)
     _copy(search, best)
     for _ in range(ROUNDS):
-        _write_grip(ground, linkage, settings, work)
+        _write_grip(linkage, settings, work)
         minimise_friction(
             work.balance, settings.allowed_torque / (linkage.radius * weight), search
         )
-        needed = _needed(ground, linkage, settings, work)
+        needed = _needed(linkage, settings, work)
         if needed <= least:
             least = needed
             _copy(search, best)
@@ -48,12 +48,12 @@ def _copy(search, best):
 
 
 @kernel
-def _write_grip(ground, linkage, settings, work):
+def _write_grip(linkage, settings, work):
     """Write friction and resistance under the present loads into the search."""
     search = work.search
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
-        soil = ground.soils[work.soil_rows[wheel]]
+        soil = work.soils[wheel]
         N, mu = weight * search.wheel_loads[wheel], search.mu[wheel]
         solved = solve_wheel(soil, mu, linkage.radius, linkage.width, N, 0.0, 0.0)
         search.mu[wheel] = effective_friction(soil, mu, linkage.radius, linkage.width, N)
@@ -61,13 +61,13 @@ def _write_grip(ground, linkage, settings, work):
 
 
 @kernel
-def _needed(ground, linkage, settings, work):
+def _needed(linkage, settings, work):
     """Return the largest utilisation of the soil, or of the torque where that is beyond 1."""
     search = work.search
     weight = linkage.mass * linkage.gravity
     worst = 0.0
     for wheel in range(6):
-        soil = ground.soils[work.soil_rows[wheel]]
+        soil = work.soils[wheel]
         solved = solve_wheel(
             soil,
             search.mu[wheel],

@@ -21,7 +21,7 @@ from rover_physics.bounds_pose import (
     UNKNOWN_NEAR,
 )
 from rover_physics.errors import ModelError
-from rover_physics.ground import Grid, heights_of, pack_ground
+from rover_physics.ground import Ground, pack_ground
 from rover_physics.limits import Verdict, find_reasons
 from rover_physics.model_setup import set_up
 from rover_physics.prediction import Floats, PathPrediction
@@ -159,16 +159,15 @@ def bound_path(
 
 
 @lru_cache(maxsize=2)
-def _spread(terrain: Terrain, sigmas: float) -> tuple[Grid, Grid, NDArray[np.float64]]:
+def _spread(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Ground]:
     """Return the lowest and the highest ground, and how far they are from the one in between."""
     assert terrain.elevation_std is not None
     error = np.ascontiguousarray(sigmas * terrain.elevation_std)
-    grids = (
-        heights_of(pack_ground(replace(terrain, elevation=terrain.elevation + sign * error)))
-        for sign in (-1.0, 1.0)
+    low, high, between = (
+        pack_ground(replace(terrain, elevation=elevation))
+        for elevation in (terrain.elevation - error, terrain.elevation + error, error)
     )
-    low, high = grids
-    return low, high, error
+    return low, high, between
 
 
 def _pack_nominal(prediction: PathPrediction) -> Any:
