@@ -94,8 +94,8 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
         for centre in placed.centres:
             points = centre + rim[:, None] + laterals[:, None] * axis
             at = (points[..., :2] - corner) * scale
-            middle = (centre[:2] - corner) * scale
-            roof = find_roof(ground, middle[0], middle[1], samples.reach * scale)
+            middle, reach = (centre[:2] - corner) * scale, samples.reach * scale
+            roof = find_roof(ground, middle[0], middle[1], reach, reach)
             if np.isfinite(roof):
                 cells.append(at[points[..., 2] <= roof])
     return np.concatenate(cells), len(settled)

@@ -114,7 +114,7 @@ def _find_lowest(ground, samples, placement, wheel, m, rim):
         after = rim.gap[m, min(k + 1, samples.rows - 1)]
         if gap != gap or gap > before or gap > after:
             continue
-        gap, s, c = search_circle(
+        gap, s, c, _, _ = search_circle(
             ground, samples, placement, wheel, samples.laterals[m],
             samples.sines[k], samples.cosines[k],
         )  # fmt: skip

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rover_physics.ground import look_up
+from rover_physics.ground import look_up, look_up_cell
 from rover_physics.kernels import kernel
 from rover_physics.touch import CIRCLE_REACH
 
@@ -19,20 +19,23 @@ BESIDE_SHARE = 0.8
 
 @kernel
 def search_circle(ground, samples, placement, wheel, across, s, c):
-    """Return the smallest gap [m] of a circle near the angle of (s, c), and where: sine, cosine.
+    """Return the smallest gap [m] of a circle near the angle of (s, c), and where.
+
+    That is sine and cosine of the angle, and the slope of the ground there along x and y.
 
     On a plane the circle touches in the direction of the plane's normal, so the first trials look
     in the direction of the normal found last. On an edge that leads to and fro: then the next
     trial is where the tangents of the gap from both sides meet, which is also where the gap can't
     be smaller. Infinite over unknown ground.
     """
-    R, centres, radius = placement.R, placement.centres, samples.radius
-    x = centres[wheel, 0] + across * R[0, 1]
-    y = centres[wheel, 1] + across * R[1, 1]
+    R, centres, forward, up = placement.R, placement.centres, placement.forward, placement.up
+    radius, scale = samples.radius, ground.inverse_resolution
+    x = (centres[wheel, 0] + across * R[0, 1] - ground.x0) * scale
+    y = (centres[wheel, 1] + across * R[1, 1] - ground.y0) * scale
     z = centres[wheel, 2] + across * R[2, 1]
-    ahead_x, ahead_y = placement.forward[0], placement.forward[1]
-    up_x, up_y, up_z = placement.up[0], placement.up[1], placement.up[2]
-    best, best_s, best_c = np.inf, s, c
+    ahead_x, ahead_y = radius * scale * forward[0], radius * scale * forward[1]
+    down_x, down_y, down_z = radius * scale * up[0], radius * scale * up[1], radius * up[2]
+    best, best_s, best_c, best_x, best_y = np.inf, s, c, 0.0, 0.0
     turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
     back_s, back_c = s * turn_c - c * turn_s, c * turn_c + s * turn_s
     ahead_s, ahead_c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
@@ -42,21 +45,22 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
         ahead_s, ahead_c = 1.0, 0.0
     back_gap, ahead_gap, back_rate, ahead_rate = np.inf, np.inf, 0.0, 0.0
     for trial in range(REFINEMENTS):
-        height, slope_x, slope_y = look_up(
-            ground, x + radius * (s * ahead_x - c * up_x), y + radius * (s * ahead_y - c * up_y)
+        height, slope_x, slope_y = look_up_cell(
+            ground, x + s * ahead_x - c * down_x, y + s * ahead_y - c * down_y
         )
-        gap = z - radius * c * up_z - height
-        rise = slope_x * ahead_x + slope_y * ahead_y
-        fall = up_z - slope_x * up_x - slope_y * up_y
+        gap = z - c * down_z - height
+        rise = slope_x * forward[0] + slope_y * forward[1]
+        fall = up[2] - slope_x * up[0] - slope_y * up[1]
         turn = s * fall - c * rise
-        length_squared = rise * rise + fall * fall
-        converged = not turn * turn > TURN_TOLERANCE * TURN_TOLERANCE * length_squared
+        straight = s * rise + c * fall
+        converged = not abs(turn) > TURN_TOLERANCE * straight
         if gap < best:
-            best, best_s, best_c = gap, s, c
+            best, best_s, best_c, best_x, best_y = gap, s, c, slope_x, slope_y
             if converged:
-                length = np.sqrt(length_squared)
-                best += radius * (s * rise + c * fall - length)
-                best_s, best_c = rise / length, fall / length
+                # to second order in the turn: what is left is below 1e-10 radii
+                turn /= straight
+                best -= 0.5 * radius * straight * turn * turn
+                best_s, best_c = s - c * turn, c + s * turn
         if converged:
             break
         if turn > 0.0:
@@ -72,23 +76,26 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
             if best - (back_gap + back_rate * share * between) < GAP_PRECISION * radius:
                 break
         if trial < 2:
-            inverse = 1.0 / np.sqrt(length_squared)
+            inverse = 1.0 / np.sqrt(rise * rise + fall * fall)
             s, c = rise * inverse, fall * inverse
         if trial > 1 or not (s * back_c > c * back_s and s * ahead_c < c * ahead_s):
             share = min(max(share, 0.05), 0.95)
             s, c = back_s + share * (ahead_s - back_s), back_c + share * (ahead_c - back_c)
             inverse = 1.0 / np.sqrt(s * s + c * c)
             s, c = s * inverse, c * inverse
-    return best, best_s, best_c
+    return best, best_s, best_c, best_x, best_y
 
 
 @kernel
 def refine_from(ground, samples, placement, wheel, m, s, c, touch):
     """Search circle m near (s, c), keep what is nearer than before, and return the gap found."""
-    gap, s, c = search_circle(ground, samples, placement, wheel, samples.laterals[m], s, c)
+    gap, s, c, slope_x, slope_y = search_circle(
+        ground, samples, placement, wheel, samples.laterals[m], s, c
+    )
     if gap < touch.circle_gap[wheel, m]:
         touch.circle_gap[wheel, m] = gap
         touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
+        touch.circle_slope[wheel, m, 0], touch.circle_slope[wheel, m, 1] = slope_x, slope_y
     return gap
 
 

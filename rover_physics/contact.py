@@ -15,6 +15,8 @@ from rover_physics.kernels import kernel
 from rover_physics.rim_scan import scan_rim
 from rover_physics.touch import AGAIN, COARSE, FULL, NEAR, QUICK, TOUCHING
 
+GUESS_SINE, GUESS_COSINE = 0.6, 0.8
+"""Contact angle, behind and ahead, of the points that a first guess looks at beside the lowest."""
 COMPLIANCE = 2e-3
 """Depth, in wheel radii, to which real wheels and ground give way: circles with gaps closer than
 that share the load. On a plane a wheel thus touches in its middle, not on an edge at random."""
@@ -36,6 +38,8 @@ def find_touch(ground, samples, placement, wheel, scope, touch):
     if touch.held_height[wheel] == touch.held_height[wheel]:
         _hold(placement, wheel, touch)
         return status
+    if scope == COARSE and _guess(ground, samples, placement, wheel, touch):
+        return status
     if scope != NEAR and scope != AGAIN:
         status = scan_rim(ground, samples, placement, wheel, scope, touch)
         if touch.noted_gap[wheel] == np.inf:
@@ -47,8 +51,28 @@ def find_touch(ground, samples, placement, wheel, scope, touch):
         refine_circle(ground, samples, placement, wheel, touch.nearest[wheel], touch)
     elif scope in (FULL, AGAIN):
         refine_others(ground, samples, placement, wheel, touch)
-    _write_touch(ground, samples, placement, wheel, scope != COARSE, touch)
+    _write_touch(samples, placement, wheel, touch)
     return status
+
+
+@kernel
+def _guess(ground, samples, placement, wheel, touch):
+    """Write the nearest of three points below a wheel's middle; False over unknown ground."""
+    forward, up, centres = placement.forward, placement.up, placement.centres
+    x, y, z = centres[wheel, 0], centres[wheel, 1], centres[wheel, 2]
+    touch.gap[wheel] = np.inf
+    for place in range(-1, 2):
+        s, c = place * GUESS_SINE, GUESS_COSINE if place != 0 else 1.0
+        ahead, down = samples.radius * s, samples.radius * c
+        px, py = x + ahead * forward[0] - down * up[0], y + ahead * forward[1] - down * up[1]
+        gap = z - down * up[2] - look_up(ground, px, py)[0]
+        if gap != gap:
+            return False
+        if gap < touch.gap[wheel]:
+            touch.gap[wheel] = gap
+            touch.point[wheel, 0], touch.point[wheel, 1] = px, py
+            touch.point[wheel, 2] = z - down * up[2]
+    return True
 
 
 @kernel
@@ -60,18 +84,18 @@ def _take_sample(samples, wheel, touch):
     touch.circle_gap[wheel, m] = touch.noted_gap[wheel]
     touch.circle_sine[wheel, m] = samples.sines[k]
     touch.circle_cosine[wheel, m] = samples.cosines[k]
+    touch.circle_slope[wheel, m, :] = 0.0
 
 
 @kernel
-def _write_touch(ground, samples, placement, wheel, with_normal, touch):
-    """Write gap, point and where asked for the normal of a wheel on its nearest circle."""
+def _write_touch(samples, placement, wheel, touch):
+    """Write gap, point and normal of a wheel on its nearest circle."""
     m = touch.nearest[wheel]
     touch.gap[wheel] = touch.circle_gap[wheel, m]
     s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
     write_point(samples, placement, wheel, s, c, samples.laterals[m], touch)
-    if with_normal:
-        height, slope_x, slope_y = look_up(ground, touch.point[wheel, 0], touch.point[wheel, 1])
-        write_normal(placement, wheel, s, c, slope_x, slope_y, touch)
+    slope = touch.circle_slope[wheel, m]
+    write_normal(placement, wheel, s, c, slope[0], slope[1], touch)
 
 
 @kernel

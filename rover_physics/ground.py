@@ -124,22 +124,23 @@ def elevation_of(ground, i, j):
 
 
 @kernel
-def find_roof(ground, gx, gy, reach):
-    """Return the highest elevation [m] within `reach` of (gx, gy), both in cells.
+def find_roof(ground, gx, gy, reach_x, reach_y):
+    """Return the highest elevation [m] of a box around (gx, gy), all in cells.
 
-    Infinite where there is unknown ground or the map ends so near. Block by block, so somewhat
-    more than asked for is looked at.
+    Infinite where there is unknown ground or the map ends in it. Block by block, so somewhat more
+    than asked for is looked at.
     """
+    low_x, high_x, low_y, high_y = gx - reach_x, gx + reach_x, gy - reach_y, gy + reach_y
     if not (
-        gx >= reach
-        and gy >= reach
-        and gx < ground.columns - 1 - reach
-        and gy < ground.rows - 1 - reach
+        low_x >= 0.0
+        and low_y >= 0.0
+        and high_x < ground.columns - 1
+        and high_y < ground.rows - 1
     ):
         return np.inf
-    first, last = int64(gx - reach) >> BLOCK_BITS, int64(gx + reach + 1.0) >> BLOCK_BITS
+    first, last = int64(low_x) >> BLOCK_BITS, int64(high_x + 1.0) >> BLOCK_BITS
     roof = -np.inf
-    for i in range(int64(gy - reach) >> BLOCK_BITS, (int64(gy + reach + 1.0) >> BLOCK_BITS) + 1):
+    for i in range(int64(low_y) >> BLOCK_BITS, (int64(high_y + 1.0) >> BLOCK_BITS) + 1):
         row = i * ground.block_columns
         for j in range(first, last + 1):
             height = read_float(ground.roof, row + j)
@@ -180,8 +181,13 @@ def _interpolate(elevation, at, columns, u, v):
 @kernel
 def look_up(ground, x, y):
     """Return elevation [m] and its gradient at (x, y) [m]; NaN where there is none."""
-    gx = (x - ground.x0) * ground.inverse_resolution
-    gy = (y - ground.y0) * ground.inverse_resolution
+    scale = ground.inverse_resolution
+    return look_up_cell(ground, (x - ground.x0) * scale, (y - ground.y0) * scale)
+
+
+@kernel
+def look_up_cell(ground, gx, gy):
+    """Return elevation [m] and its gradient at (gx, gy), in cells; NaN where there is none."""
     if not is_cell_on_map(ground, gx, gy):
         return np.nan, np.nan, np.nan
     i, j = min(int64(gy), ground.rows - 2), min(int64(gx), ground.columns - 2)

@@ -30,73 +30,93 @@ a face much can lie between two samples."""
 @kernel
 def scan_rim(ground, samples, placement, wheel, scope, touch):
     """Sample the rim; write the nearest samples into `touch` and return the worst status."""
-    first, last, stride = 0, samples.circles - 1, 1
-    if scope == COARSE:
-        first = last = last // 2
-        stride = 2
+    start = samples.rows // 2
+    if scope == FULL:
+        start = touch.first_row[wheel, touch.noted_circle[wheel]]
     for m in range(samples.circles):
         touch.first_row[wheel, m] = touch.second_row[wheel, m] = FAR_ROW
         touch.first_gap[wheel, m] = touch.second_gap[wheel, m] = np.inf
+    if scope == COARSE:
+        middle = samples.circles // 2
+        return _scan_carefully(ground, samples, placement, wheel, False, middle, middle, 2, touch)
     if scope != EXACT:
-        scale = ground.inverse_resolution
-        centre_x = (placement.centres[wheel, 0] - ground.x0) * scale
-        centre_y = (placement.centres[wheel, 1] - ground.y0) * scale
-        roof = find_roof(ground, centre_x, centre_y, samples.reach * scale)
-        if roof < np.inf:
+        rear = _find_roof_of_half(ground, samples, placement, wheel, -0.5)
+        front = _find_roof_of_half(ground, samples, placement, wheel, 0.5)
+        if rear < np.inf and front < np.inf:
             reach = CIRCLE_REACH * samples.radius if scope == FULL else 0.0
-            _scan_inside(
-                ground, samples, placement, wheel, roof, reach,
-                first, last, stride, touch,
-            )  # fmt: skip
+            _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, touch)
             return TOUCHING
-    return _scan_carefully(
-        ground, samples, placement, wheel, scope == EXACT,
-        first, last, stride, touch,
+    last = samples.circles - 1
+    return _scan_carefully(ground, samples, placement, wheel, scope == EXACT, 0, last, 1, touch)
+
+
+@kernel
+def _find_roof_of_half(ground, samples, placement, wheel, half):
+    """Return the highest ground [m] below the rear (half -0.5) or front (0.5) half of a rim.
+
+    Infinite where any ground there is unknown.
+    """
+    forward, up, centres = placement.forward, placement.up, placement.centres
+    scale = ground.inverse_resolution
+    along = 0.5 * samples.radius
+    # In the plane: half the lowest point's way aside with camber, and half the wheel's width.
+    aside = along * np.sqrt(up[0] * up[0] + up[1] * up[1]) + samples.half_width
+    gx = centres[wheel, 0] - ground.x0 + samples.radius * (half * forward[0] - 0.5 * up[0])
+    gy = centres[wheel, 1] - ground.y0 + samples.radius * (half * forward[1] - 0.5 * up[1])
+    ahead_x, ahead_y = abs(forward[0]), abs(forward[1])
+    return find_roof(
+        ground, gx * scale, gy * scale,
+        (along * ahead_x + aside * ahead_y) * scale, (along * ahead_y + aside * ahead_x) * scale,
     )  # fmt: skip
 
 
 @kernel
-def _scan_inside(ground, samples, placement, wheel, roof, reach, first, last, stride, touch):
-    """Sample a rim that is well over known ground, none of it higher than `roof` [m].
+def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, touch):
+    """Sample a rim over known ground, none of it higher than `rear` and `front` [m].
 
-    Rows of samples at one angle are visited from the lowest upwards, until even the roof is
-    farther below than the nearest sample by `reach`. What the loop reads is in local variables:
-    the compiler must take it that anything written may lie anywhere.
+    Rows of samples at one angle are visited: `start`, where the wheel was nearest before, then
+    from the lowest one to the rear and to the front, until even the roof is farther below than the
+    nearest sample by `reach` [m]. What the loop reads is in local variables: the compiler must
+    take it that anything written may lie anywhere.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
-    scale, radius = ground.inverse_resolution, samples.radius
-    laterals = samples.laterals
-    rows, middle = (samples.rows - 1) // stride + 1, samples.rows // 2
+    scale, radius, circles = ground.inverse_resolution, samples.radius, samples.circles
     ahead_x, ahead_y = scale * radius * forward[0], scale * radius * forward[1]
     down_x, down_y, down_z = scale * radius * up[0], scale * radius * up[1], radius * up[2]
-    across = laterals[first]
+    across, width = samples.laterals[0], samples.lateral_spacing
     x = (centres[wheel, 0] - ground.x0 + across * R[0, 1]) * scale
     y = (centres[wheel, 1] - ground.y0 + across * R[1, 1]) * scale
     z = centres[wheel, 2] + across * R[2, 1]
-    width = 0.0
-    if last > first:
-        width = (laterals[last] - across) / (last - first)
     step_x, step_y, step_z = width * R[0, 1] * scale, width * R[1, 1] * scale, width * R[2, 1]
-    rim = abs(laterals[samples.circles - 1] * R[2, 1])
-    floor = roof + rim - centres[wheel, 2]
-    best, best_m = np.inf, first
-    for visit in range(rows):
-        k = middle + stride * ((visit + 1) // 2) * (1 - 2 * (visit % 2))
-        s, c = samples.sines[k], samples.cosines[k]
-        if -c * down_z - floor > best + reach:
-            break
-        gx = x + s * ahead_x - c * down_x
-        gy = y + s * ahead_y - c * down_y
-        gz = z - c * down_z
-        for m in range(first, last + 1):
-            gap = gz - height_inside(ground, gx, gy)
-            gx += step_x
-            gy += step_y
-            gz += step_z
-            if gap < best + reach:
-                _note_sample(wheel, m, k, stride, gap, touch)
-                if gap < best:
-                    best, best_m = gap, m
+    lowest = centres[wheel, 2] - abs(samples.half_width * R[2, 1])
+    best, best_m = np.inf, 0
+    middle = samples.rows // 2
+    k, end, turn, roof = start, start + 1, 1, max(rear, front)
+    for stretch in range(3):
+        if stretch == 1:
+            k, end, turn, roof = middle, -1, -1, rear
+        elif stretch == 2:
+            k, end, turn, roof = middle + 1, samples.rows, 1, front
+        while k != end:
+            s, c = samples.sines[k], samples.cosines[k]
+            if lowest - c * down_z - roof > best + reach:
+                break
+            if stretch > 0 and k == start:
+                k += turn
+                continue
+            gx = x + s * ahead_x - c * down_x
+            gy = y + s * ahead_y - c * down_y
+            gz = z - c * down_z
+            for m in range(circles):
+                gap = gz - height_inside(ground, gx, gy)
+                gx += step_x
+                gy += step_y
+                gz += step_z
+                if gap < best + reach:
+                    _note_sample(wheel, m, k, 1, gap, touch)
+                    if gap < best:
+                        best, best_m = gap, m
+            k += turn
     touch.noted_gap[wheel], touch.noted_circle[wheel] = best, best_m
 
 

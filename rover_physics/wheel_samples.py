@@ -19,6 +19,8 @@ WHEEL_SAMPLES = record_type(
     ("spacing_cosine", float),  # cosine of the angle between neighbouring samples
     ("beside_sine", float),  # sine of half that angle
     ("beside_cosine", float),  # cosine of half that angle
+    ("half_width", float),  # distance of the outer circles from the middle plane [m]
+    ("lateral_spacing", float),  # distance between neighbouring circles [m]
     ("laterals", float, (MOST_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
 )
 """Where the cylinder of a wheel is sampled: at k angles of m circles."""
@@ -43,5 +45,6 @@ def sample_wheel(rover: Rover, resolution: float) -> Any:
     )
     samples.sines[: angles.size], samples.cosines[: angles.size] = np.sin(angles), np.cos(angles)
     half = 0.5 * wheel.width
+    samples.half_width, samples.lateral_spacing = half, half / half_laterals
     samples.laterals[: samples.circles] = np.linspace(-half, half, samples.circles)
     return samples
