@@ -36,13 +36,7 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
     ahead_x, ahead_y = radius * scale * forward[0], radius * scale * forward[1]
     down_x, down_y, down_z = radius * scale * up[0], radius * scale * up[1], radius * up[2]
     best, best_s, best_c, best_x, best_y = np.inf, s, c, 0.0, 0.0
-    turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
-    back_s, back_c = s * turn_c - c * turn_s, c * turn_c + s * turn_s
-    ahead_s, ahead_c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
-    if back_c < 0.0:
-        back_s, back_c = -1.0, 0.0
-    if ahead_c < 0.0:
-        ahead_s, ahead_c = 1.0, 0.0
+    back_s, back_c, ahead_s, ahead_c = -1.0, 0.0, 1.0, 0.0
     back_gap, ahead_gap, back_rate, ahead_rate = np.inf, np.inf, 0.0, 0.0
     for trial in range(REFINEMENTS):
         height, slope_x, slope_y = look_up_cell(
@@ -63,6 +57,12 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
                 best_s, best_c = s - c * turn, c + s * turn
         if converged:
             break
+        if trial == 0:
+            turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
+            if c * turn_c + s * turn_s > 0.0:
+                back_s, back_c = s * turn_c - c * turn_s, c * turn_c + s * turn_s
+            if c * turn_c - s * turn_s > 0.0:
+                ahead_s, ahead_c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
         if turn > 0.0:
             ahead_s, ahead_c, ahead_gap, ahead_rate = s, c, gap, radius * turn
         else:
@@ -153,13 +153,14 @@ def _look_beside(ground, samples, placement, wheel, m, touch):
         touch.circle_gap[wheel, m], touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
     )  # fmt: skip
     limit = gap + BESIDE_SHARE * radius * (1.0 - samples.beside_cosine)
+    z = centres[wheel, 2] + across * R[2, 1]
     for side in range(-1, 2, 2):
         turn = side * samples.beside_sine
         s, c = s0 * samples.beside_cosine + c0 * turn, c0 * samples.beside_cosine - s0 * turn
-        if c < 0.0:
+        lowest = z - radius * c * up[2]
+        if c < 0.0 or lowest - touch.roof[wheel] >= limit:
             continue
         x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
         y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
-        z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
-        if z - look_up(ground, x, y)[0] < limit:
+        if lowest - look_up(ground, x, y)[0] < limit:
             refine_from(ground, samples, placement, wheel, m, s, c, touch)

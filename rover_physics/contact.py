@@ -10,7 +10,7 @@ angles.
 import numpy as np
 
 from rover_physics.circle_search import refine_circle, refine_others
-from rover_physics.ground import look_up
+from rover_physics.ground import height_inside
 from rover_physics.kernels import kernel
 from rover_physics.rim_scan import scan_rim
 from rover_physics.touch import AGAIN, COARSE, FULL, NEAR, QUICK, TOUCHING
@@ -57,21 +57,32 @@ def find_touch(ground, samples, placement, wheel, scope, touch):
 
 @kernel
 def _guess(ground, samples, placement, wheel, touch):
-    """Write the nearest of three points below a wheel's middle; False over unknown ground."""
+    """Write the nearest of three points below a wheel's middle; False near unknown ground."""
     forward, up, centres = placement.forward, placement.up, placement.centres
-    x, y, z = centres[wheel, 0], centres[wheel, 1], centres[wheel, 2]
-    touch.gap[wheel] = np.inf
+    scale, radius = ground.inverse_resolution, samples.radius
+    gx, gy = (centres[wheel, 0] - ground.x0) * scale, (centres[wheel, 1] - ground.y0) * scale
+    reach = radius * scale
+    if not (
+        gx >= reach
+        and gy >= reach
+        and gx < ground.columns - 1 - reach
+        and gy < ground.rows - 1 - reach
+    ):
+        return False
+    nearest = np.inf
     for place in range(-1, 2):
-        s, c = place * GUESS_SINE, GUESS_COSINE if place != 0 else 1.0
-        ahead, down = samples.radius * s, samples.radius * c
-        px, py = x + ahead * forward[0] - down * up[0], y + ahead * forward[1] - down * up[1]
-        gap = z - down * up[2] - look_up(ground, px, py)[0]
-        if gap != gap:
+        s, c = radius * place * GUESS_SINE, radius * (GUESS_COSINE if place != 0 else 1.0)
+        dx, dy = s * forward[0] - c * up[0], s * forward[1] - c * up[1]
+        z = centres[wheel, 2] - c * up[2]
+        gap = z - height_inside(ground, gx + dx * scale, gy + dy * scale)
+        if gap < nearest:
+            nearest = gap
+            touch.point[wheel, 0] = centres[wheel, 0] + dx
+            touch.point[wheel, 1] = centres[wheel, 1] + dy
+            touch.point[wheel, 2] = z
+        elif gap != gap:
             return False
-        if gap < touch.gap[wheel]:
-            touch.gap[wheel] = gap
-            touch.point[wheel, 0], touch.point[wheel, 1] = px, py
-            touch.point[wheel, 2] = z - down * up[2]
+    touch.gap[wheel] = nearest
     return True
 
 

@@ -36,6 +36,7 @@ def scan_rim(ground, samples, placement, wheel, scope, touch):
     for m in range(samples.circles):
         touch.first_row[wheel, m] = touch.second_row[wheel, m] = FAR_ROW
         touch.first_gap[wheel, m] = touch.second_gap[wheel, m] = np.inf
+    touch.roof[wheel] = np.inf
     if scope == COARSE:
         middle = samples.circles // 2
         return _scan_carefully(ground, samples, placement, wheel, False, middle, middle, 2, touch)
@@ -43,6 +44,7 @@ def scan_rim(ground, samples, placement, wheel, scope, touch):
         rear = _find_roof_of_half(ground, samples, placement, wheel, -0.5)
         front = _find_roof_of_half(ground, samples, placement, wheel, 0.5)
         if rear < np.inf and front < np.inf:
+            touch.roof[wheel] = max(rear, front)
             reach = CIRCLE_REACH * samples.radius if scope == FULL else 0.0
             _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, touch)
             return TOUCHING

@@ -28,6 +28,7 @@ TOUCH = record_type(
     ("circle_sine", float, (6, MOST_CIRCLES)),  # sine of the angle where it is
     ("circle_cosine", float, (6, MOST_CIRCLES)),  # cosine of the angle where it is
     ("circle_slope", float, (6, MOST_CIRCLES, 2)),  # slope of the ground there along x and y
+    ("roof", float, (6,)),  # highest ground below the wheel [m], infinite where some is unknown
     ("noted_gap", float, (6,)),  # smallest sampled gap of the last scan [m]
     ("noted_circle", np.int64, (6,)),  # the circle of that
     ("first_gap", float, (6, MOST_CIRCLES)),  # smallest sampled gap of each circle then [m]
