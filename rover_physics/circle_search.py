@@ -51,10 +51,10 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
         if gap < best:
             best, best_s, best_c, best_x, best_y = gap, s, c, slope_x, slope_y
             if converged:
-                # to second order in the turn: what is left is below 1e-10 radii
-                turn /= straight
-                best -= 0.5 * radius * straight * turn * turn
-                best_s, best_c = s - c * turn, c + s * turn
+                length = np.sqrt(rise * rise + fall * fall)
+                inverse = 1.0 / length
+                best += radius * (straight - length)
+                best_s, best_c = rise * inverse, fall * inverse
         if converged:
             break
         if trial == 0:

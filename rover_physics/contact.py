@@ -15,8 +15,6 @@ from rover_physics.kernels import kernel
 from rover_physics.rim_scan import scan_rim
 from rover_physics.touch import AGAIN, COARSE, FULL, NEAR, QUICK, TOUCHING
 
-GUESS_SINE, GUESS_COSINE = 0.6, 0.8
-"""Contact angle, behind and ahead, of the points that a first guess looks at beside the lowest."""
 COMPLIANCE = 2e-3
 """Depth, in wheel radii, to which real wheels and ground give way: circles with gaps closer than
 that share the load. On a plane a wheel thus touches in its middle, not on an edge at random."""
@@ -57,7 +55,7 @@ def find_touch(ground, samples, placement, wheel, scope, touch):
 
 @kernel
 def _guess(ground, samples, placement, wheel, touch):
-    """Write the nearest of three points below a wheel's middle; False near unknown ground."""
+    """Write the nearest of some samples of the middle circle; False near unknown ground."""
     forward, up, centres = placement.forward, placement.up, placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
     gx, gy = (centres[wheel, 0] - ground.x0) * scale, (centres[wheel, 1] - ground.y0) * scale
@@ -70,8 +68,8 @@ def _guess(ground, samples, placement, wheel, touch):
     ):
         return False
     nearest = np.inf
-    for place in range(-1, 2):
-        s, c = radius * place * GUESS_SINE, radius * (GUESS_COSINE if place != 0 else 1.0)
+    for k in range(samples.rows // 2 % 2, samples.rows, 2):
+        s, c = radius * samples.sines[k], radius * samples.cosines[k]
         dx, dy = s * forward[0] - c * up[0], s * forward[1] - c * up[1]
         z = centres[wheel, 2] - c * up[2]
         gap = z - height_inside(ground, gx + dx * scale, gy + dy * scale)

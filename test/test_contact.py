@@ -8,7 +8,7 @@ from rough_grounds import RESOLUTION, fractal, plane, rocky, smooth
 from scipy.spatial.transform import Rotation
 
 from rover_physics.contact import find_contact, find_touch
-from rover_physics.ground import heights_of, pack_ground
+from rover_physics.ground import pack_ground
 from rover_physics.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.records import new_record
 from rover_physics.rover import load_rover
@@ -39,9 +39,10 @@ class WheelOn:
         q = np.array([0.0, roll, pitch, 0.0, 0.0, 0.0])
         place(LINKAGE, 0.0, 0.0, yaw, q, self.placement)
         self.placement.centres[0] = centre
-        grid = heights_of(pack_ground(ground))
+        self.ground = pack_ground(ground)
+        record = self.ground.records[0]
         for step in (QUICK, scope):
-            self.status = find_touch(grid, self.samples, self.placement, 0, step, self.touch)
+            self.status = find_touch(record, self.samples, self.placement, 0, step, self.touch)
 
     @property
     def gap(self) -> float:
