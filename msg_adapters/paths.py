@@ -125,11 +125,28 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     return np.unique(np.concatenate([ends, chosen, np.asarray(always, np.intp)])).astype(np.intp)
 
 
+class PoseStock:
+    """Pose messages to be filled anew: to make one takes ten times as long as to fill it.
+
+    So a message with poses of a stock must be sent before the next one is made from it.
+    """
+
+    def __init__(self) -> None:
+        self._poses: list[PoseStamped] = []
+
+    def take(self, count: int) -> list[PoseStamped]:
+        """Return `count` poses, with whatever was in them last."""
+        missing = count - len(self._poses)
+        self._poses.extend(PoseStamped() for _ in range(missing))
+        return self._poses[:count]
+
+
 def settled_path(
     prediction: PathPrediction,
     rows: Sequence[int] | NDArray[np.intp],
     frame_id: str,
     stamp,
+    stock: PoseStock | None = None,
 ) -> Path:
     """Write settled waypoints of a prediction as a path with the body's full orientation.
 
@@ -138,6 +155,7 @@ def settled_path(
         rows: Waypoints to write, in order; all must have settled.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time of the path and of every pose.
+        stock: Where to take the poses from; without it they are new.
     """
     path = empty_path(frame_id, stamp)
     rows = np.asarray(rows, dtype=np.intp)
@@ -145,13 +163,12 @@ def settled_path(
     rotation = quaternions(
         prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]
     ).tolist()
-    for (x, y, z), (qx, qy, qz, qw) in zip(position, rotation, strict=True):
-        stamped = PoseStamped()
+    path.poses = (stock or PoseStock()).take(len(rows))
+    for stamped, xyz, xyzw in zip(path.poses, position, rotation, strict=True):
         stamped.header = path.header
-        stamped.pose.position.x, stamped.pose.position.y, stamped.pose.position.z = x, y, z
-        orientation = stamped.pose.orientation
-        orientation.x, orientation.y, orientation.z, orientation.w = qx, qy, qz, qw
-        path.poses.append(stamped)
+        point, orientation = stamped.pose.position, stamped.pose.orientation
+        point.x, point.y, point.z = xyz
+        orientation.x, orientation.y, orientation.z, orientation.w = xyzw
     return path
 
 

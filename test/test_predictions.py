@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
 from msg_adapters.markers import IMPASSABLE, PASSABLE, path_markers
-from msg_adapters.paths import quaternions, settled_path
+from msg_adapters.paths import PoseStock, quaternions, settled_path
 from msg_adapters.predictions import (
     JOINTS,
     MEASURES,
@@ -107,6 +107,13 @@ def test_wheels_roll_forwards_by_the_way_they_go(prediction, rover):
     assert (np.diff(rolled, axis=0) > 0.0).all()
     flat = 0.05 * 49 / rover.wheel.radius
     assert np.all((rolled[-1] > 0.97 * flat) & (rolled[-1] < 1.05 * flat))
+
+
+def test_a_path_of_poses_filled_anew_is_the_same_as_one_of_new_poses(prediction):
+    stock = PoseStock()
+    for rows in ([0, 10, 49], [5], range(50), [49, 48]):
+        path = settled_path(prediction, rows, "map", STAMP, stock)
+        assert path == settled_path(prediction, rows, "map", STAMP)
 
 
 def test_a_settled_path_has_height_and_full_orientation(prediction):
