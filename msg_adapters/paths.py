@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from nav_msgs.msg import Path
 from numpy.typing import ArrayLike, NDArray
+from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
@@ -132,13 +133,23 @@ class PoseStock:
     """
 
     def __init__(self) -> None:
+        self.header = Header()
+        """The header of all poses."""
         self._poses: list[PoseStamped] = []
+        self._parts: list[tuple[Point, Quaternion]] = []
 
-    def take(self, count: int) -> list[PoseStamped]:
-        """Return `count` poses, with whatever was in them last."""
-        missing = count - len(self._poses)
-        self._poses.extend(PoseStamped() for _ in range(missing))
-        return self._poses[:count]
+    def fill(
+        self, positions: Sequence[Sequence[float]], rotations: Sequence[Sequence[float]]
+    ) -> list[PoseStamped]:
+        """Return poses at positions x, y, z [m], turned by quaternions x, y, z, w."""
+        for _ in range(len(positions) - len(self._poses)):
+            self._poses.append(PoseStamped(header=self.header))
+            pose = self._poses[-1].pose
+            self._parts.append((pose.position, pose.orientation))
+        for (point, turn), xyz, xyzw in zip(self._parts, positions, rotations, strict=False):
+            point.x, point.y, point.z = xyz
+            turn.x, turn.y, turn.z, turn.w = xyzw
+        return self._poses[: len(positions)]
 
 
 def settled_path(
@@ -157,19 +168,14 @@ def settled_path(
         stamp: builtin_interfaces/Time of the path and of every pose.
         stock: Where to take the poses from; without it they are new.
     """
-    path = empty_path(frame_id, stamp)
+    stock = stock or PoseStock()
+    stock.header.frame_id, stock.header.stamp = frame_id, stamp
     rows = np.asarray(rows, dtype=np.intp)
-    position = prediction.position[rows].tolist()
-    rotation = quaternions(
+    positions = prediction.position[rows].tolist()
+    rotations = quaternions(
         prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]
     ).tolist()
-    path.poses = (stock or PoseStock()).take(len(rows))
-    for stamped, xyz, xyzw in zip(path.poses, position, rotation, strict=True):
-        stamped.header = path.header
-        point, orientation = stamped.pose.position, stamped.pose.orientation
-        point.x, point.y, point.z = xyz
-        orientation.x, orientation.y, orientation.z, orientation.w = xyzw
-    return path
+    return Path(header=stock.header, poses=stock.fill(positions, rotations))
 
 
 def empty_path(frame_id: str, stamp=None) -> Path:

@@ -83,14 +83,11 @@ def joint_trajectory(
         [suspension_angles(prediction)[:count], _rolled_angles(prediction, wheel_radius, count)]
     )
     efforts = np.hstack([np.zeros((count, len(SUSPENSION_JOINTS))), prediction.torque[:count]])
-    for i in range(count):
-        trajectory.points.append(
-            JointTrajectoryPoint(
-                positions=_doubles(positions[i]),
-                effort=_doubles(efforts[i]),
-                time_from_start=_duration(float(prediction.time[i])),
-            )
-        )
+    times = prediction.time[:count].tolist()
+    trajectory.points = [
+        JointTrajectoryPoint(positions=angles, effort=torques, time_from_start=_duration(time))
+        for angles, torques, time in zip(_rows(positions), _rows(efforts), times, strict=True)
+    ]
     return trajectory
 
 
@@ -127,6 +124,12 @@ def _doubles(values: NDArray[np.float64]) -> array.array:
     data = array.array("d")
     data.frombytes(values.tobytes())
     return data
+
+
+def _rows(values: NDArray[np.float64]) -> list[array.array]:
+    """Copy the rows of (n, k) values into such arrays."""
+    flat, width = _doubles(values), values.shape[1]
+    return [flat[k : k + width] for k in range(0, len(flat), width)]
 
 
 def _duration(seconds: float) -> Duration:

@@ -8,10 +8,13 @@ from collections.abc import Callable
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-QUIET = 0.01
-"""Time without an answer after which the work begins [s]: whoever asked reads the answer first."""
+QUIET = 0.03
+"""Time without an answer after which the work begins [s]: whoever asked reads the answer first,
+and asks again."""
 SLICE = 0.002
-"""Work that takes longer than this in one go waits for requests before it goes on [s]."""
+"""Work that takes longer than this in one go waits for requests before it goes on [s]..."""
+GAP = 0.003
+"""... for so long [s]."""
 MOST_WAITING = 4
 """Answers whose work may wait for further requests to be answered."""
 
@@ -37,7 +40,7 @@ class Afterwards:
     def do(self, *pieces: Work) -> None:
         """Put off the work of one answer; where a piece of it fails the log says so."""
         self._answers.append(deque(pieces))
-        self._timer.reset()
+        self._wait(QUIET)
         if len(self._answers) > MOST_WAITING:
             self._too_many.trigger()
 
@@ -47,9 +50,13 @@ class Afterwards:
         while self._answers and time.perf_counter() < end:
             self._run_next()
         if self._answers:
-            self._timer.reset()  # or it may be due at once, and comes before requests
+            self._wait(GAP)
         else:
             self._timer.cancel()
+
+    def _wait(self, seconds: float) -> None:
+        self._timer.timer_period_ns = round(1e9 * seconds)
+        self._timer.reset()
 
     def _run_oldest(self) -> None:
         """Run what belongs to the oldest answers until no more than MOST_WAITING are left."""
