@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.markers import cleared_markers, path_markers
@@ -56,7 +56,8 @@ class ResultTopics:
 
     def __init__(self, node: Node, afterwards: Afterwards, map_frame: str):
         self._node, self._afterwards, self._frame = node, afterwards, map_frame
-        self._stock = PoseStock()
+        self._poses = PoseStock()
+        self._points: list[JointTrajectoryPoint] = []
         self._topics = {name: KeptTopic(node, kind, f"~/{name}") for name, kind in _KINDS.items()}
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(LOOK_OUT, self._serve_late_comers, clock=steady)
@@ -80,7 +81,9 @@ class ResultTopics:
             The plan; its poses are good until the next plan is made.
         """
         stamp = self._node.get_clock().now().to_msg()
-        results = _Results(judgement, rover, plan_spacing, self._frame, stamp, self._stock)
+        results = _Results(
+            judgement, rover, plan_spacing, self._frame, stamp, self._poses, self._points
+        )
         publications = [
             partial(topic.publish, partial(results.message, name))
             for name, topic in self._topics.items()
@@ -103,7 +106,8 @@ class _Results:
     plan_spacing: float
     frame: str
     stamp: Time
-    stock: PoseStock
+    poses: PoseStock
+    points: list[JointTrajectoryPoint]
 
     def message(self, topic: str) -> object:
         """Return the message for a topic."""
@@ -121,7 +125,7 @@ class _Results:
         if candidate is None or not self.judgement.traversable:
             return empty_path(self.frame, self.stamp)
         return settled_path(
-            candidate.prediction, self._rows_to_show(), self.frame, self.stamp, self.stock
+            candidate.prediction, self._rows_to_show(), self.frame, self.stamp, self.poses
         )
 
     def _verdict(self) -> DiagnosticArray:
@@ -146,7 +150,7 @@ class _Results:
         prediction = candidate.prediction
         if topic == "predicted_joints":
             radius = self.rover.wheel.radius
-            return joint_trajectory(prediction, radius, self.frame, self.stamp)
+            return joint_trajectory(prediction, radius, self.frame, self.stamp, self.points)
         if topic == "markers":
             grades = [grade.grade for grade in self.judgement.grades]
             reasons, rows = candidate.verdict.reasons, self._rows_to_show()

@@ -1,6 +1,7 @@
 """Predictions become flat labelled arrays, a trajectory by joint name, and markers."""
 
 import array
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,6 +100,17 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
         np.testing.assert_array_equal(point.effort[4:], prediction.torque[i])
         seconds = point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
         assert seconds == pytest.approx(prediction.time[i], abs=1e-8)
+
+
+def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(prediction, rover):
+    stock = []
+    for unsettled in (49, 10, 50):
+        cut = np.arange(len(prediction.settled)) < unsettled
+        part = replace(prediction, settled=prediction.settled & cut)
+        radius = rover.wheel.radius
+        trajectory = joint_trajectory(part, radius, "map", STAMP, stock)
+        assert len(trajectory.points) == unsettled
+        assert trajectory == joint_trajectory(part, radius, "map", STAMP)
 
 
 def test_wheels_roll_forwards_by_the_way_they_go(prediction, rover):
