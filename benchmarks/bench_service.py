@@ -1,14 +1,17 @@
 """`~/can_traverse` over DDS between two processes: 10 m, 2 cm between waypoints.
 
 In turns are asked: the server, a node that answers at once with the same plan, and the same
-question in this process without ROS. A planner that replans asks now and then, so there is a
-pause before each question; how fast answers come without a pause is measured too.
+question in this process without ROS. All of it twice: after a pause, as by a planner that asks
+now and then (processors sleep and caches have cooled meanwhile), and at once, as by a planner that
+asks again as soon as the answer is there.
 """
 
 import statistics
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 
-from measure import Figure, median_time, quantile
+from measure import Figure, quantile
 from planner_process import SERVER, Planner, planner_and_processes
 
 from rover_physics.terrain import Terrain
@@ -21,8 +24,21 @@ START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
 """Over ground with some rocks: contacts jump here and there, as on most ways."""
 QUESTIONS = 200
 WARM_UP = 20
-PAUSE = 0.03
-"""Time between an answer and the next question [s]."""
+
+
+@dataclass(frozen=True)
+class Asker:
+    """How a planner asks."""
+
+    name: str
+    """What figures call it."""
+    pause: float
+    """Time between an answer and the next question [s]."""
+    in_a_row: int
+    """Questions to one before it is the turn of the next."""
+
+
+ASKERS = (Asker("after a pause", 0.03, 1), Asker("at once", 0.0, 20))
 
 
 def make_service(ground: Terrain, **parameters: object) -> TraverseService:
@@ -33,57 +49,67 @@ def make_service(ground: Terrain, **parameters: object) -> TraverseService:
     return service
 
 
-def ask_in_turns(planner: Planner, service: TraverseService) -> dict[str, list[float]]:
+def ask_in_turns(
+    planner: Planner, service: TraverseService, asker: Asker
+) -> dict[str, list[float]]:
     """Return the times [s] of server, echo and computation."""
-    times: dict[str, list[float]] = {"server": [], "echo": [], "computation": []}
-    for k in range(WARM_UP + QUESTIONS):
-        taken = {}
-        for name, topic in (("server", SERVER), ("echo", ECHO)):
-            time.sleep(PAUSE)
-            taken[name] = planner.ask(topic, START, GOAL)[1]
-        time.sleep(PAUSE)
-        began = time.perf_counter()
-        service.answer(START, GOAL)
-        taken["computation"] = time.perf_counter() - began
-        for name, value in taken.items():
-            if k >= WARM_UP:
-                times[name].append(value)
-    return times
+    ways: dict[str, Callable[[], object]] = {
+        "server": lambda: planner.ask(SERVER, START, GOAL),
+        "echo": lambda: planner.ask(ECHO, START, GOAL),
+        "computation": lambda: service.answer(START, GOAL),
+    }
+    times: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range((WARM_UP + QUESTIONS) // asker.in_a_row):
+        for name, ask in ways.items():
+            if not asker.pause:
+                ask()  # does not count: it comes after another's turn
+            times[name] += [_time(ask, asker.pause) for _ in range(asker.in_a_row)]
+    return {name: taken[WARM_UP:] for name, taken in times.items()}
+
+
+def _time(ask: Callable[[], object], pause: float) -> float:
+    time.sleep(pause)
+    began = time.perf_counter()
+    ask()
+    return time.perf_counter() - began
 
 
 def measure() -> list[Figure]:
-    """Measure one path, and a fan of nine."""
+    """Measure one path either way, and a fan of nine."""
     ground = make_mars_terrain(1, 24.0, 0.05)
     service = make_service(ground, candidate_count=1)
+    figures = []
     with planner_and_processes() as (planner, processes):
         processes.start_server(ground, candidate_count=1)
         plan, _ = planner.ask(SERVER, START, GOAL)
         assert plan.poses, "the path is to be passable: " + service.answer(START, GOAL).reason
         processes.start_echo(plan)
-        times = ask_in_turns(planner, service)
-        hurried = median_time(
-            lambda: [planner.ask(SERVER, START, GOAL) for _ in range(20)], clock=time.perf_counter
-        )
-    figures = _tell(times, len(plan.poses))
-    rate = Figure("service", "answers without a pause between", 20.0 / hurried, "1/s", repeats=5)
-    return [*figures, rate, *_measure_nine(ground)]
+        planner.ask(ECHO, START, GOAL)
+        for asker in ASKERS:
+            times = ask_in_turns(planner, service, asker)
+            figures += _tell(asker.name, times, len(plan.poses))
+    return [*figures, *_measure_nine(ground)]
 
 
-def _tell(times: dict[str, list[float]], poses: int) -> list[Figure]:
+def _tell(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]:
     middle = {name: 1e3 * statistics.median(values) for name, values in times.items()}
-    late = 1e3 * quantile(times["server"], 0.99)
-    echo_late = 1e3 * quantile(times["echo"], 0.99)
+    late = {name: 1e3 * quantile(values, 0.99) for name, values in times.items()}
+    spread = {name: late[name] / middle[name] for name in times}
     overhead = middle["server"] - middle["echo"] - middle["computation"]
     rows = [
         (f"p50, one path, {poses} poses back", middle["server"], "ms", 6.0),
-        ("p99", late, "ms", None),
-        ("p99 / p50", late / middle["server"], "x", 2.0),
+        ("p99", late["server"], "ms", None),
+        ("p99 / p50", spread["server"], "x", 2.0),
         ("p50 of an echo of the plan", middle["echo"], "ms", None),
-        ("p99 / p50 of that", echo_late / middle["echo"], "x", None),
+        ("p99 / p50 of that", spread["echo"], "x", None),
         ("p50 of the computation", middle["computation"], "ms", None),
+        ("p99 / p50 of that", spread["computation"], "x", None),
         ("p50 - computation - echo", overhead, "ms", 1.0),
+        ("answers in a second of waiting", 1.0 / statistics.mean(times["server"]), "1/s", None),
     ]
-    return [Figure("service", *row, repeats=QUESTIONS) for row in rows]
+    return [
+        Figure("service", f"{asked}: {name}", *rest, repeats=QUESTIONS) for name, *rest in rows
+    ]
 
 
 def _measure_nine(ground: Terrain) -> list[Figure]:
@@ -92,7 +118,7 @@ def _measure_nine(ground: Terrain) -> list[Figure]:
         processes.start_server(ground)
         times = []
         for _ in range(60):
-            time.sleep(PAUSE)
+            time.sleep(ASKERS[0].pause)
             times.append(planner.ask(SERVER, START, GOAL)[1])
     middle = 1e3 * statistics.median(times[10:])
     return [Figure("service", "p50, nine candidates", middle, "ms", repeats=50)]

@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from nav_msgs.msg import Path
 from numpy.typing import ArrayLike, NDArray
+from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
@@ -125,11 +126,38 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     return np.unique(np.concatenate([ends, chosen, np.asarray(always, np.intp)])).astype(np.intp)
 
 
+class PoseStock:
+    """Pose messages to be filled anew: to make one takes ten times as long as to fill it.
+
+    So a message with poses of a stock must be sent before the next one is made from it.
+    """
+
+    def __init__(self) -> None:
+        self.header = Header()
+        """The header of all poses."""
+        self._poses: list[PoseStamped] = []
+        self._parts: list[tuple[Point, Quaternion]] = []
+
+    def fill(
+        self, positions: Sequence[Sequence[float]], rotations: Sequence[Sequence[float]]
+    ) -> list[PoseStamped]:
+        """Return poses at positions x, y, z [m], turned by quaternions x, y, z, w."""
+        for _ in range(len(positions) - len(self._poses)):
+            self._poses.append(PoseStamped(header=self.header))
+            pose = self._poses[-1].pose
+            self._parts.append((pose.position, pose.orientation))
+        for (point, turn), xyz, xyzw in zip(self._parts, positions, rotations, strict=False):
+            point.x, point.y, point.z = xyz
+            turn.x, turn.y, turn.z, turn.w = xyzw
+        return self._poses[: len(positions)]
+
+
 def settled_path(
     prediction: PathPrediction,
     rows: Sequence[int] | NDArray[np.intp],
     frame_id: str,
     stamp,
+    stock: PoseStock | None = None,
 ) -> Path:
     """Write settled waypoints of a prediction as a path with the body's full orientation.
 
@@ -138,21 +166,16 @@ def settled_path(
         rows: Waypoints to write, in order; all must have settled.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time of the path and of every pose.
+        stock: Where to take the poses from; without it they are new.
     """
-    path = empty_path(frame_id, stamp)
+    stock = stock or PoseStock()
+    stock.header.frame_id, stock.header.stamp = frame_id, stamp
     rows = np.asarray(rows, dtype=np.intp)
-    position = prediction.position[rows].tolist()
-    rotation = quaternions(
+    positions = prediction.position[rows].tolist()
+    rotations = quaternions(
         prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]
     ).tolist()
-    for (x, y, z), (qx, qy, qz, qw) in zip(position, rotation, strict=True):
-        stamped = PoseStamped()
-        stamped.header = path.header
-        stamped.pose.position.x, stamped.pose.position.y, stamped.pose.position.z = x, y, z
-        orientation = stamped.pose.orientation
-        orientation.x, orientation.y, orientation.z, orientation.w = qx, qy, qz, qw
-        path.poses.append(stamped)
-    return path
+    return Path(header=stock.header, poses=stock.fill(positions, rotations))
 
 
 def empty_path(frame_id: str, stamp=None) -> Path:

@@ -3,7 +3,6 @@
 import array
 
 import numpy as np
-from builtin_interfaces.msg import Duration
 from numpy.typing import ArrayLike, NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -62,6 +61,7 @@ def joint_trajectory(
     wheel_radius: float,
     frame_id: str,
     stamp,
+    stock: list[JointTrajectoryPoint] | None = None,
 ) -> JointTrajectory:
     """Write the joints along a path, up to the first waypoint that did not settle.
 
@@ -74,6 +74,8 @@ def joint_trajectory(
         wheel_radius: Of the rover [m].
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
+        stock: Points to fill anew instead of making them, which takes most of the time; it grows
+            as needed. So one message must be sent before the next is made from it.
     """
     count = len(prediction.settled)
     if not prediction.settled.all():
@@ -83,14 +85,14 @@ def joint_trajectory(
         [suspension_angles(prediction)[:count], _rolled_angles(prediction, wheel_radius, count)]
     )
     efforts = np.hstack([np.zeros((count, len(SUSPENSION_JOINTS))), prediction.torque[:count]])
-    for i in range(count):
-        trajectory.points.append(
-            JointTrajectoryPoint(
-                positions=_doubles(positions[i]),
-                effort=_doubles(efforts[i]),
-                time_from_start=_duration(float(prediction.time[i])),
-            )
-        )
+    stock = [] if stock is None else stock
+    stock.extend(JointTrajectoryPoint() for _ in range(count - len(stock)))
+    trajectory.points = stock[:count]
+    rows = zip(trajectory.points, _rows(positions), _rows(efforts), strict=True)
+    for (point, angles, torques), time in zip(rows, prediction.time[:count].tolist(), strict=True):
+        point.positions, point.effort = angles, torques
+        start = point.time_from_start
+        start.sec, start.nanosec = divmod(round(time * 1e9), 1_000_000_000)
     return trajectory
 
 
@@ -129,7 +131,7 @@ def _doubles(values: NDArray[np.float64]) -> array.array:
     return data
 
 
-def _duration(seconds: float) -> Duration:
-    """Return seconds as a message, to the nearest nanosecond."""
-    whole, nanoseconds = divmod(round(seconds * 1e9), 1_000_000_000)
-    return Duration(sec=int(whole), nanosec=int(nanoseconds))
+def _rows(values: NDArray[np.float64]) -> list[array.array]:
+    """Copy the rows of (n, k) values into such arrays."""
+    flat, width = _doubles(values), values.shape[1]
+    return [flat[k : k + width] for k in range(0, len(flat), width)]

@@ -217,9 +217,8 @@ class TraverseServer(Node):
         """
         judgement = answer_or_refuse(self.get_logger(), request, judge, refusal)
         rover, spacing = self._service.settings.rover, self._values["plan_spacing"]
-        plan = self._results.take(judgement, rover, spacing)
-        self._afterwards.do(partial(self._log, request, judgement))
-        return judgement, plan
+        log = partial(self._log, request, judgement)
+        return judgement, self._results.take(judgement, rover, spacing, log)
 
     def _log(self, request: str, judgement: Judgement) -> None:
         text = f"{request}: {judgement.summary()}"

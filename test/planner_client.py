@@ -1,5 +1,7 @@
 """A client of the traverse server as tests need it: sends, asks, and keeps what it hears."""
 
+from collections.abc import Callable
+
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Path
@@ -43,6 +45,7 @@ class PlannerClient(Node):
         super().__init__("test_planner", context=ros.context)
         self.heard: dict[str, list] = {topic: [] for topic in RESULTS}
         self.logs: list[str] = []
+        self._heard_last: Callable[[], bool] = lambda: True
         for topic, kind in RESULTS.items():
             self.create_subscription(
                 kind, f"{SERVER}/{topic}", self.heard[topic].append, result_qos()
@@ -81,10 +84,18 @@ class PlannerClient(Node):
     def plan(self, start, goal, tolerance=0.0) -> Path:
         """Ask for a plan between two PoseStamped."""
         request = GetPlan.Request(start=start, goal=goal, tolerance=float(tolerance))
-        return call(self._plan, request).plan
+        plan = call(self._plan, request).plan
+        markers = self.heard["markers"]
+        self._heard_last = lambda: (
+            bool(markers) and markers[-1].markers[0].header.stamp == plan.header.stamp
+        )
+        return plan
 
     def check_path(self) -> Trigger.Response:
         """Ask about the last path."""
+        markers = self.heard["markers"]
+        before = len(markers)
+        self._heard_last = lambda: len(markers) > before
         return call(self._check, Trigger.Request())
 
     def check_poses(self, server, poses) -> Trigger.Response:
@@ -114,7 +125,12 @@ class PlannerClient(Node):
         return result.successful, result.reason
 
     def next_results(self, ask) -> tuple:
-        """Call `ask` and return its answer with the results published for it."""
+        """Call `ask` and return its answer with the results published for it.
+
+        Results follow an answer, so those of the question before are awaited first; the markers
+        are the last of them.
+        """
+        wait_until(self._heard_last, "the results of the question before")
         for messages in self.heard.values():
             messages.clear()
         answer = ask()

@@ -1,6 +1,7 @@
 """Predictions become flat labelled arrays, a trajectory by joint name, and markers."""
 
 import array
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
 from msg_adapters.markers import IMPASSABLE, PASSABLE, path_markers
-from msg_adapters.paths import quaternions, settled_path
+from msg_adapters.paths import PoseStock, quaternions, settled_path
 from msg_adapters.predictions import (
     JOINTS,
     MEASURES,
@@ -101,12 +102,30 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
         assert seconds == pytest.approx(prediction.time[i], abs=1e-8)
 
 
+def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(prediction, rover):
+    stock = []
+    for unsettled in (49, 10, 50):
+        cut = np.arange(len(prediction.settled)) < unsettled
+        part = replace(prediction, settled=prediction.settled & cut)
+        radius = rover.wheel.radius
+        trajectory = joint_trajectory(part, radius, "map", STAMP, stock)
+        assert len(trajectory.points) == unsettled
+        assert trajectory == joint_trajectory(part, radius, "map", STAMP)
+
+
 def test_wheels_roll_forwards_by_the_way_they_go(prediction, rover):
     message = joint_trajectory(prediction, rover.wheel.radius, "map", STAMP)
     rolled = np.array([point.positions[4:] for point in message.points])
     assert (np.diff(rolled, axis=0) > 0.0).all()
     flat = 0.05 * 49 / rover.wheel.radius
     assert np.all((rolled[-1] > 0.97 * flat) & (rolled[-1] < 1.05 * flat))
+
+
+def test_a_path_of_poses_filled_anew_is_the_same_as_one_of_new_poses(prediction):
+    stock = PoseStock()
+    for rows in ([0, 10, 49], [5], range(50), [49, 48]):
+        path = settled_path(prediction, rows, "map", STAMP, stock)
+        assert path == settled_path(prediction, rows, "map", STAMP)
 
 
 def test_a_settled_path_has_height_and_full_orientation(prediction):

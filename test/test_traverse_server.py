@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from grounds import gap, make_terrain, wall_at, waves
-from planner_client import GOAL, START, ask, verdict_of
+from nav_msgs.srv import GetPlan
+from planner_client import GOAL, SERVER, START, PlannerClient, ask, verdict_of
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
-from ros_fixtures import wait_until
+from ros_fixtures import call, wait_until
 from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.paths import path_to_poses
+from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.predictions import JOINTS, MEASURES, array_values
 from rover_physics.terrain import load_terrain, save_terrain
 from rover_planner.qos import map_qos
@@ -63,6 +65,30 @@ def test_all_results_of_a_path_share_stamp_frame_and_waypoints(mapped, client):
     assert tuple(joints.joint_names) == JOINTS and len(joints.points) == waypoints
     last = joints.points[-1].time_from_start
     assert last.sec + last.nanosec * 1e-9 == pytest.approx(float(verdict["time"]), abs=1e-6)
+
+
+def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(server, ros):
+    server.service.take_terrain(make_terrain(waves))
+    asker = ros.spin(Node("asker", context=ros.context))
+    client = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
+    for end in ((1.0, 0.3, 0.0), GOAL):
+        request = GetPlan.Request(start=stamped_pose(START, "map"), goal=stamped_pose(end, "map"))
+        plan = call(client, request).plan
+    late = ros.spin(PlannerClient(ros)).heard
+
+    def heard_all() -> bool:
+        if not all(late.values()) or late["plan"][-1] != plan:
+            return False
+        last = {topic: messages[-1] for topic, messages in late.items()}
+        headers = [last[topic].header for topic in ("predicted_joints", "verdict")]
+        headers += [marker.header for marker in last["markers"].markers]
+        arrays = [array_values(last[topic]) for topic in (*WHEEL_TOPICS, "tip_over_margin")]
+        waypoints = int(verdict_of(last)["waypoints"])
+        return all(header == plan.header for header in headers) and all(
+            len(values) == waypoints for values in arrays
+        )
+
+    wait_until(heard_all, "all results of the last answer")
 
 
 def test_the_results_are_those_of_the_model(mapped, client):
