@@ -13,13 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.evaluation import NONE_HELD, new_results
+from rover_physics.evaluation import NONE_HELD, RESULT, new_results
+from rover_physics.path_kernels import divide_stretches, find_jumps
 from rover_physics.settling import NOT_SETTLED, SETTLED
 from rover_physics.terrain import Terrain
 
-ANGLE_JUMP = np.radians(12.0)
-"""Change of a contact angle that is looked into, where one of the two is steep."""
-STEEP = np.radians(25.0)
 HEIGHT_JUMP = 0.25
 """Change of a wheel's height, in wheel radii, that is looked into."""
 PIECES = 4
@@ -49,7 +47,7 @@ class Crossings:
     def select(self, rows: np.ndarray | slice) -> "Crossings":
         """Return the poses that a mask (m,) has, or those of some rows in their order."""
         return Crossings(
-            self.place[rows], self.waypoint[rows], self.poses[rows], self.results[rows]
+            self.place[rows], self.waypoint[rows], self.poses[rows], _take(self.results, rows)
         )
 
     def between(self, first: int, end: int) -> "Crossings":
@@ -80,22 +78,23 @@ def find_crossings(
         direction: 1 where the rover drives forwards along the path, -1 backwards.
         joined: (n - 1,) True where the path leads from a waypoint to the next one.
     """
-    spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    near = (spacing <= radius) & (spacing > 0.0) & joined
-    at = np.flatnonzero(_jumps(results, slice(None, -1), slice(1, None), radius) & near)
-    open_ = _Stretches(
-        np.column_stack([at, at + 1.0]),
-        poses[np.column_stack([at, at + 1])],
-        results[np.column_stack([at, at + 1])],
-    )
+    ends = _find_jumps(results, len(poses), radius)
+    before, after = ends.T
+    spacing = np.hypot(*(poses[after] - poses[before])[:, :2].T)
+    near = (after - before == 1) & (spacing <= radius) & (spacing > 0.0)
+    ends = ends[near & np.broadcast_to(joined, len(poses) - 1)[before]]
+    open_ = _Stretches(ends.astype(float), poses[ends], _take(results, ends))
     found = []
     while len(open_.place):
-        inner = open_.divide(evaluate)
+        whole, inner = open_.divide(evaluate)
         found.append(inner.select(inner.results["status"] != NOT_SETTLED))
-        pieces, stuck = open_.split(inner, radius)
+        pieces, stuck = whole.split(radius)
         short = np.hypot(*(pieces.poses[:, 1] - pieces.poses[:, 0])[:, :2].T) < SHORTEST
-        found.append(_climb(terrain, radius, pieces.select(short | stuck), evaluate, direction))
-        open_ = pieces.select(~(short | stuck))
+        closed = short | stuck
+        if closed.any():
+            found.append(_climb(terrain, radius, pieces.select(closed), evaluate, direction))
+            pieces = pieces.select(~closed)
+        open_ = pieces
     return _in_order(found)
 
 
@@ -104,61 +103,69 @@ _NOTHING = Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_result
 
 @dataclass(frozen=True, eq=False)
 class _Stretches:
-    """Stretches of the path within which a contact jumps."""
+    """Stretches of the path within which a contact jumps: p poses of each, the ends and between."""
 
     place: np.ndarray
-    """(k, 2) places where each begins and ends, counted in waypoints."""
+    """(k, p) places, counted in waypoints."""
     poses: np.ndarray
-    """(k, 2, 3) the poses there."""
-    results: np.ndarray
-    """(k, 2) the RESULTs there."""
+    """(k, p, 3) the poses there."""
+    results: Any
+    """(k, p) the RESULTs there."""
 
-    @property
     def waypoint(self) -> np.ndarray:
-        """(k,) index of the waypoint that follows."""
-        return np.floor(self.place[:, 0]).astype(int) + 1
+        """Return (k,) the index of the waypoint that follows."""
+        return self.place[:, 0].astype(int) + 1
 
     def select(self, mask: np.ndarray) -> "_Stretches":
         """Return the stretches where `mask` (k,) is True."""
-        return _Stretches(self.place[mask], self.poses[mask], self.results[mask])
+        return _Stretches(self.place[mask], self.poses[mask], _take(self.results, mask))
 
-    def divide(self, evaluate: Evaluate) -> Crossings:
-        """Return the results at PIECES - 1 poses within each stretch, stretch by stretch."""
-        share = np.arange(1, PIECES) / PIECES
-        first, last = self.poses[:, 0], self.poses[:, 1]
-        way = last - first
-        way[:, 2] = (way[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-        poses = (first[:, None] + share[:, None] * way[:, None]).reshape(-1, 3)
-        start, end = self.place[:, :1], self.place[:, 1:]
-        return Crossings(
-            (start + share * (end - start)).ravel(),
-            np.repeat(self.waypoint, PIECES - 1),
-            poses,
-            evaluate(poses, NONE_HELD),
+    def divide(self, evaluate: Evaluate) -> tuple["_Stretches", Crossings]:
+        """Return the stretches with PIECES - 1 poses more between the two of each, and those."""
+        k, p = len(self.place), PIECES + 1
+        place, poses = np.empty((k, p)), np.empty((k, p, 3))
+        place[:, ::PIECES], poses[:, ::PIECES] = self.place, self.poses
+        divide_stretches(place, poses)
+        inner = Crossings(
+            place[:, 1:-1].ravel(),
+            self.waypoint().repeat(p - 2),
+            poses[:, 1:-1].reshape(-1, 3),
+            evaluate(poses[:, 1:-1].reshape(-1, 3), NONE_HELD),
         )
+        numbers = np.empty((k, p, _NUMBERS))
+        numbers[:, ::PIECES] = _numbers(self.results)
+        numbers[:, 1:-1] = _numbers(inner.results).reshape(k, p - 2, -1)
+        return _Stretches(place, poses, numbers.view(RESULT)[..., 0]), inner
 
-    def split(self, inner: Crossings, radius: float) -> tuple["_Stretches", np.ndarray]:
+    def split(self, radius: float) -> tuple["_Stretches", np.ndarray]:
         """Return the pieces within which a contact still jumps, and which of them are stuck.
 
         Stuck (k,) are those that hold a pose in which the rover does not settle.
         """
-        k = len(self.place)
+        results = self.results.reshape(-1)
+        ends = _find_jumps(results, self.place.shape[1], radius)
+        place, poses = self.place.reshape(-1), self.poses.reshape(-1, 3)
+        pieces = _Stretches(place[ends], poses[ends], _take(results, ends))
+        return pieces, ends[:, 1] - ends[:, 0] > 1
 
-        def insert(ends: np.ndarray, between: np.ndarray) -> np.ndarray:
-            whole = np.empty((k, PIECES + 1, *ends.shape[2:]), ends.dtype)
-            whole[:, 0], whole[:, -1] = ends[:, 0], ends[:, 1]
-            whole[:, 1:-1] = between.reshape(k, PIECES - 1, *between.shape[1:])
-            return whole.reshape(k * (PIECES + 1), *whole.shape[2:])
 
-        results = insert(self.results, inner.results)
-        known = np.flatnonzero(results["status"] != NOT_SETTLED)
-        before, after = known[:-1], known[1:]
-        same = before // (PIECES + 1) == after // (PIECES + 1)
-        before, after = before[same], after[same]
-        jumps = _jumps(results, before, after, radius)
-        ends = np.column_stack([before[jumps], after[jumps]])
-        place, poses = insert(self.place, inner.place), insert(self.poses, inner.poses)
-        return _Stretches(place[ends], poses[ends], results[ends]), ends[:, 1] - ends[:, 0] > 1
+def _find_jumps(results: Any, run: int, radius: float) -> np.ndarray:
+    """Return the rows (j, 2) of neighbours between which a contact jumps; see `find_jumps`."""
+    ends = np.empty((len(results), 2), np.int64)
+    return ends[: find_jumps(results, run, HEIGHT_JUMP * radius, ends)]
+
+
+_NUMBERS = RESULT.itemsize // 8
+
+
+def _numbers(results: Any) -> np.ndarray:
+    """Return RESULTs (...) as numbers (..., k): to copy these is much faster."""
+    return results.view(np.float64).reshape(*results.shape, _NUMBERS)
+
+
+def _take(results: Any, rows: np.ndarray | slice) -> Any:
+    """Return `results[rows]`."""
+    return _numbers(results)[rows].view(RESULT)[..., 0]
 
 
 def _in_order(found: list[Crossings]) -> Crossings:
@@ -166,15 +173,11 @@ def _in_order(found: list[Crossings]) -> Crossings:
     if not found:
         return _NOTHING
     place = np.concatenate([part.place for part in found])
-    results, end = new_results(len(place)), 0
-    for part in found:
-        end += len(part.place)
-        results[end - len(part.place) : end] = part.results
     together = Crossings(
         place,
         np.concatenate([part.waypoint for part in found]),
         np.concatenate([part.poses for part in found]),
-        results,
+        np.concatenate([_numbers(part.results) for part in found]).view(RESULT)[:, 0],
     )
     return together.select(np.argsort(place, kind="stable"))
 
@@ -203,7 +206,7 @@ def _climb(
     at = np.flatnonzero(np.any(climbing & (rise > HEIGHT_JUMP * radius), axis=1))
     if not len(at):
         return _NOTHING
-    stages = len(CLIMB_STAGES)
+    stages, waypoint = len(CLIMB_STAGES), places.waypoint()
     held = np.full((len(at), stages, 6, 2), np.nan)
     for row, i in enumerate(at):
         course = places.poses[i, 0, 2] + (0.0 if direction > 0.0 else np.pi)
@@ -220,7 +223,7 @@ def _climb(
     settled = (results["status"] == SETTLED).reshape(-1, stages)
     climbs = Crossings(
         (start + CLIMB_STAGES * (end - start)).ravel(),
-        np.repeat(places.waypoint[at], stages),
+        np.repeat(waypoint[at], stages),
         poses,
         results,
     )

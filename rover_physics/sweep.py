@@ -13,6 +13,7 @@ from rover_physics.drops import find_falls
 from rover_physics.errors import PoseError
 from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, evaluate
 from rover_physics.model_setup import POLICIES, Setup, set_up
+from rover_physics.path_kernels import add_up
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover, load_rover
 from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
@@ -178,14 +179,13 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
 
 def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any) -> PathPrediction:
     same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
-    q, power = results["q"], np.nan_to_num(results["power"])
-    settled = results["status"] == SETTLED
-    position = np.column_stack([poses[:, :2], q[:, 0]])
+    q, settled = results["q"], results["status"] == SETTLED
+    position = np.empty((len(poses), 3))
+    position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
     position[~settled] = np.nan
-    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    climbs = np.nan_to_num(np.diff(position[:, 2]))
-    durations = np.hypot(steps, climbs) / settings.speed
-    work = 0.5 * (power[1:] + power[:-1]) * durations
+    sums = np.empty((3, len(poses)))
+    add_up(poses, position[:, 2], results["power"], settled, settings["speed"], sums)
+    distance, time, energy = sums
     return PathPrediction(
         poses=poses,
         settled=settled,
@@ -194,17 +194,13 @@ def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any)
         pitch=q[:, 2],
         rocker_angle=q[:, 3:4] * (1.0, -1.0),
         bogie_angle=q[:, 4:6],
-        energy=_accumulate(work, settled),
-        time=_accumulate(durations, settled),
-        distance=np.concatenate([[0.0], np.cumsum(steps)]),
-        policy=POLICY_NAMES[int(settings.policy)],
+        energy=energy,
+        time=time,
+        distance=distance,
+        policy=POLICY_NAMES[int(settings["policy"])],
         **same,
         **more,
     )
-
-
-def _accumulate(increments: np.ndarray, settled: np.ndarray) -> np.ndarray:
-    return np.where(settled, np.concatenate([[0.0], np.cumsum(increments)]), np.nan)
 
 
 def warm_up() -> None:
