@@ -103,7 +103,7 @@ _NOTHING = Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_result
 
 @dataclass(frozen=True, eq=False)
 class _Stretches:
-    """Stretches of the path within which a contact jumps: p poses of each, the ends and between."""
+    """Stretches of the path within which a contact jumps: p poses of each, ends included."""
 
     place: np.ndarray
     """(k, p) places, counted in waypoints."""
@@ -180,20 +180,6 @@ def _in_order(found: list[Crossings]) -> Crossings:
         np.concatenate([_numbers(part.results) for part in found]).view(RESULT)[:, 0],
     )
     return together.select(np.argsort(place, kind="stable"))
-
-
-def _jumps(
-    results: np.ndarray, before: np.ndarray | slice, after: np.ndarray | slice, radius: float
-) -> np.ndarray:
-    """Return (k,) True where a contact jumps between the rows before (k,) and after (k,)."""
-    settled = results["status"] == SETTLED
-    angle, height = results["contact_angle"], results["wheel_centres"][:, :, 2]
-    here, there = angle[before], angle[after]
-    steep = np.maximum(np.abs(here), np.abs(there)) > STEEP
-    turned = steep & (np.abs(there - here) > ANGLE_JUMP)
-    rise = np.abs(height[after] - height[before]) > HEIGHT_JUMP * radius
-    jumps = settled[before] & settled[after] & np.any(turned | rise, axis=1)
-    return np.asarray(jumps)
 
 
 def _climb(
