@@ -102,7 +102,8 @@ def new_work() -> Any:
     return work
 
 
-NEW_WORK = np.array([new_work()], WORK)
+_NEW_WORK = np.array([new_work()], WORK).view(np.float64)
+"""As numbers, for numpy copies records field by field."""
 
 
 def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
@@ -113,10 +114,10 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     """
     results = new_results(len(poses))
     records = (np.array([record]) for record in (linkage, samples, settings))
-    effort = 1 if settings.policy == EQUAL else OPTIMAL_EFFORT
+    effort = 1 if settings["policy"] == EQUAL else OPTIMAL_EFFORT
     with threads_worth(effort * len(poses)) as threads:
         chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-len(poses) // CHUNK))
-        works = np.repeat(NEW_WORK, chunks)
+        works = _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
         evaluate_poses(ground, *records, poses, held, works, results)
     return results
 
