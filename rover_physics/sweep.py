@@ -121,7 +121,7 @@ def _sweep(
     results = evaluate_at(poses)
     joined = np.ones(len(poses) - 1, bool)
     joined[ends[:-1] - 1] = False
-    radius, direction = rover.wheel.radius, float(setup.settings.direction)
+    radius, direction = rover.wheel.radius, float(setup.settings["direction"])
     crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
@@ -136,7 +136,7 @@ def _predict(
     settings: Any, radius: float, poses: np.ndarray, results: np.ndarray, crossings: Crossings
 ) -> PathPrediction:
     """Return what results and crossings of one path say of it."""
-    falls = find_falls(radius, poses, results, crossings, float(settings.direction))
+    falls = find_falls(radius, poses, results, crossings, float(settings["direction"]))
     between = _collect(
         crossings.poses,
         crossings.results,
