@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike
 from rover_physics.crossing import Crossings, find_crossings
 from rover_physics.drops import find_falls
 from rover_physics.errors import PoseError
-from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, evaluate
+from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, effort, evaluate
 from rover_physics.model_setup import POLICIES, Setup, set_up
 from rover_physics.path_kernels import add_up
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover, load_rover
 from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
 from rover_physics.terrain import Terrain
+from rover_physics.threads import threads_worth
 
 __all__ = [
     "NOT_SETTLED",
@@ -118,11 +119,12 @@ def _sweep(
         return []
     ends = np.cumsum([len(poses) for poses in paths])
     poses = np.concatenate(paths)
-    results = evaluate_at(poses)
     joined = np.ones(len(poses) - 1, bool)
     joined[ends[:-1] - 1] = False
     radius, direction = rover.wheel.radius, float(setup.settings["direction"])
-    crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
+    with threads_worth(effort(setup.settings, len(poses))):  # told once, not for each round
+        results = evaluate_at(poses)
+        crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
         part = crossings.between(first, end)
@@ -169,9 +171,9 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
         raise PoseError(f"poses are not numbers: {error}") from error
     if array.ndim != 2 or array.shape[1] != 3 or not len(array):
         raise PoseError(f"poses have shape {array.shape}; it must be (n, 3): x, y, yaw, n >= 1")
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        row, column = wrong[0]
+    finite = np.isfinite(array)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
         name, value = ["x", "y", "yaw"][column], array[row, column]
         raise PoseError(f"{name} of pose {row} is {value}; poses must be finite")
     return array
