@@ -8,13 +8,13 @@ contact; downwards it drops.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rover_physics.evaluation import NONE_HELD, RESULT, new_results
-from rover_physics.path_kernels import divide_stretches, find_jumps
+from rover_physics.path_kernels import divide_stretches, find_jumps, sort_pieces
 from rover_physics.settling import NOT_SETTLED, SETTLED
 from rover_physics.terrain import Terrain
 
@@ -44,17 +44,34 @@ class Crossings:
     results: Any
     """(m,) RESULT of each pose."""
 
-    def select(self, rows: np.ndarray | slice) -> "Crossings":
-        """Return the poses that a mask (m,) has, or those of some rows in their order."""
-        return Crossings(
-            self.place[rows], self.waypoint[rows], self.poses[rows], _take(self.results, rows)
-        )
+    def select(self, rows: np.ndarray) -> "Crossings":
+        """Return the poses in some rows, in their order, or those that a mask (m,) has."""
+        results = _numbers(self.results)[rows].view(RESULT)[:, 0]
+        return Crossings(self.place[rows], self.waypoint[rows], self.poses[rows], results)
 
     def between(self, first: int, end: int) -> "Crossings":
         """Return what lies between waypoints `first` and `end`, counted from the first of them."""
-        start, stop = np.searchsorted(self.place, (first, end))
-        part = self.select(slice(start, stop))
-        return replace(part, place=part.place - first, waypoint=part.waypoint - first)
+        rows = slice(*np.searchsorted(self.place, (first, end)))
+        place, waypoint = self.place[rows] - first, self.waypoint[rows] - first
+        return Crossings(place, waypoint, self.poses[rows], self.results[rows])
+
+    def followed_by(self, more: "Crossings") -> "Crossings":
+        """Return the rows of both."""
+        numbers = np.concatenate([_numbers(self.results), _numbers(more.results)])
+        return Crossings(
+            np.concatenate([self.place, more.place]),
+            np.concatenate([self.waypoint, more.waypoint]),
+            np.concatenate([self.poses, more.poses]),
+            numbers.view(RESULT)[:, 0],
+        )
+
+
+_NUMBERS = RESULT.itemsize // 8
+
+
+def _numbers(results: Any) -> np.ndarray:
+    """Return RESULTs (n,) as numbers (n, k): numpy copies records field by field."""
+    return results.view(np.float64).reshape(len(results), _NUMBERS)
 
 
 def find_crossings(
@@ -78,124 +95,79 @@ def find_crossings(
         direction: 1 where the rover drives forwards along the path, -1 backwards.
         joined: (n - 1,) True where the path leads from a waypoint to the next one.
     """
-    ends = _find_jumps(results, len(poses), radius)
-    before, after = ends.T
-    spacing = np.hypot(*(poses[after] - poses[before])[:, :2].T)
-    near = (after - before == 1) & (spacing <= radius) & (spacing > 0.0)
-    ends = ends[near & np.broadcast_to(joined, len(poses) - 1)[before]]
-    open_ = _Stretches(ends.astype(float), poses[ends], _take(results, ends))
-    found = []
-    while len(open_.place):
-        whole, inner = open_.divide(evaluate)
-        found.append(inner.select(inner.results["status"] != NOT_SETTLED))
-        pieces, stuck = whole.split(radius)
-        short = np.hypot(*(pieces.poses[:, 1] - pieces.poses[:, 0])[:, :2].T) < SHORTEST
-        closed = short | stuck
-        if closed.any():
-            found.append(_climb(terrain, radius, pieces.select(closed), evaluate, direction))
-            pieces = pieces.select(~closed)
-        open_ = pieces
-    return _in_order(found)
+    jumps = np.empty((len(poses), 2), np.int64)
+    joined = np.broadcast_to(joined, len(poses) - 1)
+    jumps = jumps[: find_jumps(results, poses, joined, radius, HEIGHT_JUMP * radius, jumps)]
+    if not len(jumps):
+        return _NOTHING
+    rows = jumps.ravel()
+    at_jumps = _numbers(results)[rows].view(RESULT)[:, 0]
+    known = Crossings(rows.astype(float), jumps[:, 1].repeat(2), poses[rows], at_jumps)
+    ends, found = np.arange(len(rows)).reshape(-1, 2), []
+    while len(ends):
+        new = _divide(known, ends, evaluate)
+        found.append(len(known.place) + np.flatnonzero(new.results["status"] != NOT_SETTLED))
+        known = known.followed_by(new)
+        ends, closed = _sort_pieces(known, ends, radius)
+        climbs = _climb(terrain, radius, known, closed, evaluate, direction)
+        if len(climbs.place):
+            found.append(len(known.place) + np.arange(len(climbs.place)))
+            known = known.followed_by(climbs)
+    between = np.concatenate(found)
+    return known.select(between[np.argsort(known.place[between], kind="stable")])
 
 
 _NOTHING = Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_results(0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretches:
-    """Stretches of the path within which a contact jumps: p poses of each, ends included."""
-
-    place: np.ndarray
-    """(k, p) places, counted in waypoints."""
-    poses: np.ndarray
-    """(k, p, 3) the poses there."""
-    results: Any
-    """(k, p) the RESULTs there."""
-
-    def waypoint(self) -> np.ndarray:
-        """Return (k,) the index of the waypoint that follows."""
-        return self.place[:, 0].astype(int) + 1
-
-    def select(self, mask: np.ndarray) -> "_Stretches":
-        """Return the stretches where `mask` (k,) is True."""
-        return _Stretches(self.place[mask], self.poses[mask], _take(self.results, mask))
-
-    def divide(self, evaluate: Evaluate) -> tuple["_Stretches", Crossings]:
-        """Return the stretches with PIECES - 1 poses more between the two of each, and those."""
-        k, p = len(self.place), PIECES + 1
-        place, poses = np.empty((k, p)), np.empty((k, p, 3))
-        place[:, ::PIECES], poses[:, ::PIECES] = self.place, self.poses
-        divide_stretches(place, poses)
-        inner = Crossings(
-            place[:, 1:-1].ravel(),
-            self.waypoint().repeat(p - 2),
-            poses[:, 1:-1].reshape(-1, 3),
-            evaluate(poses[:, 1:-1].reshape(-1, 3), NONE_HELD),
-        )
-        numbers = np.empty((k, p, _NUMBERS))
-        numbers[:, ::PIECES] = _numbers(self.results)
-        numbers[:, 1:-1] = _numbers(inner.results).reshape(k, p - 2, -1)
-        return _Stretches(place, poses, numbers.view(RESULT)[..., 0]), inner
-
-    def split(self, radius: float) -> tuple["_Stretches", np.ndarray]:
-        """Return the pieces within which a contact still jumps, and which of them are stuck.
-
-        Stuck (k,) are those that hold a pose in which the rover does not settle.
-        """
-        results = self.results.reshape(-1)
-        ends = _find_jumps(results, self.place.shape[1], radius)
-        place, poses = self.place.reshape(-1), self.poses.reshape(-1, 3)
-        pieces = _Stretches(place[ends], poses[ends], _take(results, ends))
-        return pieces, ends[:, 1] - ends[:, 0] > 1
-
-
-def _find_jumps(results: Any, run: int, radius: float) -> np.ndarray:
-    """Return the rows (j, 2) of neighbours between which a contact jumps; see `find_jumps`."""
-    ends = np.empty((len(results), 2), np.int64)
-    return ends[: find_jumps(results, run, HEIGHT_JUMP * radius, ends)]
-
-
-_NUMBERS = RESULT.itemsize // 8
-
-
-def _numbers(results: Any) -> np.ndarray:
-    """Return RESULTs (...) as numbers (..., k): to copy these is much faster."""
-    return results.view(np.float64).reshape(*results.shape, _NUMBERS)
-
-
-def _take(results: Any, rows: np.ndarray | slice) -> Any:
-    """Return `results[rows]`."""
-    return _numbers(results)[rows].view(RESULT)[..., 0]
-
-
-def _in_order(found: list[Crossings]) -> Crossings:
-    found = [part for part in found if len(part.place)]
-    if not found:
-        return _NOTHING
-    place = np.concatenate([part.place for part in found])
-    together = Crossings(
-        place,
-        np.concatenate([part.waypoint for part in found]),
-        np.concatenate([part.poses for part in found]),
-        np.concatenate([_numbers(part.results) for part in found]).view(RESULT)[:, 0],
+def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings:
+    """Return PIECES - 1 poses between each two rows `ends` (k, 2), stretch by stretch."""
+    n = len(ends) * (PIECES - 1)
+    place, waypoint, poses = np.empty(n), np.empty(n, np.int64), np.empty((n, 3))
+    divide_stretches(
+        ends, PIECES, known.place, known.waypoint, known.poses, place, waypoint, poses
     )
-    return together.select(np.argsort(place, kind="stable"))
+    return Crossings(place, waypoint, poses, evaluate(poses, NONE_HELD))
+
+
+def _sort_pieces(
+    known: Crossings, ends: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows between which a contact still jumps, (j, 2), first of open pieces.
+
+    The last rows are those between `ends`; `sort_pieces` says which pieces are closed.
+    """
+    pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
+    n_open, n_closed = sort_pieces(
+        ends, PIECES, known.results, known.poses, HEIGHT_JUMP * radius, SHORTEST, *pieces
+    )
+    return pieces[0, :n_open], pieces[1, :n_closed]
 
 
 def _climb(
-    terrain: Terrain, radius: float, places: _Stretches, evaluate: Evaluate, direction: float
+    terrain: Terrain,
+    radius: float,
+    known: Crossings,
+    ends: np.ndarray,
+    evaluate: Evaluate,
+    direction: float,
 ) -> Crossings:
-    """Evaluate wheels held at stages between foot and edge where they jump up at one place."""
-    before, after = places.results[:, 0]["wheel_centres"], places.results[:, 1]["wheel_centres"]
+    """Evaluate wheels held at stages between foot and edge where they jump up at one place.
+
+    The places are between rows of `known`, the `ends` (k, 2).
+    """
+    if not len(ends):
+        return _NOTHING
+    before, after = known.results["wheel_centres"][ends].swapaxes(0, 1)
     rise = (after - before)[:, :, 2]
     climbing = rise > 0.05 * radius
     at = np.flatnonzero(np.any(climbing & (rise > HEIGHT_JUMP * radius), axis=1))
     if not len(at):
         return _NOTHING
-    stages, waypoint = len(CLIMB_STAGES), places.waypoint()
+    stages, foot = len(CLIMB_STAGES), ends[at, 0]
     held = np.full((len(at), stages, 6, 2), np.nan)
     for row, i in enumerate(at):
-        course = places.poses[i, 0, 2] + (0.0 if direction > 0.0 else np.pi)
+        course = known.poses[ends[i, 0], 2] + (0.0 if direction > 0.0 else np.pi)
         for wheel in np.flatnonzero(climbing[i]):
             centre = before[i, wheel]
             face, edge = _face_ahead(terrain, radius, centre, course)
@@ -203,13 +175,13 @@ def _climb(
                 if k > 0 or height > edge:
                     angle = direction * _angle_on_face(radius, height, face, edge)
                     held[row, k, wheel] = height, angle
-    poses = np.repeat(places.poses[at, 0], stages, axis=0)
+    poses = np.repeat(known.poses[foot], stages, axis=0)
     results = evaluate(poses, held.reshape(-1, 6, 2))
-    start, end = places.place[at, :1], places.place[at, 1:]
+    start, end = known.place[ends[at]].T[:, :, None]
     settled = (results["status"] == SETTLED).reshape(-1, stages)
     climbs = Crossings(
         (start + CLIMB_STAGES * (end - start)).ravel(),
-        np.repeat(waypoint[at], stages),
+        np.repeat(known.waypoint[foot], stages),
         poses,
         results,
     )

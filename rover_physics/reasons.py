@@ -36,7 +36,7 @@ class Check(NamedTuple):
 def tilt_of(prediction: PathPrediction) -> np.ndarray:
     """Return the angle (n,) [rad] between the body's z axis and the vertical."""
     upright = np.cos(prediction.roll) * np.cos(prediction.pitch)
-    return np.arccos(np.clip(upright, -1.0, 1.0))
+    return np.arccos(np.minimum(np.maximum(upright, -1.0), 1.0))
 
 
 def compare(value: float, limit: float, digits: int, unit: str = "") -> str:
@@ -83,27 +83,30 @@ def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
 def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
     rocker, bogie = prediction.rocker_angle, prediction.bogie_angle
     limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
-    low, high = np.repeat(limits, 2, axis=0).T
     breaks = any(
         smallest_of(angle) < least - TOLERANCE or largest_of(angle) > most + TOLERANCE
         for angle, (least, most) in zip((rocker, bogie), limits, strict=True)
     )
 
+    def joints_and_limits() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        low, high = np.repeat(limits, 2, axis=0).T
+        return np.hstack([rocker, bogie]), low, high
+
     def beyond() -> np.ndarray:
-        joints = np.hstack([rocker, bogie])
+        joints, low, high = joints_and_limits()
         return (joints < low - TOLERANCE) | (joints > high + TOLERANCE)
 
     def margins() -> np.ndarray:
-        joints = np.hstack([rocker, bogie])
+        joints, low, high = joints_and_limits()
         left = np.minimum(joints - low, high - joints) / (high - low)
         return np.asarray(left.min(axis=1))
 
     def describe(i: int) -> str:
         joint = int(np.argmax(beyond()[i]))
-        angle = float(np.hstack([rocker[i], bogie[i]])[joint])
+        joints, low, high = joints_and_limits()
         name = f"{SIDES[joint % 2]} {('rocker', 'bogie')[joint // 2]}"
-        limit = low[joint] if angle < low[joint] else high[joint]
-        return f"{name} angle {compare(angle, limit, 2, ' rad')}"
+        limit = low[joint] if joints[i, joint] < low[joint] else high[joint]
+        return f"{name} angle {compare(joints[i, joint], limit, 2, ' rad')}"
 
     return Check(
         "suspension",

@@ -127,7 +127,7 @@ def _sweep(
         crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
-        part = crossings.between(first, end)
+        part = crossings.between(first, end) if len(paths) > 1 else crossings
         predictions.append(
             _predict(setup.settings, radius, poses[first:end], results[first:end], part)
         )
@@ -186,7 +186,7 @@ def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any)
     position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
     position[~settled] = np.nan
     sums = np.empty((3, len(poses)))
-    add_up(poses, position[:, 2], results["power"], settled, settings["speed"], sums)
+    add_up(poses, results, settings["speed"], sums)
     distance, time, energy = sums
     return PathPrediction(
         poses=poses,
@@ -206,14 +206,15 @@ def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any)
 
 
 def warm_up() -> None:
-    """Compile the kernels, or load them from the cache, by sweeping a level patch."""
+    """Compile the kernels, or load them from the cache, by sweeping a short way up a step."""
     from rover_physics.uncertainty import bound_path  # it asks for sweeps itself
 
-    rover = load_rover("lsr1")
-    patch = Terrain(np.zeros((64, 64)), 0.05, (-1.6, -1.6))
-    for layer in (None, np.ones((64, 64))):
-        ground = replace(patch, friction=layer, elevation_std=layer)
-        bound_path(rover, ground, sweep_path(rover, ground, np.zeros((1, 3))))
+    rover, layer = load_rover("lsr1"), np.ones((64, 64))
+    step = Terrain(np.where(np.arange(64) > 40, 0.1, 0.0) * layer, 0.05, (-1.6, -1.6))
+    poses = np.zeros((8, 3))
+    poses[:, 0] = np.linspace(-0.12, 0.02, 8)
+    for ground in (step, replace(step, friction=layer, elevation_std=layer)):
+        bound_path(rover, ground, sweep_path(rover, ground, poses))
 
 
 if __name__ == "__main__":

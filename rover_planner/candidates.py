@@ -11,6 +11,7 @@ is always a candidate.
 
 import numpy as np
 
+from rover_planner.curve_kernels import follow_curve, interpolate, turns_within
 from rover_planner.dubins import dubins_paths
 from rover_planner.errors import PlanningError
 
@@ -111,69 +112,45 @@ def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.nda
     return [path for path in paths if path_length(path) <= longest]
 
 
-def _slope_weights(t: np.ndarray) -> np.ndarray:
-    """Return what chord, start and end tangent and bump count for in the slope at t, (4, 1, n)."""
-    weights = [6 * t * (1 - t), (1 - t) * (1 - 3 * t), t * (3 * t - 2), np.sin(2 * np.pi * t)]
-    return np.array(weights)[:, None, :]
-
-
-_FINE_WEIGHTS = _slope_weights(_FINE)
+_FINE_WEIGHTS = np.array(
+    [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
+)
+"""What chord, start and end tangent count for in the slope at the fine samples, (3, n)."""
+_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
+"""First derivative there of a bump of one metre."""
 
 
 class _Fan:
     """Curves of a parameter in 0 to 1: the Hermite cubic, and beside it with bumps of some metres.
 
-    `scale` times the chord is the length of the end tangents. Points and directions are columns.
+    `scale` times the chord is the length of the end tangents.
     """
 
     def __init__(self, start: np.ndarray, goal: np.ndarray, scale: float):
-        chord = goal[:2] - start[:2]
-        length = np.hypot(*chord)
-        self._start, self._chord = start[:2, None], chord[:, None]
-        self._left = np.array([[-chord[1]], [chord[0]]]) / length
-        self._m0 = scale * length * np.array([[np.cos(start[2])], [np.sin(start[2])]])
-        self._m1 = scale * length * np.array([[np.cos(goal[2])], [np.sin(goal[2])]])
-        self._fine = self._slope_without_bump(_FINE_WEIGHTS)
-
-    def fine_slope(self, offset: float) -> np.ndarray:
-        """Return the first derivative of a curve at the fine samples and between them, (2, n)."""
-        return self._fine + np.pi * _FINE_WEIGHTS[3] * (offset * self._left)
-
-    def place(self, t: np.ndarray, offset: float) -> np.ndarray:
-        """Return the places (2, n) of a curve at some parameters (n,)."""
-        rest = 1 - t
-        place = self._start + t * t * (3 - 2 * t) * self._chord
-        place = place + t * rest**2 * self._m0 - t * t * rest * self._m1
-        return place + 0.5 * offset * (1 - np.cos(2 * np.pi * t)) * self._left
-
-    def slope(self, t: np.ndarray, offset: float) -> np.ndarray:
-        """Return the first derivative (2, n) of a curve at some parameters (n,)."""
-        weights = _slope_weights(t)
-        return self._slope_without_bump(weights) + np.pi * offset * weights[3] * self._left
-
-    def _slope_without_bump(self, weights: np.ndarray) -> np.ndarray:
-        return weights[0] * self._chord + weights[1] * self._m0 + weights[2] * self._m1
+        self.start, self.chord = start[:2], goal[:2] - start[:2]
+        length = np.hypot(*self.chord)
+        self.left = np.array([-self.chord[1], self.chord[0]]) / length
+        self.m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
+        self.m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
+        along_chord, along_m0, along_m1 = _FINE_WEIGHTS
+        self.fine_slope = along_chord * self.chord[:, None] + along_m0 * self.m0[:, None]
+        self.fine_slope += along_m1 * self.m1[:, None]
 
 
 class _Curve:
     """One curve of a fan, and how fast it is driven at the fine samples and between them."""
 
     def __init__(self, fan: _Fan, offset: float):
-        self._fan, self._offset = fan, offset
-        self._slope = fan.fine_slope(offset)
+        self._fan, self._offset = fan, float(offset)
+        self._slope = fan.fine_slope + _FINE_BUMP * (offset * fan.left)[:, None]
         self._speed = np.hypot(self._slope[0], self._slope[1])
 
     def is_drivable(self, min_radius: float) -> bool:
         """Tell whether the tightest place of the curve is no tighter than `min_radius` [m]."""
-        slope, speed = self._slope[:, ::2], self._speed[::2]
-        if speed.min() <= 1e-6 * speed.max():
+        ends = self._speed[::2]
+        if ends.min() <= 1e-6 * ends.max():
             return False
-        before, after = slope[:, :-1], slope[:, 1:]
-        across = before[0] * after[1] - before[1] * after[0]
-        along = before[0] * after[0] + before[1] * after[1]
-        turned = np.abs(np.arctan2(across, along))
-        driven = 0.5 * (speed[1:] + speed[:-1]) / (len(speed) - 1)
-        return bool(np.all(turned * min_radius <= driven * (1 + 1e-9)))
+        return bool(turns_within(self._slope, self._speed, float(min_radius)))
 
     def sample(self, waypoint_spacing: float) -> np.ndarray:
         """Sample poses (n, 3) equally far apart along the curve."""
@@ -182,25 +159,12 @@ class _Curve:
         driven = np.concatenate([[0.0], np.cumsum(pieces)])
         steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
         marks = np.linspace(0.0, driven[-1], steps + 1)
-        t = _interpolate(marks, driven, _FINE[::2], 1 / ends)
-        poses = np.empty((steps + 1, 3))
-        poses[:, :2] = self._fan.place(t, self._offset).T
-        along_x, along_y = self._fan.slope(t, self._offset)
-        poses[:, 2] = np.arctan2(along_y, along_x)
+        t, poses, slope = np.empty(steps + 1), np.empty((steps + 1, 3)), np.empty((2, steps + 1))
+        interpolate(marks, driven, _FINE[::2], 1 / ends, t)
+        fan = self._fan
+        follow_curve(t, fan.start, fan.chord, fan.m0, fan.m1, fan.left, self._offset, poses, slope)
+        poses[:, 2] = np.arctan2(slope[1], slope[0])
         return poses
-
-
-def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Return what the cubic Hermite spline through (x, y) with these slopes is at some places.
-
-    scipy has it, but to import its interpolation takes a tenth of the time a server needs to
-    start.
-    """
-    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
-    width, rise = x[i + 1] - x[i], y[i + 1] - y[i]
-    s = (at - x[i]) / width
-    first, last = slopes[i] * width - rise, rise - slopes[i + 1] * width
-    return y[i] + s * rise + s * (1 - s) * ((1 - s) * first + s * last)
 
 
 def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover import Rover, load_rover
 from rover_physics.soil_file import soil_named
 from rover_physics.terrain import Terrain
+from rover_planner.candidates import generate_candidates
 from rover_planner.errors import PlanningError
 from rover_planner.judgement import Judgement, refusal
 from rover_planner.path_geometry import densify, rings_within
@@ -99,6 +100,8 @@ class TraverseService:
         self._path: NDArray[np.float64] | None = None
         self._path_refusal = "no path was received yet; publish one on ~/path"
         self._joints: dict[str, float] = {}
+        # Compiles or loads kernels, so that the first question does not wait for it.
+        generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
     @property
     def settings(self) -> ServiceSettings:
