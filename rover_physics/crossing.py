@@ -103,17 +103,19 @@ def find_crossings(
     rows = jumps.ravel()
     at_jumps = _numbers(results)[rows].view(RESULT)[:, 0]
     known = Crossings(rows.astype(float), jumps[:, 1].repeat(2), poses[rows], at_jumps)
-    ends, found = np.arange(len(rows)).reshape(-1, 2), []
+    ends, climbed = np.arange(len(rows)).reshape(-1, 2), []
     while len(ends):
-        new = _divide(known, ends, evaluate)
-        found.append(len(known.place) + np.flatnonzero(new.results["status"] != NOT_SETTLED))
-        known = known.followed_by(new)
+        known = known.followed_by(_divide(known, ends, evaluate))
         ends, closed = _sort_pieces(known, ends, radius)
-        climbs = _climb(terrain, radius, known, closed, evaluate, direction)
-        if len(climbs.place):
-            found.append(len(known.place) + np.arange(len(climbs.place)))
+        if len(closed):
+            climbs = _climb(terrain, radius, known, closed, evaluate, direction)
+            climbed.append(slice(len(known.place), len(known.place) + len(climbs.place)))
             known = known.followed_by(climbs)
-    between = np.concatenate(found)
+    kept = known.results["status"] != NOT_SETTLED
+    kept[: len(rows)] = False
+    for climb in climbed:
+        kept[climb] = True
+    between = np.flatnonzero(kept)
     return known.select(between[np.argsort(known.place[between], kind="stable")])
 
 
@@ -156,8 +158,6 @@ def _climb(
 
     The places are between rows of `known`, the `ends` (k, 2).
     """
-    if not len(ends):
-        return _NOTHING
     before, after = known.results["wheel_centres"][ends].swapaxes(0, 1)
     rise = (after - before)[:, :, 2]
     climbing = rise > 0.05 * radius
