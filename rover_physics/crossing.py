@@ -8,18 +8,16 @@ contact; downwards it drops.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rover_physics.evaluation import NONE_HELD, new_results
+from rover_physics.evaluation import NONE_HELD, RESULT, new_results
+from rover_physics.path_kernels import divide_stretches, find_jumps, sort_pieces
 from rover_physics.settling import NOT_SETTLED, SETTLED
 from rover_physics.terrain import Terrain
 
-ANGLE_JUMP = np.radians(12.0)
-"""Change of a contact angle that is looked into, where one of the two is steep."""
-STEEP = np.radians(25.0)
 HEIGHT_JUMP = 0.25
 """Change of a wheel's height, in wheel radii, that is looked into."""
 PIECES = 4
@@ -46,17 +44,34 @@ class Crossings:
     results: Any
     """(m,) RESULT of each pose."""
 
-    def select(self, rows: np.ndarray | slice) -> "Crossings":
-        """Return the poses that a mask (m,) has, or those of some rows in their order."""
-        return Crossings(
-            self.place[rows], self.waypoint[rows], self.poses[rows], self.results[rows]
-        )
+    def select(self, rows: np.ndarray) -> "Crossings":
+        """Return the poses in some rows, in their order, or those that a mask (m,) has."""
+        results = _numbers(self.results)[rows].view(RESULT)[:, 0]
+        return Crossings(self.place[rows], self.waypoint[rows], self.poses[rows], results)
 
     def between(self, first: int, end: int) -> "Crossings":
         """Return what lies between waypoints `first` and `end`, counted from the first of them."""
-        start, stop = np.searchsorted(self.place, (first, end))
-        part = self.select(slice(start, stop))
-        return replace(part, place=part.place - first, waypoint=part.waypoint - first)
+        rows = slice(*np.searchsorted(self.place, (first, end)))
+        place, waypoint = self.place[rows] - first, self.waypoint[rows] - first
+        return Crossings(place, waypoint, self.poses[rows], self.results[rows])
+
+    def followed_by(self, more: "Crossings") -> "Crossings":
+        """Return the rows of both."""
+        numbers = np.concatenate([_numbers(self.results), _numbers(more.results)])
+        return Crossings(
+            np.concatenate([self.place, more.place]),
+            np.concatenate([self.waypoint, more.waypoint]),
+            np.concatenate([self.poses, more.poses]),
+            numbers.view(RESULT)[:, 0],
+        )
+
+
+_NUMBERS = RESULT.itemsize // 8
+
+
+def _numbers(results: Any) -> np.ndarray:
+    """Return RESULTs (n,) as numbers (n, k): numpy copies records field by field."""
+    return results.view(np.float64).reshape(len(results), _NUMBERS)
 
 
 def find_crossings(
@@ -80,133 +95,79 @@ def find_crossings(
         direction: 1 where the rover drives forwards along the path, -1 backwards.
         joined: (n - 1,) True where the path leads from a waypoint to the next one.
     """
-    spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    near = (spacing <= radius) & (spacing > 0.0) & joined
-    at = np.flatnonzero(_jumps(results, slice(None, -1), slice(1, None), radius) & near)
-    open_ = _Stretches(
-        np.column_stack([at, at + 1.0]),
-        poses[np.column_stack([at, at + 1])],
-        results[np.column_stack([at, at + 1])],
-    )
-    found = []
-    while len(open_.place):
-        inner = open_.divide(evaluate)
-        found.append(inner.select(inner.results["status"] != NOT_SETTLED))
-        pieces, stuck = open_.split(inner, radius)
-        short = np.hypot(*(pieces.poses[:, 1] - pieces.poses[:, 0])[:, :2].T) < SHORTEST
-        found.append(_climb(terrain, radius, pieces.select(short | stuck), evaluate, direction))
-        open_ = pieces.select(~(short | stuck))
-    return _in_order(found)
+    jumps = np.empty((len(poses), 2), np.int64)
+    joined = np.broadcast_to(joined, len(poses) - 1)
+    jumps = jumps[: find_jumps(results, poses, joined, radius, HEIGHT_JUMP * radius, jumps)]
+    if not len(jumps):
+        return _NOTHING
+    rows = jumps.ravel()
+    at_jumps = _numbers(results)[rows].view(RESULT)[:, 0]
+    known = Crossings(rows.astype(float), jumps[:, 1].repeat(2), poses[rows], at_jumps)
+    ends, climbed = np.arange(len(rows)).reshape(-1, 2), []
+    while len(ends):
+        known = known.followed_by(_divide(known, ends, evaluate))
+        ends, closed = _sort_pieces(known, ends, radius)
+        if len(closed):
+            climbs = _climb(terrain, radius, known, closed, evaluate, direction)
+            climbed.append(slice(len(known.place), len(known.place) + len(climbs.place)))
+            known = known.followed_by(climbs)
+    kept = known.results["status"] != NOT_SETTLED
+    kept[: len(rows)] = False
+    for climb in climbed:
+        kept[climb] = True
+    between = np.flatnonzero(kept)
+    return known.select(between[np.argsort(known.place[between], kind="stable")])
 
 
 _NOTHING = Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_results(0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretches:
-    """Stretches of the path within which a contact jumps."""
-
-    place: np.ndarray
-    """(k, 2) places where each begins and ends, counted in waypoints."""
-    poses: np.ndarray
-    """(k, 2, 3) the poses there."""
-    results: np.ndarray
-    """(k, 2) the RESULTs there."""
-
-    @property
-    def waypoint(self) -> np.ndarray:
-        """(k,) index of the waypoint that follows."""
-        return np.floor(self.place[:, 0]).astype(int) + 1
-
-    def select(self, mask: np.ndarray) -> "_Stretches":
-        """Return the stretches where `mask` (k,) is True."""
-        return _Stretches(self.place[mask], self.poses[mask], self.results[mask])
-
-    def divide(self, evaluate: Evaluate) -> Crossings:
-        """Return the results at PIECES - 1 poses within each stretch, stretch by stretch."""
-        share = np.arange(1, PIECES) / PIECES
-        first, last = self.poses[:, 0], self.poses[:, 1]
-        way = last - first
-        way[:, 2] = (way[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-        poses = (first[:, None] + share[:, None] * way[:, None]).reshape(-1, 3)
-        start, end = self.place[:, :1], self.place[:, 1:]
-        return Crossings(
-            (start + share * (end - start)).ravel(),
-            np.repeat(self.waypoint, PIECES - 1),
-            poses,
-            evaluate(poses, NONE_HELD),
-        )
-
-    def split(self, inner: Crossings, radius: float) -> tuple["_Stretches", np.ndarray]:
-        """Return the pieces within which a contact still jumps, and which of them are stuck.
-
-        Stuck (k,) are those that hold a pose in which the rover does not settle.
-        """
-        k = len(self.place)
-
-        def insert(ends: np.ndarray, between: np.ndarray) -> np.ndarray:
-            whole = np.empty((k, PIECES + 1, *ends.shape[2:]), ends.dtype)
-            whole[:, 0], whole[:, -1] = ends[:, 0], ends[:, 1]
-            whole[:, 1:-1] = between.reshape(k, PIECES - 1, *between.shape[1:])
-            return whole.reshape(k * (PIECES + 1), *whole.shape[2:])
-
-        results = insert(self.results, inner.results)
-        known = np.flatnonzero(results["status"] != NOT_SETTLED)
-        before, after = known[:-1], known[1:]
-        same = before // (PIECES + 1) == after // (PIECES + 1)
-        before, after = before[same], after[same]
-        jumps = _jumps(results, before, after, radius)
-        ends = np.column_stack([before[jumps], after[jumps]])
-        place, poses = insert(self.place, inner.place), insert(self.poses, inner.poses)
-        return _Stretches(place[ends], poses[ends], results[ends]), ends[:, 1] - ends[:, 0] > 1
-
-
-def _in_order(found: list[Crossings]) -> Crossings:
-    found = [part for part in found if len(part.place)]
-    if not found:
-        return _NOTHING
-    place = np.concatenate([part.place for part in found])
-    results, end = new_results(len(place)), 0
-    for part in found:
-        end += len(part.place)
-        results[end - len(part.place) : end] = part.results
-    together = Crossings(
-        place,
-        np.concatenate([part.waypoint for part in found]),
-        np.concatenate([part.poses for part in found]),
-        results,
+def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings:
+    """Return PIECES - 1 poses between each two rows `ends` (k, 2), stretch by stretch."""
+    n = len(ends) * (PIECES - 1)
+    place, waypoint, poses = np.empty(n), np.empty(n, np.int64), np.empty((n, 3))
+    divide_stretches(
+        ends, PIECES, known.place, known.waypoint, known.poses, place, waypoint, poses
     )
-    return together.select(np.argsort(place, kind="stable"))
+    return Crossings(place, waypoint, poses, evaluate(poses, NONE_HELD))
 
 
-def _jumps(
-    results: np.ndarray, before: np.ndarray | slice, after: np.ndarray | slice, radius: float
-) -> np.ndarray:
-    """Return (k,) True where a contact jumps between the rows before (k,) and after (k,)."""
-    settled = results["status"] == SETTLED
-    angle, height = results["contact_angle"], results["wheel_centres"][:, :, 2]
-    here, there = angle[before], angle[after]
-    steep = np.maximum(np.abs(here), np.abs(there)) > STEEP
-    turned = steep & (np.abs(there - here) > ANGLE_JUMP)
-    rise = np.abs(height[after] - height[before]) > HEIGHT_JUMP * radius
-    jumps = settled[before] & settled[after] & np.any(turned | rise, axis=1)
-    return np.asarray(jumps)
+def _sort_pieces(
+    known: Crossings, ends: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows between which a contact still jumps, (j, 2), first of open pieces.
+
+    The last rows are those between `ends`; `sort_pieces` says which pieces are closed.
+    """
+    pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
+    n_open, n_closed = sort_pieces(
+        ends, PIECES, known.results, known.poses, HEIGHT_JUMP * radius, SHORTEST, *pieces
+    )
+    return pieces[0, :n_open], pieces[1, :n_closed]
 
 
 def _climb(
-    terrain: Terrain, radius: float, places: _Stretches, evaluate: Evaluate, direction: float
+    terrain: Terrain,
+    radius: float,
+    known: Crossings,
+    ends: np.ndarray,
+    evaluate: Evaluate,
+    direction: float,
 ) -> Crossings:
-    """Evaluate wheels held at stages between foot and edge where they jump up at one place."""
-    before, after = places.results[:, 0]["wheel_centres"], places.results[:, 1]["wheel_centres"]
+    """Evaluate wheels held at stages between foot and edge where they jump up at one place.
+
+    The places are between rows of `known`, the `ends` (k, 2).
+    """
+    before, after = known.results["wheel_centres"][ends].swapaxes(0, 1)
     rise = (after - before)[:, :, 2]
     climbing = rise > 0.05 * radius
     at = np.flatnonzero(np.any(climbing & (rise > HEIGHT_JUMP * radius), axis=1))
     if not len(at):
         return _NOTHING
-    stages = len(CLIMB_STAGES)
+    stages, foot = len(CLIMB_STAGES), ends[at, 0]
     held = np.full((len(at), stages, 6, 2), np.nan)
     for row, i in enumerate(at):
-        course = places.poses[i, 0, 2] + (0.0 if direction > 0.0 else np.pi)
+        course = known.poses[ends[i, 0], 2] + (0.0 if direction > 0.0 else np.pi)
         for wheel in np.flatnonzero(climbing[i]):
             centre = before[i, wheel]
             face, edge = _face_ahead(terrain, radius, centre, course)
@@ -214,13 +175,13 @@ def _climb(
                 if k > 0 or height > edge:
                     angle = direction * _angle_on_face(radius, height, face, edge)
                     held[row, k, wheel] = height, angle
-    poses = np.repeat(places.poses[at, 0], stages, axis=0)
+    poses = np.repeat(known.poses[foot], stages, axis=0)
     results = evaluate(poses, held.reshape(-1, 6, 2))
-    start, end = places.place[at, :1], places.place[at, 1:]
+    start, end = known.place[ends[at]].T[:, :, None]
     settled = (results["status"] == SETTLED).reshape(-1, stages)
     climbs = Crossings(
         (start + CLIMB_STAGES * (end - start)).ravel(),
-        np.repeat(places.waypoint[at], stages),
+        np.repeat(known.waypoint[foot], stages),
         poses,
         results,
     )

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.crossing import HEIGHT_JUMP, SHORTEST, Crossings
+from rover_physics.kernels import allocating_kernel, exact_kernel
 
 LEAST_ANGLE = np.radians(15.0)
 """A wheel falls only from contacts at least this steep, however slippery they are."""
@@ -48,85 +49,134 @@ def find_falls(
 
     `direction` is 1 where the rover drives forwards along the path, -1 backwards.
     """
-    n = len(poses)
-    order = np.argsort(np.concatenate([np.arange(n), crossings.place]), kind="stable")
-
-    def in_order(at_waypoints: np.ndarray, between: np.ndarray) -> np.ndarray:
-        return np.concatenate([at_waypoints, between])[order]
-
-    extra = crossings.results
-    steps = np.hypot(*np.diff(in_order(poses, crossings.poses)[:, :2], axis=0).T)
-    distance = np.concatenate([[0.0], np.cumsum(steps)])
-    angle = direction * in_order(results["contact_angle"], extra["contact_angle"])
-    steep = _find_steep(angle, in_order(results["friction"], extra["friction"]))
-    falling = _keep_short_runs(steep, distance, radius)
-    rolling_over = _extend_to_edges(falling, angle, distance, radius)
-    heights = in_order(results["wheel_centres"], extra["wheel_centres"])[:, :, 2]
-    owner = in_order(np.arange(n), crossings.waypoint)
-    drops = _measure_drops(radius, heights, steps, rolling_over, owner, n)
-    unordered = np.empty_like(falling)
-    unordered[order] = falling
-    return Falls(unordered[:n], unordered[n:], drops)
+    found = _find_falls(
+        float(radius), float(direction), poses, results,
+        crossings.place, crossings.waypoint, crossings.poses, crossings.results,
+    )  # fmt: skip
+    return Falls(*found)
 
 
-def _find_steep(contact_angle: np.ndarray, friction: np.ndarray) -> np.ndarray:
-    """Return (k, 6) True where contacts behind a wheel are steeper than friction holds.
+@allocating_kernel
+def _find_falls(radius, direction, poses, results, place, waypoint, poses_between, between):
+    """Return the fields of `Falls`."""
+    n, m = len(poses), len(place)
+    order = np.empty(n + m, np.int64)
+    _merge(n, place, order)
+    steps, distance = np.zeros(n + m), np.zeros(n + m)
+    angle, height = np.empty((n + m, 6)), np.empty((n + m, 6))
+    steep, turning = np.zeros((n + m, 6), np.bool_), np.zeros((n + m, 6), np.bool_)
+    last = poses[0]
+    for k in range(n + m):
+        i = order[k]
+        here = poses[i] if i < n else poses_between[i - n]
+        result = results[i] if i < n else between[i - n]
+        steps[k] = np.hypot(here[0] - last[0], here[1] - last[1])
+        distance[k] = steps[k] + (distance[k - 1] if k > 0 else 0.0)
+        if _read_contacts(result, direction, angle[k], height[k]) < -LEAST_ANGLE:
+            _find_steep(angle[k], result.friction, steep[k])
+        last = here
+    _keep_short_runs(distance, radius, steep)
+    _extend_to_edges(steep, angle, distance, radius, turning)
+    fallen, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
+    _measure_drops(radius, height, steps, turning, fallen)
+    at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
+    for k in range(n + m):
+        i = order[k]
+        owner = i if i < n else waypoint[i - n]
+        for wheel in range(6):
+            drops[owner, wheel] = max(drops[owner, wheel], fallen[k, wheel])
+            if i < n:
+                at_waypoints[i, wheel] = steep[k, wheel]
+            else:
+                at_between[i - n, wheel] = steep[k, wheel]
+    return at_waypoints, at_between, drops
+
+
+@exact_kernel
+def _merge(n, place, order):
+    """Write the waypoints 0 to n - 1 and then the m places, as n + i, in the order of the path."""
+    i = 0
+    for k in range(n + place.size):
+        waypoint = k - i
+        if i < place.size and (waypoint == n or place[i] < waypoint):
+            order[k] = n + i
+            i += 1
+        else:
+            order[k] = waypoint
+
+
+@exact_kernel
+def _read_contacts(result, direction, angle, height):
+    """Write contact angles [rad] and heights [m] of the wheels; return the smallest angle."""
+    smallest = 0.0
+    for wheel in range(6):
+        angle[wheel] = direction * result.contact_angle[wheel]
+        height[wheel] = result.wheel_centres[wheel, 2]
+        if angle[wheel] < smallest:
+            smallest = angle[wheel]
+    return smallest
+
+
+@exact_kernel
+def _find_steep(angle, friction, steep):
+    """Write (6,) True where contacts behind a wheel are steeper than friction holds.
 
     Not where the rover as a whole goes downhill: then it slides, and no wheel falls by itself.
     """
-    held_by_friction = np.arctan(np.nan_to_num(friction, nan=1.0))
-    steep = contact_angle < -np.maximum(held_by_friction, LEAST_ANGLE)
-    others = np.where(steep, np.nan, contact_angle)
-    count = np.maximum((~steep).sum(axis=1), 1)
-    downhill = np.nansum(others, axis=1) / count < -0.5 * held_by_friction.min(axis=1)
-    steep[downhill | (steep.sum(axis=1) > MOST_FALLING)] = False
-    return steep
-
-
-def _keep_short_runs(steep: np.ndarray, distance: np.ndarray, radius: float) -> np.ndarray:
-    """Return `steep` (k, 6) without runs that begin or end the path or are longer than a fall."""
-    kept = np.zeros_like(steep)
+    count, others, least_held = 0, 0.0, np.inf
     for wheel in range(6):
-        padded = np.concatenate([[False], steep[:, wheel], [False]]).astype(int)
-        starts, ends = np.flatnonzero(np.diff(padded) == 1), np.flatnonzero(np.diff(padded) == -1)
-        for start, end in zip(starts, ends, strict=True):
-            inside = start > 0 and end < len(steep)
-            if inside and distance[end] - distance[start - 1] <= LONGEST_FALL * radius:
-                kept[start:end, wheel] = True
-    return kept
+        mu = friction[wheel]
+        held = np.arctan(mu) if mu == mu else np.arctan(1.0)
+        least_held = min(least_held, held)
+        steep[wheel] = angle[wheel] < -max(held, LEAST_ANGLE)
+        if steep[wheel]:
+            count += 1
+        elif angle[wheel] == angle[wheel]:
+            others += angle[wheel]
+    if count > MOST_FALLING or others / max(6 - count, 1) < -0.5 * least_held:
+        steep[:] = False
 
 
-def _extend_to_edges(
-    falling: np.ndarray, angle: np.ndarray, distance: np.ndarray, radius: float
-) -> np.ndarray:
-    """Return `falling` with the way on which a wheel turns over the edge before it falls."""
-    extended = falling.copy()
-    for row, wheel in np.argwhere(falling[1:] & ~falling[:-1]):
-        k = row
-        while k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[row] - distance[k] <= radius:
-            extended[k, wheel] = True
-            k -= 1
-    return extended
+@exact_kernel
+def _keep_short_runs(distance, radius, steep):
+    """Drop from `steep` (k, 6) runs that begin or end the path or are longer than a fall."""
+    rows = distance.size
+    for wheel in range(6):
+        start = 0
+        while start < rows:
+            end = start
+            while end < rows and steep[end, wheel]:
+                end += 1
+            inside = start > 0 and end < rows
+            if not inside or distance[end] - distance[start - 1] > LONGEST_FALL * radius:
+                steep[start:end, wheel] = False
+            start = end + 1
 
 
-def _measure_drops(
-    radius: float,
-    heights: np.ndarray,
-    steps: np.ndarray,
-    falling: np.ndarray,
-    owner: np.ndarray,
-    n: int,
-) -> np.ndarray:
+@exact_kernel
+def _extend_to_edges(falling, angle, distance, radius, extended):
+    """Write `falling` with the way on which a wheel turns over the edge before it falls."""
+    rows = distance.size
+    for wheel in range(6):
+        for row in range(rows):
+            extended[row, wheel] = falling[row, wheel]
+        for row in range(rows - 1):
+            k = row if falling[row + 1, wheel] and not falling[row, wheel] else -1
+            while (
+                k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[row] - distance[k] <= radius
+            ):
+                extended[k, wheel] = True
+                k -= 1
+
+
+@exact_kernel
+def _measure_drops(radius, height, steps, falling, fallen):
     """Add up the descent of each wheel while it falls; a sudden descent at one place is a fall."""
-    descents = np.nan_to_num(np.maximum(-np.diff(heights, axis=0), 0.0))
-    descents[descents < ROUNDING] = 0.0
-    sudden = (descents > HEIGHT_JUMP * radius) & (steps[:, None] <= 2.0 * SHORTEST)
-    dropping = falling[:-1] | falling[1:] | sudden
-    drops = np.zeros((n, 6))
     for wheel in range(6):
-        fallen, last = 0.0, -1
-        for k in np.flatnonzero(dropping[:, wheel]).tolist():
-            fallen = descents[k, wheel] + (fallen if k == last + 1 else 0.0)
-            drops[owner[k + 1], wheel] = max(drops[owner[k + 1], wheel], fallen)
-            last = k
-    return drops
+        for k in range(1, steps.size):
+            descent = height[k - 1, wheel] - height[k, wheel]
+            if not descent >= ROUNDING:
+                descent = 0.0
+            sudden = descent > HEIGHT_JUMP * radius and steps[k] <= 2.0 * SHORTEST
+            if falling[k - 1, wheel] or falling[k, wheel] or sudden:
+                fallen[k, wheel] = fallen[k - 1, wheel] + descent

@@ -10,7 +10,7 @@ from rover_physics.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool
 from rover_physics.ground import SOIL_NUMBERS, friction_at
 from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.linkage import PLACEMENT, place_masses
-from rover_physics.records import new_record, record_type
+from rover_physics.records import new_record, record_type, shared_array_of
 from rover_physics.settling import SETTLED, settle
 from rover_physics.soil import coulomb_slip, effective_friction, solve_wheel
 from rover_physics.soil_sharing import share_forces_on_soil
@@ -102,7 +102,8 @@ def new_work() -> Any:
     return work
 
 
-NEW_WORK = np.array([new_work()], WORK)
+_NEW_WORK = np.array([new_work()], WORK).view(np.float64)
+"""As numbers, for numpy copies records field by field."""
 
 
 def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
@@ -112,13 +113,17 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     those that rest on the ground; (0, 6, 2) where none climbs. The others are those of `Setup`.
     """
     results = new_results(len(poses))
-    records = (np.array([record]) for record in (linkage, samples, settings))
-    effort = 1 if settings.policy == EQUAL else OPTIMAL_EFFORT
-    with threads_worth(effort * len(poses)) as threads:
+    records = [shared_array_of(record) for record in (linkage, samples, settings)]
+    with threads_worth(effort(settings, len(poses))) as threads:
         chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-len(poses) // CHUNK))
-        works = np.repeat(NEW_WORK, chunks)
+        works = _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
         evaluate_poses(ground.records, *records, poses, held, works, results)
     return results
+
+
+def effort(settings, poses: int) -> int:
+    """Return how long so many poses take, in that of one under equal torques."""
+    return poses * (1 if settings["policy"] == EQUAL else OPTIMAL_EFFORT)
 
 
 @sweep_kernel

@@ -34,6 +34,11 @@ def kernel(function):
     return numba.njit(_nrt=False, **COMPILE_OPTIONS)(function)
 
 
+def exact_kernel(function):
+    """Compile a kernel that rounds after each operation, as numpy does."""
+    return numba.njit(_nrt=False, **{**COMPILE_OPTIONS, "fastmath": False})(function)
+
+
 def allocating_kernel(function):
     """Compile a function that makes work space for kernels."""
     return numba.njit(**COMPILE_OPTIONS)(function)

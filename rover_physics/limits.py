@@ -8,7 +8,7 @@ import numpy as np
 from rover_physics.evaluation import NO_EQUILIBRIUM
 from rover_physics.plain import to_plain
 from rover_physics.prediction import PathPrediction
-from rover_physics.reasons import check_limits, tilt_of
+from rover_physics.reasons import check_limits, largest_of
 from rover_physics.rover import Rover
 from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
 
@@ -30,6 +30,7 @@ CODES = (
 )
 UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Limits that do not count while a wheel rolls off an edge."""
+_LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
 _PLACELESS = {
     OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
     UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
@@ -97,62 +98,75 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
     The first limit broken, in the order of CODES, is the reason of a waypoint; a limit broken on
     the way to a waypoint counts there, unless the waypoint has a reason of its own.
     """
-    codes, reasons = find_reasons(rover, prediction)
-    parts = [prediction]
-    if prediction.between is not None and len(prediction.between.poses):
-        parts.append(prediction.between)
-        owners = prediction.between.waypoint.tolist()
-        on_the_way = zip(*find_reasons(rover, prediction.between), strict=True)
-        for i, (code, reason) in zip(owners, on_the_way, strict=True):
-            if code and not codes[i]:
-                codes[i], reasons[i] = code, f"on the way here: {reason}"
-    first: int = next((k for k, code in enumerate(codes) if code), -1)
-
-    def extreme(choose, values_of) -> float:
-        values = np.concatenate([np.ravel(values_of(part)) for part in parts])
-        known = values[~np.isnan(values)]
-        return float(choose(known)) if known.size else float("nan")
-
+    found, extremes = _hold_against_limits(rover, prediction)
+    between = prediction.between
+    if between is not None and len(between.poses):
+        on_the_way, others = _hold_against_limits(rover, between)
+        for row in sorted(on_the_way):
+            code, reason = on_the_way[row]
+            found.setdefault(int(between.waypoint[row]), (code, f"on the way here: {reason}"))
+        extremes = {
+            code: float((np.fmin if code in _LOWER_LIMITS else np.fmax)(value, others[code]))
+            for code, value in extremes.items()
+        }
+    first = min(found, default=-1)
+    code, reason = found.get(first, ("", ""))
+    codes, reasons = _spread_out(found, len(prediction.poses))
     return Verdict(
         traversable=first < 0,
         reasons=tuple(reasons),
         codes=tuple(codes),
         first_failure=first,
-        code=codes[first] if first >= 0 else "",
-        reason=reasons[first] if first >= 0 else "",
+        code=code,
+        reason=reason,
         policy=prediction.policy,
-        min_tip_over_ratio=extreme(np.min, lambda part: part.tip_over_ratio),
-        max_friction_utilisation=extreme(np.max, _needed_friction),
-        max_torque_saturation=extreme(np.max, _needed_torque),
-        max_tilt=extreme(np.max, tilt_of),
-        min_belly_clearance=extreme(np.min, lambda part: part.belly_clearance),
-        max_wheel_drop=extreme(np.max, lambda part: part.wheel_drop),
-        max_sinkage=extreme(np.max, lambda part: part.sinkage),
+        min_tip_over_ratio=extremes["tip_over"],
+        max_friction_utilisation=extremes["friction"],
+        max_torque_saturation=extremes["torque"],
+        max_tilt=extremes["tilt"],
+        min_belly_clearance=extremes["belly"],
+        max_wheel_drop=extremes["wheel_drop"],
+        max_sinkage=extremes["sinkage"],
     )
-
-
-def _needed_friction(prediction: PathPrediction) -> np.ndarray:
-    falls = np.asarray(prediction.falling.any(axis=1))
-    return np.where(falls[:, None], np.nan, prediction.friction_utilisation)
-
-
-def _needed_torque(prediction: PathPrediction) -> np.ndarray:
-    falls = np.asarray(prediction.falling.any(axis=1))
-    return np.where(falls[:, None], np.nan, prediction.torque_saturation)
 
 
 def find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
     """Return code and reason of each row of a prediction, empty where passable."""
-    n = len(prediction.poses)
+    return _spread_out(_hold_against_limits(rover, prediction)[0], len(prediction.poses))
+
+
+def _spread_out(found: dict[int, tuple[str, str]], n: int) -> tuple[list[str], list[str]]:
+    """Return code and reason of each of n rows, empty where none was found."""
     codes, reasons = [""] * n, [""] * n
-    for i in np.flatnonzero(prediction.status != SETTLED).tolist():
-        codes[i], reasons[i] = _PLACELESS[int(prediction.status[i])]
-    falls = np.asarray(prediction.falling.any(axis=1))
-    for check in check_limits(rover, prediction):
-        broken = check.broken
-        if check.code in UNNEEDED_IN_A_FALL:
-            broken = broken & ~falls
-        for i in np.flatnonzero(broken).tolist():
-            if not codes[i]:
-                codes[i], reasons[i] = check.code, check.describe(i)
+    for row, (code, reason) in found.items():
+        codes[row], reasons[row] = code, reason
     return codes, reasons
+
+
+def _hold_against_limits(
+    rover: Rover, prediction: PathPrediction
+) -> tuple[dict[int, tuple[str, str]], dict[str, float]]:
+    """Return code and reason of the rows that aren't passable, and the extreme of each limit."""
+    found = {
+        row: _PLACELESS[int(prediction.status[row])]
+        for row in np.flatnonzero(prediction.status != SETTLED).tolist()
+    }
+    checks = check_limits(rover, prediction)
+    extremes = {check.code: check.extreme for check in checks}
+    needed = _where_forces_count(prediction)
+    for check in checks:
+        if check.breaks:
+            counts = needed if check.code in UNNEEDED_IN_A_FALL else True
+            for row in np.flatnonzero(check.broken() & counts).tolist():
+                if row not in found:
+                    found[row] = check.code, check.describe(row)
+    if needed is not True:
+        extremes["friction"] = largest_of(prediction.friction_utilisation[needed])
+        extremes["torque"] = largest_of(prediction.torque_saturation[needed])
+    return found, extremes
+
+
+def _where_forces_count(prediction: PathPrediction) -> np.ndarray | bool:
+    """Return (n,) False where a wheel rolls off an edge, True where none does anywhere."""
+    falling = prediction.falling
+    return ~np.asarray(falling.any(axis=1)) if falling.any() else True

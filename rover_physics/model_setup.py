@@ -55,32 +55,16 @@ def set_up(
         ModelError: An argument that makes no sense.
         SoilError: A soil of the terrain, or `soil`, that is not among the presets.
     """
-    if policy not in POLICIES:
-        raise ModelError(f"no torque policy {policy!r}; policies are {', '.join(POLICIES)}")
-    mu = rover.friction if friction is None else friction
-    torque = rover.wheel.max_torque if max_torque is None else max_torque
-    for name, value in (("friction", mu), ("max_torque", torque)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise ModelError(f"{name} is {value}; it must be above 0")
-    mass, com = body_mass_and_com(rover, joint_angles, payload)
-    tool = pack_tool(rover, joint_angles, tool_force, tool_moment)
-    samples = sample_wheel(rover, terrain.resolution)
-    flat_angle, flat_measure = _tip_over_on_flat_ground(_SameRover(rover))
-    settings = new_record(
-        SETTINGS,
-        policy=POLICIES[policy],
-        friction=float(mu),
-        max_torque=float(torque),
-        allowed_torque=float(torque * rover.limits.torque_saturation),
-        on_soil=bool(terrain.soil_names or soil is not None),
-        direction=-1.0 if backward else 1.0,
-        speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),
-        max_wheel_speed=float(rover.wheel.max_speed),
-        flat_angle=flat_angle,
-        flat_measure=flat_measure,
-    )
-    ground = with_soils(pack_ground(terrain), _pack_soils(terrain.soil_names, soil))
-    return Setup(ground, pack_linkage(rover, mass, com, tool), samples, settings)
+    same, on_soil = _SameRover(rover), bool(terrain.soil_names or soil is not None)
+    angles = None if joint_angles is None else tuple(joint_angles.items())
+    tool_loads = () if tool_force is None and tool_moment is None else (tool_force, tool_moment)
+    pack = _pack_request.__wrapped__ if tool_loads else _pack_request
+    packed = pack(
+        same, terrain.resolution, policy, friction, max_torque, angles, payload, on_soil, backward,
+        *tool_loads,
+    )  # fmt: skip
+    soils = _pack_soils(terrain.soil_names, soil)
+    return Setup(with_soils(pack_ground(terrain), soils), *packed)
 
 
 @lru_cache(maxsize=16)
@@ -99,6 +83,48 @@ class _SameRover:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _SameRover) and self.rover is other.rover
+
+
+@lru_cache(maxsize=16)
+def _pack_request(
+    same: _SameRover,
+    resolution: float,
+    policy: str,
+    friction: float | None,
+    max_torque: float | None,
+    angles: tuple[tuple[str, float], ...] | None,
+    payload: float | None,
+    on_soil: bool,
+    backward: bool,
+    tool_force: ArrayLike | None = None,
+    tool_moment: ArrayLike | None = None,
+) -> tuple[Any, Any, Any]:
+    """Return the fields of `Setup` after the ground, the same ones where the same is asked."""
+    rover, joint_angles = same.rover, None if angles is None else dict(angles)
+    if policy not in POLICIES:
+        raise ModelError(f"no torque policy {policy!r}; policies are {', '.join(POLICIES)}")
+    mu = rover.friction if friction is None else friction
+    torque = rover.wheel.max_torque if max_torque is None else max_torque
+    for name, value in (("friction", mu), ("max_torque", torque)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise ModelError(f"{name} is {value}; it must be above 0")
+    mass, com = body_mass_and_com(rover, joint_angles, payload)
+    tool = pack_tool(rover, joint_angles, tool_force, tool_moment)
+    flat_angle, flat_measure = _tip_over_on_flat_ground(same)
+    settings = new_record(
+        SETTINGS,
+        policy=POLICIES[policy],
+        friction=float(mu),
+        max_torque=float(torque),
+        allowed_torque=float(torque * rover.limits.torque_saturation),
+        on_soil=on_soil,
+        direction=-1.0 if backward else 1.0,
+        speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),
+        max_wheel_speed=float(rover.wheel.max_speed),
+        flat_angle=flat_angle,
+        flat_measure=flat_measure,
+    )
+    return pack_linkage(rover, mass, com, tool), sample_wheel(rover, resolution), settings
 
 
 @lru_cache(maxsize=4)

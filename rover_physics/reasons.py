@@ -18,8 +18,13 @@ class Check(NamedTuple):
 
     code: str
     """Its code in a verdict."""
-    broken: np.ndarray
-    """(n,) True where the limit is broken."""
+    extreme: float
+    """The value that comes closest to the limit or goes furthest beyond it, NaN where none is
+    known; NaN too for limits that are no single number."""
+    breaks: bool
+    """Whether the limit is broken anywhere."""
+    broken: Callable[[], np.ndarray]
+    """Gives (n,) True where the limit is broken."""
     margins: Callable[[], np.ndarray]
     """Gives the share of the limit (n,) that is left, negative where it is broken."""
     wheels: Callable[[], np.ndarray]
@@ -31,7 +36,7 @@ class Check(NamedTuple):
 def tilt_of(prediction: PathPrediction) -> np.ndarray:
     """Return the angle (n,) [rad] between the body's z axis and the vertical."""
     upright = np.cos(prediction.roll) * np.cos(prediction.pitch)
-    return np.arccos(np.clip(upright, -1.0, 1.0))
+    return np.arccos(np.minimum(np.maximum(upright, -1.0), 1.0))
 
 
 def compare(value: float, limit: float, digits: int, unit: str = "") -> str:
@@ -50,6 +55,16 @@ def _no_wheel(values: np.ndarray) -> Callable[[], np.ndarray]:
     return lambda: np.full(len(values), -1)
 
 
+def largest_of(values: np.ndarray) -> float:
+    """Return the largest of values that are not NaN, NaN where there is none."""
+    return float(np.fmax.reduce(values, axis=None)) if values.size else np.nan
+
+
+def smallest_of(values: np.ndarray) -> float:
+    """Return the smallest of values that are not NaN, NaN where there is none."""
+    return float(np.fmin.reduce(values, axis=None)) if values.size else np.nan
+
+
 def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
     """Return the checks of a prediction, the most telling reason first."""
     return [
@@ -66,35 +81,57 @@ def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
 
 
 def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
-    suspension = rover.suspension
-    joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle])
-    low = np.repeat([suspension.rocker_limits[0], suspension.bogie_limits[0]], 2)
-    high = np.repeat([suspension.rocker_limits[1], suspension.bogie_limits[1]], 2)
-    beyond = (joints < low - TOLERANCE) | (joints > high + TOLERANCE)
+    rocker, bogie = prediction.rocker_angle, prediction.bogie_angle
+    limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
+    breaks = any(
+        smallest_of(angle) < least - TOLERANCE or largest_of(angle) > most + TOLERANCE
+        for angle, (least, most) in zip((rocker, bogie), limits, strict=True)
+    )
+
+    def joints_and_limits() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        low, high = np.repeat(limits, 2, axis=0).T
+        return np.hstack([rocker, bogie]), low, high
+
+    def beyond() -> np.ndarray:
+        joints, low, high = joints_and_limits()
+        return (joints < low - TOLERANCE) | (joints > high + TOLERANCE)
 
     def margins() -> np.ndarray:
+        joints, low, high = joints_and_limits()
         left = np.minimum(joints - low, high - joints) / (high - low)
         return np.asarray(left.min(axis=1))
 
     def describe(i: int) -> str:
-        joint = int(np.argmax(beyond[i]))
+        joint = int(np.argmax(beyond()[i]))
+        joints, low, high = joints_and_limits()
         name = f"{SIDES[joint % 2]} {('rocker', 'bogie')[joint // 2]}"
         limit = low[joint] if joints[i, joint] < low[joint] else high[joint]
         return f"{name} angle {compare(joints[i, joint], limit, 2, ' rad')}"
 
-    return Check("suspension", np.any(beyond, axis=1), margins, _no_wheel(joints), describe)
+    return Check(
+        "suspension",
+        np.nan,
+        breaks,
+        lambda: np.any(beyond(), axis=1),
+        margins,
+        _no_wheel(rocker),
+        describe,
+    )
 
 
 def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
-    tilt, limit = np.degrees(tilt_of(prediction)), np.degrees(rover.limits.tilt)
+    tilt, limit = tilt_of(prediction), np.degrees(rover.limits.tilt)
+    extreme = largest_of(tilt)
 
     def describe(i: int) -> str:
-        return f"tilt {compare(tilt[i], limit, 1, ' deg')}"
+        return f"tilt {compare(np.degrees(tilt[i]), limit, 1, ' deg')}"
 
     return Check(
         "tilt",
-        tilt > limit + TOLERANCE,
-        lambda: _share_left(tilt, limit),
+        extreme,
+        bool(np.degrees(extreme) > limit + TOLERANCE),
+        lambda: np.degrees(tilt) > limit + TOLERANCE,
+        lambda: _share_left(np.degrees(tilt), limit),
         _no_wheel(tilt),
         describe,
     )
@@ -106,13 +143,7 @@ def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"tip-over ratio {compare(ratio[i], limit, 2)}"
 
-    return Check(
-        "tip_over",
-        ratio < limit - TOLERANCE,
-        lambda: -_share_left(ratio, limit),
-        _no_wheel(ratio),
-        describe,
-    )
+    return _check_lower("tip_over", ratio, limit, describe)
 
 
 def _check_wheel_lift(prediction: PathPrediction) -> Check:
@@ -129,8 +160,16 @@ def _check_wheel_lift(prediction: PathPrediction) -> Check:
         share = loads.min(axis=1) / np.maximum(loads.sum(axis=1) / 6.0, TOLERANCE)
         return np.asarray(share)
 
-    broken = np.any(loads < 0.0, axis=1)
-    return Check("wheel_lift", broken, margins, lambda: np.argmin(loads, axis=1), describe)
+    least = smallest_of(loads)
+    return Check(
+        "wheel_lift",
+        least,
+        least < 0.0,
+        lambda: np.any(loads < 0.0, axis=1),
+        margins,
+        lambda: np.argmin(loads, axis=1),
+        describe,
+    )
 
 
 def _check_sinkage(rover: Rover, prediction: PathPrediction) -> Check:
@@ -164,9 +203,12 @@ def _check_wheels(
         wheel = int(np.argmax(values[i]))
         return f"{WHEELS[wheel]} {words} {compare(values[i, wheel], limit, digits, unit)}"
 
+    extreme = largest_of(values)
     return Check(
         code,
-        np.any(values > limit + TOLERANCE, axis=1),
+        extreme,
+        extreme > limit + TOLERANCE,
+        lambda: np.any(values > limit + TOLERANCE, axis=1),
         lambda: _share_left(np.max(values, axis=1), limit),
         lambda: np.argmax(values, axis=1),
         describe,
@@ -179,10 +221,19 @@ def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"belly clearance {compare(clearance[i], limit, 3, ' m')}"
 
+    return _check_lower("belly", clearance, limit, describe)
+
+
+def _check_lower(
+    code: str, values: np.ndarray, limit: float, describe: Callable[[int], str]
+) -> Check:
+    extreme = smallest_of(values)
     return Check(
-        "belly",
-        clearance < limit - TOLERANCE,
-        lambda: -_share_left(clearance, limit),
-        _no_wheel(clearance),
+        code,
+        extreme,
+        extreme < limit - TOLERANCE,
+        lambda: values < limit - TOLERANCE,
+        lambda: -_share_left(values, limit),
+        _no_wheel(values),
         describe,
     )

@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike
 from rover_physics.crossing import Crossings, find_crossings
 from rover_physics.drops import find_falls
 from rover_physics.errors import PoseError
-from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, evaluate
+from rover_physics.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, effort, evaluate
 from rover_physics.model_setup import POLICIES, Setup, set_up
+from rover_physics.path_kernels import add_up
 from rover_physics.prediction import PathPrediction
 from rover_physics.rover import Rover, load_rover
 from rover_physics.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
 from rover_physics.terrain import Terrain
+from rover_physics.threads import threads_worth
 
 __all__ = [
     "NOT_SETTLED",
@@ -117,14 +119,15 @@ def _sweep(
         return []
     ends = np.cumsum([len(poses) for poses in paths])
     poses = np.concatenate(paths)
-    results = evaluate_at(poses)
     joined = np.ones(len(poses) - 1, bool)
     joined[ends[:-1] - 1] = False
-    radius, direction = rover.wheel.radius, float(setup.settings.direction)
-    crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
+    radius, direction = rover.wheel.radius, float(setup.settings["direction"])
+    with threads_worth(effort(setup.settings, len(poses))):  # told once, not for each round
+        results = evaluate_at(poses)
+        crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
-        part = crossings.between(first, end)
+        part = crossings.between(first, end) if len(paths) > 1 else crossings
         predictions.append(
             _predict(setup.settings, radius, poses[first:end], results[first:end], part)
         )
@@ -135,7 +138,7 @@ def _predict(
     settings: Any, radius: float, poses: np.ndarray, results: np.ndarray, crossings: Crossings
 ) -> PathPrediction:
     """Return what results and crossings of one path say of it."""
-    falls = find_falls(radius, poses, results, crossings, float(settings.direction))
+    falls = find_falls(radius, poses, results, crossings, float(settings["direction"]))
     between = _collect(
         crossings.poses,
         crossings.results,
@@ -168,9 +171,9 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
         raise PoseError(f"poses are not numbers: {error}") from error
     if array.ndim != 2 or array.shape[1] != 3 or not len(array):
         raise PoseError(f"poses have shape {array.shape}; it must be (n, 3): x, y, yaw, n >= 1")
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        row, column = wrong[0]
+    finite = np.isfinite(array)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
         name, value = ["x", "y", "yaw"][column], array[row, column]
         raise PoseError(f"{name} of pose {row} is {value}; poses must be finite")
     return array
@@ -178,14 +181,13 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
 
 def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any) -> PathPrediction:
     same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
-    q, power = results["q"], np.nan_to_num(results["power"])
-    settled = results["status"] == SETTLED
-    position = np.column_stack([poses[:, :2], q[:, 0]])
+    q, settled = results["q"], results["status"] == SETTLED
+    position = np.empty((len(poses), 3))
+    position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
     position[~settled] = np.nan
-    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    climbs = np.nan_to_num(np.diff(position[:, 2]))
-    durations = np.hypot(steps, climbs) / settings.speed
-    work = 0.5 * (power[1:] + power[:-1]) * durations
+    sums = np.empty((3, len(poses)))
+    add_up(poses, results, settings["speed"], sums)
+    distance, time, energy = sums
     return PathPrediction(
         poses=poses,
         settled=settled,
@@ -194,28 +196,25 @@ def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any)
         pitch=q[:, 2],
         rocker_angle=q[:, 3:4] * (1.0, -1.0),
         bogie_angle=q[:, 4:6],
-        energy=_accumulate(work, settled),
-        time=_accumulate(durations, settled),
-        distance=np.concatenate([[0.0], np.cumsum(steps)]),
-        policy=POLICY_NAMES[int(settings.policy)],
+        energy=energy,
+        time=time,
+        distance=distance,
+        policy=POLICY_NAMES[int(settings["policy"])],
         **same,
         **more,
     )
 
 
-def _accumulate(increments: np.ndarray, settled: np.ndarray) -> np.ndarray:
-    return np.where(settled, np.concatenate([[0.0], np.cumsum(increments)]), np.nan)
-
-
 def warm_up() -> None:
-    """Compile the kernels, or load them from the cache, by sweeping a level patch."""
+    """Compile the kernels, or load them from the cache, by sweeping a short way up a step."""
     from rover_physics.uncertainty import bound_path  # it asks for sweeps itself
 
-    rover = load_rover("lsr1")
-    patch = Terrain(np.zeros((64, 64)), 0.05, (-1.6, -1.6))
-    for layer in (None, np.ones((64, 64))):
-        ground = replace(patch, friction=layer, elevation_std=layer)
-        bound_path(rover, ground, sweep_path(rover, ground, np.zeros((1, 3))))
+    rover, layer = load_rover("lsr1"), np.ones((64, 64))
+    step = Terrain(np.where(np.arange(64) > 40, 0.1, 0.0) * layer, 0.05, (-1.6, -1.6))
+    poses = np.zeros((8, 3))
+    poses[:, 0] = np.linspace(-0.12, 0.02, 8)
+    for ground in (step, replace(step, friction=layer, elevation_std=layer)):
+        bound_path(rover, ground, sweep_path(rover, ground, poses))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,9 @@ def threads_worth(poses: int) -> Iterator[int]:
     """Let kernels use as many threads as they may, or one if there are few `poses`; yield it."""
     allowed = numba.get_num_threads()
     used = allowed if poses > ALONE else 1
+    if used == allowed:
+        yield used
+        return
     numba.set_num_threads(used)
     try:
         yield used

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.limits import Verdict, judge
 from rover_physics.prediction import PathPrediction
-from rover_physics.reasons import TOLERANCE
+from rover_physics.reasons import TOLERANCE, largest_of
 from rover_physics.rover import Rover
 from rover_physics.soil import use_of_shear
 from rover_physics.sweep import sweep_path, sweep_paths
@@ -126,7 +126,7 @@ def _find_one_way(
 
     Another set of torques may do, under policy "optimal"; this only tells where to ask.
     """
-    one_way = prediction.wheel_drop.max(axis=1) > DROP * rover.wheel.radius
+    one_way = np.any(prediction.wheel_drop > DROP * rover.wheel.radius, axis=1)
     for part in (prediction, prediction.between):
         if part is not None:
             rows = _resists_way_back(rover, part, arguments)
@@ -138,11 +138,11 @@ def _resists_way_back(
     rover: Rover, prediction: PathPrediction, arguments: dict[str, Any]
 ) -> np.ndarray:
     """Return (n,) True where driving back with the same forces breaks a limit on some soil."""
-    resistance = np.nan_to_num(prediction.motion_resistance)
+    resistance = prediction.motion_resistance
+    if not largest_of(resistance) > 0.0:
+        return np.zeros(len(resistance), dtype=bool)
     broken = np.zeros(resistance.shape, dtype=bool)
     wheels = np.nonzero(resistance > 0.0)
-    if not len(wheels[0]):
-        return np.asarray(broken.any(axis=1))
     direction = -1.0 if arguments.get("backward", False) else 1.0
     R, N = resistance[wheels], prediction.wheel_loads[wheels]
     T, S = -direction * prediction.tangential[wheels], prediction.lateral[wheels]

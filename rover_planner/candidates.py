@@ -11,6 +11,7 @@ is always a candidate.
 
 import numpy as np
 
+from rover_planner.curve_kernels import follow_curve, interpolate, turns_within
 from rover_planner.dubins import dubins_paths
 from rover_planner.errors import PlanningError
 
@@ -29,8 +30,6 @@ _LONG_WAY_ROUND = 1.5
 _FINE_SAMPLES = 501
 _FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
 """Parameters of the fine samples, and half-way between them."""
-_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)[:, None]
-"""First derivative there of a bump of one metre."""
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
 
 
@@ -97,10 +96,11 @@ def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> lis
     """Sample the direct curve and its neighbours; nothing where the direct one is too tight."""
     for scale in _TANGENT_SCALES:
         fan = _Fan(start, goal, scale)
-        if fan.is_drivable(0.0, min_radius):
-            offsets = lateral_offsets(count, spacing)
-            drivable = [one for one in offsets if fan.is_drivable(one, min_radius)]
-            return [fan.sample(offset, waypoint_spacing) for offset in drivable]
+        curves = (_Curve(fan, offset) for offset in lateral_offsets(count, spacing))
+        direct = next(curves)
+        if direct.is_drivable(min_radius):
+            others = [curve for curve in curves if curve.is_drivable(min_radius)]
+            return [curve.sample(waypoint_spacing) for curve in [direct, *others]]
     return []
 
 
@@ -112,76 +112,59 @@ def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.nda
     return [path for path in paths if path_length(path) <= longest]
 
 
+_FINE_WEIGHTS = np.array(
+    [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
+)
+"""What chord, start and end tangent count for in the slope at the fine samples, (3, n)."""
+_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
+"""First derivative there of a bump of one metre."""
+
+
 class _Fan:
     """Curves of a parameter in 0 to 1: the Hermite cubic, and beside it with bumps of some metres.
 
-    `scale` times the chord is the length of the end tangents. Slopes at the fine samples, and
-    half-way between them, are what all curves of a fan have in common but for their bump.
+    `scale` times the chord is the length of the end tangents.
     """
 
     def __init__(self, start: np.ndarray, goal: np.ndarray, scale: float):
-        self._start, self._chord = start[:2], goal[:2] - start[:2]
-        length = np.hypot(*self._chord)
-        self._left = np.array([-self._chord[1], self._chord[0]]) / length
-        self._m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
-        self._m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
-        self._fine = self._slope(_FINE, 0.0)
+        self.start, self.chord = start[:2], goal[:2] - start[:2]
+        length = np.hypot(*self.chord)
+        self.left = np.array([-self.chord[1], self.chord[0]]) / length
+        self.m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
+        self.m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
+        along_chord, along_m0, along_m1 = _FINE_WEIGHTS
+        self.fine_slope = along_chord * self.chord[:, None] + along_m0 * self.m0[:, None]
+        self.fine_slope += along_m1 * self.m1[:, None]
 
-    def is_drivable(self, offset: float, min_radius: float) -> bool:
-        """Tell whether the tightest place of a curve is no tighter than `min_radius` [m]."""
-        slope = self._fine_slope(offset)[::2]
-        speed = np.hypot(slope[:, 0], slope[:, 1])
-        if speed.min() <= 1e-6 * speed.max():
+
+class _Curve:
+    """One curve of a fan, and how fast it is driven at the fine samples and between them."""
+
+    def __init__(self, fan: _Fan, offset: float):
+        self._fan, self._offset = fan, float(offset)
+        self._slope = fan.fine_slope + _FINE_BUMP * (offset * fan.left)[:, None]
+        self._speed = np.hypot(self._slope[0], self._slope[1])
+
+    def is_drivable(self, min_radius: float) -> bool:
+        """Tell whether the tightest place of the curve is no tighter than `min_radius` [m]."""
+        ends = self._speed[::2]
+        if ends.min() <= 1e-6 * ends.max():
             return False
-        before, after = slope[:-1], slope[1:]
-        across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-        along = before[:, 0] * after[:, 0] + before[:, 1] * after[:, 1]
-        turned = np.abs(np.arctan2(across, along))
-        driven = 0.5 * (speed[1:] + speed[:-1]) / (len(speed) - 1)
-        return bool(np.all(turned * min_radius <= driven * (1 + 1e-9)))
+        return bool(turns_within(self._slope, self._speed, float(min_radius)))
 
-    def sample(self, offset: float, waypoint_spacing: float) -> np.ndarray:
-        """Sample poses (n, 3) equally far apart along a curve."""
-        slope = self._fine_slope(offset)
-        speed = np.hypot(slope[:, 0], slope[:, 1])
-        ends, middles = speed[::2], speed[1::2]
+    def sample(self, waypoint_spacing: float) -> np.ndarray:
+        """Sample poses (n, 3) equally far apart along the curve."""
+        ends, middles = self._speed[::2], self._speed[1::2]
         pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
         driven = np.concatenate([[0.0], np.cumsum(pieces)])
         steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
         marks = np.linspace(0.0, driven[-1], steps + 1)
-        t = _interpolate(marks, driven, _FINE[::2], 1 / ends)
-        place, slope = self._place(t, offset), self._slope(t, offset)
-        return np.column_stack([place, np.arctan2(slope[:, 1], slope[:, 0])])
-
-    def _fine_slope(self, offset: float) -> np.ndarray:
-        """Return the first derivative of a curve at the fine samples and between them, (n, 2)."""
-        return self._fine + _FINE_BUMP * (offset * self._left)
-
-    def _place(self, t: np.ndarray, offset: float) -> np.ndarray:
-        t = t[:, None]
-        h = t * t * (3 - 2 * t)
-        place = self._start + h * self._chord
-        place = place + t * (1 - t) ** 2 * self._m0 - t * t * (1 - t) * self._m1
-        return place + 0.5 * offset * (1 - np.cos(2 * np.pi * t)) * self._left
-
-    def _slope(self, t: np.ndarray, offset: float) -> np.ndarray:
-        t = t[:, None]
-        slope = 6 * t * (1 - t) * self._chord
-        slope = slope + (1 - t) * (1 - 3 * t) * self._m0 + t * (3 * t - 2) * self._m1
-        return slope + np.pi * offset * np.sin(2 * np.pi * t) * self._left
-
-
-def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Return what the cubic Hermite spline through (x, y) with these slopes is at some places.
-
-    scipy has it, but to import its interpolation takes a tenth of the time a server needs to
-    start.
-    """
-    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
-    width, rise = x[i + 1] - x[i], y[i + 1] - y[i]
-    s = (at - x[i]) / width
-    first, last = slopes[i] * width - rise, rise - slopes[i + 1] * width
-    return y[i] + s * rise + s * (1 - s) * ((1 - s) * first + s * last)
+        t, poses, slope = np.empty(steps + 1), np.empty((steps + 1, 3)), np.empty((2, steps + 1))
+        interpolate(marks, driven, _FINE[::2], 1 / ends, t)
+        fan = self._fan
+        follow_curve(t, fan.start, fan.chord, fan.m0, fan.m1, fan.left, self._offset, poses, slope)
+        poses[:, 2] = np.arctan2(slope[1], slope[0])
+        return poses
 
 
 def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
@@ -194,6 +177,8 @@ def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarr
 def _wrap(angle):
     """Bring an angle [rad] into -pi to pi, leaving those inside as they are."""
     inside = np.abs(angle) <= np.pi
+    if inside.all():
+        return angle
     return np.where(inside, angle, np.arctan2(np.sin(angle), np.cos(angle)))
 
 

@@ -1,7 +1,7 @@
 """The answer to one request: yes or no at once, and all there is to say about it on demand."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -25,8 +25,8 @@ class Judgement:
     """The path that was judged; None where the request was refused before."""
     grade: Callable[[], tuple[Grade, ...]] = tuple
     """Grades the waypoints; may have to sweep the path once more."""
-    notes: Mapping[str, Any] = field(default_factory=dict)
-    """Further entries of the verdict."""
+    notes: Callable[[], Mapping[str, Any]] = dict
+    """Tells further entries of the verdict."""
 
     @property
     def traversable(self) -> bool:
@@ -43,8 +43,9 @@ class Judgement:
         """What there is to say, of JSON's types or numpy's: `traversable`, `code`, `reason`..."""
         if self.candidate is None:
             said = {"code": self.code, "reason": self.reason, "first_failure": -1}
-            return {"traversable": False, **said, **self.notes}
-        return {**describe_path(self.candidate), **describe_grades(self.grades), **self.notes}
+            return {"traversable": False, **said, **self.notes()}
+        path, grades = describe_path(self.candidate), describe_grades(self.grades)
+        return {**path, **grades, **self.notes()}
 
     def changes(self) -> NDArray[np.intp]:
         """Return the waypoints that have another grade than the one before."""

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -17,6 +17,7 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover import Rover, load_rover
 from rover_physics.soil_file import soil_named
 from rover_physics.terrain import Terrain
+from rover_planner.candidates import generate_candidates
 from rover_planner.errors import PlanningError
 from rover_planner.judgement import Judgement, refusal
 from rover_planner.path_geometry import densify, rings_within
@@ -99,6 +100,8 @@ class TraverseService:
         self._path: NDArray[np.float64] | None = None
         self._path_refusal = "no path was received yet; publish one on ~/path"
         self._joints: dict[str, float] = {}
+        # Compiles or loads kernels, so that the first question does not wait for it.
+        generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
     @property
     def settings(self) -> ServiceSettings:
@@ -249,19 +252,24 @@ class TraverseService:
         tried: int,
     ) -> Judgement:
         """Make a judgement of the answer to a query, which says which goal it is for."""
-        passable = sum(candidate.verdict.traversable for candidate in answer.candidates)
-        return self._judgement(
-            answer.chosen,
-            candidates=len(answer.candidates),
-            traversable_candidates=passable,
-            chosen_candidate=answer.nearest,
-            goal=reached.tolist(),
-            goal_offset=float(np.hypot(*(reached - goal)[:2])),
-            alternative_goals_tried=tried,
-            explanation=answer.explain(),
-        )
 
-    def _judgement(self, candidate: Candidate, **notes: Any) -> Judgement:
+        def notes() -> dict[str, Any]:
+            passable = sum(candidate.verdict.traversable for candidate in answer.candidates)
+            return {
+                "candidates": len(answer.candidates),
+                "traversable_candidates": passable,
+                "chosen_candidate": answer.nearest,
+                "goal": reached.tolist(),
+                "goal_offset": float(np.hypot(*(reached - goal)[:2])),
+                "alternative_goals_tried": tried,
+                "explanation": answer.explain(),
+            }
+
+        return self._judgement(answer.chosen, notes)
+
+    def _judgement(
+        self, candidate: Candidate, notes: Callable[[], dict[str, Any]] = dict
+    ) -> Judgement:
         """Make a judgement of a judged path, with all that describing it later takes."""
         assert self._terrain is not None
         grade = partial(
@@ -275,13 +283,17 @@ class TraverseService:
             **self._settings.query.ground_and_load(),
         )
         verdict = candidate.verdict
-        notes = {**self._compare_suspension(candidate), **notes}
-        return Judgement(verdict.code, verdict.reason, candidate, grade, notes)
+        suspension = self._compare_suspension(candidate)  # with the joints as they are now
+
+        def all_notes() -> dict[str, Any]:
+            return {**suspension, **notes()}
+
+        return Judgement(verdict.code, verdict.reason, candidate, grade, all_notes)
 
     def _compare_suspension(self, candidate: Candidate) -> dict[str, Any]:
         """Compare the measured suspension with the predicted one at the path's start."""
         prediction = candidate.prediction
-        if not prediction.settled[0]:
+        if not (self._joints and prediction.settled[0]):
             return {}
         predicted = dict(
             zip(

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicHermiteSpline
 
 from rover_planner.candidates import (
     MIN_RADIUS,
-    _interpolate,
     generate_candidates,
     lateral_offsets,
     path_length,
@@ -143,11 +141,3 @@ def test_bad_requests_are_refused_by_name(change, names):
     start, goal = arguments.pop("start"), arguments.pop("goal")
     with pytest.raises(PlanningError, match=names):
         generate_candidates(start, goal, **arguments)
-
-
-def test_the_places_along_a_curve_are_those_of_a_cubic_hermite_spline():
-    rng = np.random.default_rng(0)
-    x, y = np.cumsum(rng.uniform(0.1, 1.0, 20)), rng.normal(size=20)
-    slopes, at = rng.normal(size=20), np.linspace(x[0], x[-1], 333)
-    expected = CubicHermiteSpline(x, y, slopes)(at)
-    assert _interpolate(at, x, y, slopes) == pytest.approx(expected, abs=1e-12)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from rough_grounds import plane
 
-from rover_physics.limits import CODES, judge, tilt_of
+from rover_physics.limits import CODES, judge
+from rover_physics.reasons import tilt_of
 from rover_physics.rover import load_rover
 from rover_physics.sweep import (
     NO_EQUILIBRIUM,
