@@ -82,7 +82,8 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
     ground, samples = setup.ground.records[0], setup.samples
     corner = np.array([ground.x0, ground.y0])
     sines, cosines = samples.sines[: samples.rows], samples.cosines[: samples.rows]
-    laterals, radius, scale = samples.laterals[: samples.circles], samples.radius, ground.inverse_resolution
+    laterals, radius = samples.laterals[: samples.circles], samples.radius
+    scale = ground.inverse_resolution
     cells = []
     settled = results[results["status"] == SETTLED]
     work = new_work()

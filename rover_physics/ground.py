@@ -132,10 +132,7 @@ def find_roof(ground, gx, gy, reach_x, reach_y):
     """
     low_x, high_x, low_y, high_y = gx - reach_x, gx + reach_x, gy - reach_y, gy + reach_y
     if not (
-        low_x >= 0.0
-        and low_y >= 0.0
-        and high_x < ground.columns - 1
-        and high_y < ground.rows - 1
+        low_x >= 0.0 and low_y >= 0.0 and high_x < ground.columns - 1 and high_y < ground.rows - 1
     ):
         return np.inf
     first, last = int64(low_x) >> BLOCK_BITS, int64(high_x + 1.0) >> BLOCK_BITS

@@ -191,7 +191,8 @@ def _may_come_near(ground, samples, forward, up, gx, gy, z, s, c, best):
     c_most, s_most = 1.0, min(1.0, abs(s) + turn_s)
     if abs(s) > turn_s:
         c_most = c * turn_c + abs(s) * turn_s
-    way = 1.01 * turn_s * samples.radius * ground.inverse_resolution  # the arc is a little longer than its sine
+    # The arc is a little longer than its sine.
+    way = 1.01 * turn_s * samples.radius * ground.inverse_resolution
     reach_x = way * (abs(forward[0]) * c_most + abs(up[0]) * s_most)
     reach_y = way * (abs(forward[1]) * c_most + abs(up[1]) * s_most)
     top = -np.inf

@@ -74,7 +74,10 @@ def settle_from(ground, linkage, samples, x, y, yaw, q, placement, touch, J, ste
         if attempt > 0:
             relaxed = RELAXED * linkage.radius * RELAXED_FURTHER ** (attempt - 1)
             scope = EXACT if attempt == RECOVERIES - 1 else QUICK
-            _relax(relaxed, scope, ground, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+            _relax(
+                relaxed, scope, ground, linkage, samples, x, y, yaw,
+                q, placement, touch, J, step,
+            )  # fmt: skip
         _newton(ground, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
         status, worst = _touch_all(ground, samples, placement, EXACT, touch)
         if _has_turned_over(q):
