@@ -7,7 +7,6 @@ some hundred calls a pose, handing them on took a quarter of the time.
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
@@ -28,8 +27,8 @@ def _reader(element: types.Type, returned: types.Type) -> Any:
 
     def read(_context: Any, _address: Any, _index: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-            kind = context.get_value_type(element)
-            start = builder.inttoptr(arguments[0], ir.PointerType(kind))
+            kind = context.get_value_type(element).as_pointer()
+            start = builder.inttoptr(arguments[0], kind)
             value = builder.load(builder.gep(start, [arguments[1]]))
             return context.cast(builder, value, element, returned)
 
