@@ -115,10 +115,15 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     results = new_results(len(poses))
     records = [shared_array_of(record) for record in (linkage, samples, settings)]
     with threads_worth(effort(settings, len(poses))) as threads:
-        chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-len(poses) // CHUNK))
-        works = _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
+        works = new_works(threads, len(poses))
         evaluate_poses(ground.records, *records, poses, held, works, results)
     return results
+
+
+def new_works(threads: int, poses: int) -> Any:
+    """Return empty work spaces for a sweep, one for each chunk of poses."""
+    chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-poses // CHUNK))
+    return _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
 
 
 def effort(settings, poses: int) -> int:
@@ -137,14 +142,13 @@ def evaluate_poses(grounds, linkages, samplings, settings, poses, held, works, r
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             evaluate_pose(
                 grounds[0], linkages[0], samplings[0], settings[0],
-                poses, held, i, works[chunk], results,
+                poses, held, i, works[chunk], results[i],
             )  # fmt: skip
 
 
 @kernel
-def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, results):
-    """Evaluate the model at pose i into row i of `results`."""
-    result = results[i]
+def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, result):
+    """Evaluate the model at pose i into `result`; where it does not settle only the status."""
     q, placement, touch = result.q, work.placement, work.touch
     for wheel in range(6 if held.shape[0] > 0 else 0):
         touch.held_height[wheel] = held[i, wheel, 0]

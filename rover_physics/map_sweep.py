@@ -1,8 +1,8 @@
-"""Many poses that form no path, such as all cells of a map: few numbers each, in batches.
+"""Many poses that form no path, such as all cells of a map: few numbers each.
 
 A prediction keeps some 100 numbers a pose; of a map of a million cells at eight headings that
-would be 6 GB. Here one batch of results at a time is boiled down to what decides whether the rover
-can stand and drive at a pose.
+would be 6 GB. Here the results of each pose are boiled down at once to what decides whether the
+rover can stand and drive there.
 """
 
 from collections.abc import Iterator
@@ -10,17 +10,29 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.evaluation import evaluate
+from rover_physics.evaluation import (
+    NONE_HELD,
+    effort,
+    evaluate_pose,
+    new_results,
+    new_works,
+)
+from rover_physics.kernels import kernel, sweep_kernel
 from rover_physics.model_setup import Setup, set_up
+from rover_physics.records import shared_array_of
 from rover_physics.rover import Rover
 from rover_physics.settling import SETTLED
 from rover_physics.sweep import check_poses, one_sweep_at_a_time
 from rover_physics.terrain import Terrain
+from rover_physics.threads import threads_worth
 
 BATCH = 32_768
-"""Poses that are evaluated at a time; their results take 35 MB."""
+"""About how many poses of a map are scored at a time."""
+NUMBERS = 6
+"""Numbers that a score has beside the status."""
 
 Floats = NDArray[np.float32]
 
@@ -76,11 +88,7 @@ def score_poses(rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: A
     """
     given = np.asarray(poses)
     flat = check_poses(given.reshape(-1, 3) if given.shape[-1:] == (3,) else given)
-    setup = set_up(rover, terrain, **arguments)
-    scores = _empty_scores(given.shape[:-1])
-    for first in range(0, len(flat), BATCH):
-        _score_batch(setup, flat[first : first + BATCH], scores, first)
-    return scores
+    return _score(set_up(rover, terrain, **arguments), flat, given.shape[:-1])
 
 
 def sweep_map(
@@ -109,36 +117,54 @@ def sweep_map(
     for first in range(0, ny, rows):
         y = terrain.origin[1] + terrain.resolution * np.arange(first, min(first + rows, ny))
         grid = np.stack(np.broadcast_arrays(x[:, None], y[:, None, None], yaw), axis=-1)
-        scores = _empty_scores(grid.shape[:-1])
-        _score_batch(setup, np.ascontiguousarray(grid.reshape(-1, 3)), scores, 0)
-        yield first, scores
+        poses = np.ascontiguousarray(grid.reshape(-1, 3))
+        yield first, _score(setup, poses, grid.shape[:-1])
 
 
-def _empty_scores(shape: tuple[int, ...]) -> PoseScores:
-    def blank() -> Floats:
-        return np.full(shape, np.nan, np.float32)
+def _score(setup: Setup, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
+    """Score poses (n, 3); the scores have another shape of n elements."""
+    n = len(poses)
+    status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
+    records = [shared_array_of(record) for record in setup[1:]]
+    with one_sweep_at_a_time, threads_worth(effort(setup.settings, n)) as threads:
+        works = new_works(threads, n)
+        results = new_results(len(works))
+        score_all(
+            setup.ground.records, *records, poses, NONE_HELD, works, results, status, numbers
+        )
+    return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
 
-    status = np.zeros(shape, np.int8)
-    return PoseScores(status, blank(), blank(), blank(), blank(), blank(), blank())
+
+@sweep_kernel
+def score_all(
+    grounds, linkages, samplings, settings, poses, held, works, results, status, numbers
+):
+    """Score the poses in chunks, as many as there are work spaces and results."""
+    n, chunks = poses.shape[0], works.size
+    for chunk in prange(chunks):
+        for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
+            evaluate_pose(
+                grounds[0], linkages[0], samplings[0], settings[0],
+                poses, held, i, works[chunk], results[chunk],
+            )  # fmt: skip
+            status[i] = results[chunk].status
+            _write_score(results[chunk], i, numbers)
 
 
-def _score_batch(setup: Setup, poses: np.ndarray, scores: PoseScores, first: int) -> None:
-    """Score poses (n, 3) into rows `first` and on of the scores, counted in all their axes."""
-    with one_sweep_at_a_time:
-        results = evaluate(*setup, poses)
-    status = scores.status.reshape(-1)[first : first + len(poses)]
-    status[:] = results["status"]
-    settled = status == SETTLED
-    q = results["q"]
-    upright = np.clip(np.cos(q[:, 1]) * np.cos(q[:, 2]), -1.0, 1.0)
-    found = {
-        "friction_utilisation": results["friction_utilisation"].max(axis=1),
-        "torque_saturation": results["torque_saturation"].max(axis=1),
-        "least_load": results["wheel_loads"].min(axis=1),
-        "tip_over_ratio": results["tip_over_ratio"],
-        "tilt": np.arccos(upright),
-        "belly_clearance": results["belly_clearance"],
-    }
-    for name, values in found.items():
-        row = getattr(scores, name).reshape(-1)[first : first + len(poses)]
-        row[settled] = values[settled]
+@kernel
+def _write_score(result, i, numbers):
+    """Write column i of numbers (NUMBERS, n), in the order of `PoseScores`."""
+    if result.status != SETTLED:
+        for k in range(NUMBERS):
+            numbers[k, i] = np.nan
+        return
+    use, saturation, least = 0.0, 0.0, np.inf
+    for wheel in range(6):
+        use = max(use, result.friction_utilisation[wheel])
+        saturation = max(saturation, result.torque_saturation[wheel])
+        least = min(least, result.wheel_loads[wheel])
+    upright = np.cos(result.q[1]) * np.cos(result.q[2])
+    numbers[0, i], numbers[1, i], numbers[2, i] = use, saturation, least
+    numbers[3, i] = result.tip_over_ratio
+    numbers[4, i] = np.arccos(min(max(upright, -1.0), 1.0))
+    numbers[5, i] = result.belly_clearance

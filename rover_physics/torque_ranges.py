@@ -89,7 +89,9 @@ def find_torque_ranges(
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
         with one_sweep_at_a_time:
-            evaluate_pose(setup.ground.records[0], *setup[1:], poses, NONE_HELD, i, work, results)
+            evaluate_pose(
+                setup.ground.records[0], *setup[1:], poses, NONE_HELD, i, work, results[i]
+            )
         if results[i].status != SETTLED or not _is_within(rover, setup, results[i]):
             continue
         feasible[i] = True

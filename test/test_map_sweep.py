@@ -24,11 +24,10 @@ def poses_on(terrain: Terrain, shape) -> np.ndarray:
 
 
 @pytest.mark.parametrize("ground", [rocky, gap])
-@pytest.mark.parametrize("batch", [7, 10_000])
-def test_scores_are_those_of_a_sweep(ground, batch, monkeypatch):
-    monkeypatch.setattr(map_sweep, "BATCH", batch)
+@pytest.mark.parametrize("shape", [(5, 8), (60, 50)])
+def test_scores_are_those_of_a_sweep_on_one_thread_and_on_several(ground, shape):
     terrain = make_terrain(ground)
-    poses = poses_on(terrain, (5, 8))
+    poses = poses_on(terrain, shape)
     scores = score_poses(ROVER, terrain, poses, friction=0.5)
     path = sweep_path(ROVER, terrain, poses.reshape(-1, 3), friction=0.5)
     expected = {
@@ -43,7 +42,7 @@ def test_scores_are_those_of_a_sweep(ground, batch, monkeypatch):
     assert 0 < path.settled.sum() < path.settled.size
     for name, values in expected.items():
         found = getattr(scores, name)
-        assert found.shape == (5, 8)
+        assert found.shape == shape
         np.testing.assert_allclose(found.ravel(), values, rtol=1e-6, atol=1e-7)
 
 
