@@ -67,20 +67,21 @@ def _guess(ground, samples, placement, wheel, touch):
         and gy < ground.rows - 1 - reach
     ):
         return False
-    nearest = np.inf
+    ahead_x, ahead_y = reach * forward[0], reach * forward[1]
+    down_x, down_y, down_z = reach * up[0], reach * up[1], radius * up[2]
+    nearest, row, total = np.inf, 0, 0.0
     for k in range(samples.rows // 2 % 2, samples.rows, 2):
-        s, c = radius * samples.sines[k], radius * samples.cosines[k]
-        dx, dy = s * forward[0] - c * up[0], s * forward[1] - c * up[1]
-        z = centres[wheel, 2] - c * up[2]
-        gap = z - height_inside(ground, gx + dx * scale, gy + dy * scale)
-        if gap < nearest:
-            nearest = gap
-            touch.point[wheel, 0] = centres[wheel, 0] + dx
-            touch.point[wheel, 1] = centres[wheel, 1] + dy
-            touch.point[wheel, 2] = z
-        elif gap != gap:
-            return False
-    touch.gap[wheel] = nearest
+        s, c = samples.sines[k], samples.cosines[k]
+        dx, dy = s * ahead_x - c * down_x, s * ahead_y - c * down_y
+        height = height_inside(ground, gx + dx, gy + dy)
+        gap = -c * down_z - height
+        total += height
+        row = k if gap < nearest else row
+        nearest = min(nearest, gap)
+    if total != total:
+        return False
+    touch.gap[wheel] = centres[wheel, 2] + nearest
+    write_point(samples, placement, wheel, samples.sines[row], samples.cosines[row], 0.0, touch)
     return True
 
 
