@@ -24,7 +24,7 @@ SERVER = "/traverse_server/can_traverse"
 HERE = FilePath(__file__).resolve().parent
 DOMAIN = 101 + os.getpid() % 100
 """A ROS domain that tests do not use."""
-TIMEOUT = 120.0
+TIMEOUT = 300.0
 """Longest wait for an answer [s]; the first may have to wait for compilation."""
 
 
