@@ -12,7 +12,7 @@ READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.bench_ready
 PACKAGES := rover_physics msg_adapters rover_planner
 MAP ?=
-BROWSER_TESTS := test/test_viewer_page.py test/test_viewer_live_page.py
+BROWSER_TESTS := test/viewer/test_page.py test/viewer/test_live_page.py
 # Tests, demo and nodes talk to this machine only.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -46,11 +46,11 @@ lint: $(READY) ## ruff and mypy
 .PHONY: kernels
 kernels: $(READY) ## compile the numba kernels into their cache
 	@echo "== compiling kernels"
-	$(BIN)/python -m rover_physics.sweep
+	$(BIN)/python -m rover_physics.warm_up
 
 .PHONY: bench
 bench: $(BENCH_READY) kernels ## measure times and memory, as a table and bench_output/results.json
-	@$(BIN)/python benchmarks/run.py
+	@$(BIN)/python -m benchmarks.run
 
 .PHONY: clean
 clean: ## remove the environment and everything that was made

@@ -3,18 +3,10 @@
 import re
 from pathlib import Path
 
-from setuptools import setup
+from setuptools import find_packages, setup
 
 NAME = "rover_planner"
-PACKAGES = [
-    "rover_physics",
-    "msg_adapters",
-    "rover_planner",
-    "rover_planner.parameters",
-    "rover_planner.simulator",
-    "rover_planner.studies",
-    "rover_planner.viewer",
-]
+IMPORT_PACKAGES = ("rover_physics", "msg_adapters", "rover_planner")
 HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link to this file
 
 # Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba and osqp are not in it.
@@ -78,7 +70,7 @@ def list_data_files() -> list[tuple[str, list[str]]]:
 setup(
     name=NAME,
     version=read_version(),
-    packages=PACKAGES,
+    packages=find_packages(HERE, include=[f"{name}*" for name in IMPORT_PACKAGES]),
     data_files=list_data_files(),
     python_requires=">=3.11",
     install_requires=REQUIRES,
@@ -92,10 +84,10 @@ setup(
     entry_points={
         "console_scripts": [
             "rover_planner = rover_planner.cli:main",
-            "traverse_server = rover_planner.traverse_server:main",
-            "traction_controller = rover_planner.traction_controller:main",
-            "mission_planner = rover_planner.mission_planner:main",
-            "rover_simulator = rover_planner.rover_simulator:main",
+            "traverse_server = rover_planner.nodes.traverse_server:main",
+            "traction_controller = rover_planner.nodes.traction_controller:main",
+            "mission_planner = rover_planner.nodes.mission_planner:main",
+            "rover_simulator = rover_planner.nodes.rover_simulator:main",
         ],
     },
 )

@@ -6,12 +6,12 @@ import time
 
 import numba
 import numpy as np
-from measure import REPEATS, Figure, median_time, median_times
 
-from rover_physics.map_sweep import score_poses, sweep_map
-from rover_physics.rover import load_rover
-from rover_physics.terrain import Terrain
-from rover_planner.mars_terrain import make_mars_terrain
+from benchmarks.measure import REPEATS, Figure, median_time, median_times
+from rover_physics.prediction.map_sweep import score_poses, sweep_map
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 ARCS = (14, 11, 11)
 """ENav's tree: so many curvatures on the first, second and third part of a path."""

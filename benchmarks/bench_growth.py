@@ -2,15 +2,15 @@
 
 import numba
 import numpy as np
-from measure import Figure, median_time
 
-from rover_physics.evaluation import evaluate
-from rover_physics.model_setup import set_up
-from rover_physics.rover import load_rover
-from rover_physics.sweep import sweep_path
-from rover_physics.terrain import Terrain
-from rover_planner.mars_terrain import make_mars_terrain
-from rover_planner.path_query import PathQueryOptions, answer_path_query
+from benchmarks.measure import Figure, median_time
+from rover_physics.prediction.evaluation import evaluate
+from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 
 def straight(length: float) -> np.ndarray:

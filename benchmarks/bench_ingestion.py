@@ -4,14 +4,14 @@ import array
 import time
 
 import numpy as np
-from measure import Figure, median_times
 from sensor_msgs.msg import PointCloud2
 
+from benchmarks.measure import Figure, median_times
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
-from rover_physics.terrain import Terrain
-from rover_planner.mars_terrain import make_mars_terrain
+from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 CELLS = 1_000
 RESOLUTION = 0.05

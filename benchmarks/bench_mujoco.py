@@ -6,15 +6,15 @@ from functools import lru_cache
 
 import numba
 import numpy as np
-from bench_poses import run_settling
-from grounds import random_poses, reference_ground
-from measure import Figure, median_time
-from mujoco_rover import DroppedRover, Settled
 
-from rover_physics.evaluation import evaluate
-from rover_physics.model_setup import set_up
-from rover_physics.rover import load_rover
-from rover_physics.settling import SETTLED
+from benchmarks.bench_poses import run_settling
+from benchmarks.grounds import random_poses, reference_ground
+from benchmarks.measure import Figure, median_time
+from benchmarks.mujoco_rover import DroppedRover, Settled
+from rover_physics.contact.settling import SETTLED
+from rover_physics.prediction.evaluation import evaluate
+from rover_physics.prediction.model_setup import set_up
+from rover_physics.rover.rover_file import load_rover
 
 POSES = 15
 """Poses on each ground."""

@@ -4,17 +4,17 @@ from collections.abc import Callable
 
 import numba
 import numpy as np
-from grounds import all_grounds, random_poses
-from measure import Figure, median_times
 
-from rover_physics.contact import find_contact, find_touch
-from rover_physics.evaluation import WORK, evaluate, new_work
-from rover_physics.linkage import place
-from rover_physics.model_setup import set_up
-from rover_physics.rim_scan import scan_rim
-from rover_physics.rover import load_rover
-from rover_physics.settling import SETTLED, SLOPED, settle, write_gap_rates
-from rover_physics.touch import AGAIN, COARSE, FULL, NEAR, QUICK
+from benchmarks.grounds import all_grounds, random_poses
+from benchmarks.measure import Figure, median_times
+from rover_physics.contact.contact_record import AGAIN, COARSE, FULL, NEAR, QUICK
+from rover_physics.contact.rim_scan import scan_rim
+from rover_physics.contact.settling import SETTLED, SLOPED, settle, write_gap_rates
+from rover_physics.contact.wheel import find_contact, find_touch
+from rover_physics.prediction.evaluation import WORK, evaluate, new_work
+from rover_physics.prediction.model_setup import set_up
+from rover_physics.rover.linkage import place
+from rover_physics.rover.rover_file import load_rover
 
 POSES = 2_000
 REPEATS = 15

@@ -2,16 +2,16 @@
 
 import numba
 import numpy as np
-from grounds import all_grounds, random_poses, reference_ground
-from measure import Figure, median_time, median_times
 
-from rover_physics.evaluation import WORK, evaluate, new_results, new_work
-from rover_physics.ground import find_roof, height_inside
-from rover_physics.linkage import place
-from rover_physics.model_setup import Setup, set_up
-from rover_physics.rover import load_rover
-from rover_physics.settling import SETTLED, settle, settle_from
-from rover_physics.terrain import Terrain
+from benchmarks.grounds import all_grounds, random_poses, reference_ground
+from benchmarks.measure import Figure, median_time, median_times
+from rover_physics.contact.settling import SETTLED, settle, settle_from
+from rover_physics.prediction.evaluation import WORK, evaluate, new_results, new_work
+from rover_physics.prediction.model_setup import Setup, set_up
+from rover_physics.rover.linkage import place
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.ground import find_roof, height_inside
 
 POSES = 4_000
 FLOOR_POSES = 400

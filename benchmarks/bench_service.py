@@ -11,13 +11,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from measure import Figure, quantile
-from planner_process import SERVER, Planner, planner_and_processes
-
-from rover_physics.terrain import Terrain
-from rover_planner.mars_terrain import make_mars_terrain
+from benchmarks.measure import Figure, quantile
+from benchmarks.planner_process import SERVER, Planner, planner_and_processes
+from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 ECHO = "/echo/can_traverse"
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)

@@ -8,11 +8,10 @@ import statistics
 import tempfile
 import time
 
-from bench_service import GOAL, START
-from measure import Figure
-from planner_process import SERVER, memory_of, planner_and_processes
-
-from rover_planner.mars_terrain import make_mars_terrain
+from benchmarks.bench_service import GOAL, START
+from benchmarks.measure import Figure
+from benchmarks.planner_process import SERVER, memory_of, planner_and_processes
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 STARTS = 5
 

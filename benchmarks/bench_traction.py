@@ -5,30 +5,26 @@ controller and server run in processes of their own; the controller's own diagno
 its updates took (estimate, build, solve, publish), by the clock, and how many cycles it missed.
 """
 
-import sys
 import threading
 import time
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from measure import Figure
-from planner_process import DOMAIN, SERVER, Planner, planner_and_processes
 from rclpy.context import Context
 from rclpy.node import Node
 
-from rover_physics.contact_estimate import Motion
+from benchmarks.measure import Figure
+from benchmarks.planner_process import DOMAIN, SERVER, Planner, planner_and_processes
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover import load_rover
-from rover_planner.mars_terrain import make_mars_terrain
-from rover_planner.qos import topic_qos
-from rover_planner.traction_controller import TractionController
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
-from rough_grounds import rocky
-from traction_states import drive_states
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traction.contact_ekf import Motion
+from rover_planner.nodes.traction_controller import TractionController
+from rover_planner.ros.qos import topic_qos
+from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.rough_grounds import rocky
+from support.traction_states import drive_states
 
 RATE = 100.0
 DURATION = 60.0

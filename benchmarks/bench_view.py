@@ -2,11 +2,10 @@
 
 import time
 
-from measure import Figure, median_time
-
-from rover_physics.rover import load_rover
-from rover_planner.mars_terrain import make_mars_terrain
-from rover_planner.viewer.session import ViewSession
+from benchmarks.measure import Figure, median_time
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.viewer.state.session import ViewSession
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 
 def measure() -> list[Figure]:

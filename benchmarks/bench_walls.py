@@ -1,14 +1,14 @@
 """Where the rover can't stand: poses along walls, and questions across one."""
 
 import numpy as np
-from measure import Figure, median_time
 
-from rover_physics.evaluation import evaluate
-from rover_physics.model_setup import set_up
-from rover_physics.rover import load_rover
-from rover_physics.settling import NOT_SETTLED
-from rover_physics.terrain import Terrain
-from rover_planner.path_query import PathQueryOptions, answer_path_query
+from benchmarks.measure import Figure, median_time
+from rover_physics.contact.settling import NOT_SETTLED
+from rover_physics.prediction.evaluation import evaluate
+from rover_physics.prediction.model_setup import set_up
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 
 POSES = 300
 HEIGHTS = (0.3, 0.5, 1.0)

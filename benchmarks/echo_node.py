@@ -1,6 +1,6 @@
 """A node that answers GetPlan at once: what a service costs that has nothing to work out.
 
-Run as python -m echo_node PLAN, with the serialised nav_msgs/Path to answer with.
+Run as python -m benchmarks.echo_node PLAN, with the serialised nav_msgs/Path to answer with.
 """
 
 import sys

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.terrain import Terrain, load_terrain
-from rover_planner.mars_terrain import make_mars_terrain
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 ROOT = Path(__file__).resolve().parents[1]
 REFERENCE = ROOT / "test" / "data" / "settled_a.npz"

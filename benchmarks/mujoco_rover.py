@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from rover_physics.names import WHEELS
-from rover_physics.rover import Rover
-from rover_physics.terrain import Terrain
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 
 TIMESTEP = 1e-3
 """Time step [s]; at 2 ms and more the rover trembles on contacts as stiff as these."""

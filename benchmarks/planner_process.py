@@ -17,11 +17,11 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
 from msg_adapters.paths import stamped_pose
-from rover_physics.terrain import Terrain, save_terrain
-from rover_planner.child_process import ChildProcess, stopping_children
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.demo.child_process import ChildProcess, stopping_children
 
 SERVER = "/traverse_server/can_traverse"
-HERE = FilePath(__file__).resolve().parent
+ROOT = FilePath(__file__).resolve().parents[1]
 DOMAIN = 101 + os.getpid() % 100
 """A ROS domain that tests do not use."""
 TIMEOUT = 300.0
@@ -84,7 +84,7 @@ class Processes:
             **environment,
             "ROS_DOMAIN_ID": str(DOMAIN),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "PYTHONPATH": os.pathsep.join([str(HERE), str(HERE.parent)]),
+            "PYTHONPATH": str(ROOT),
         }
 
     def start_server(self, terrain: Terrain, **parameters: object) -> ChildProcess:
@@ -93,7 +93,7 @@ class Processes:
         save_terrain(file, terrain)
         parameters = {"terrain_file": file, **parameters}
         words = [w for name, value in parameters.items() for w in ("-p", f"{name}:={value}")]
-        return self._start("rover_planner.traverse_server", "--ros-args", *words)
+        return self._start("rover_planner.nodes.traverse_server", "--ros-args", *words)
 
     def start_rover(
         self, terrain: Terrain, rate: float, start: Sequence[float], priority: int = 0
@@ -105,9 +105,12 @@ class Processes:
         file = self._folder / "rover_terrain.npz"
         save_terrain(file, terrain)
         for module, parameters in (
-            ("rover_planner.traction_controller", {"rate": rate, "realtime_priority": priority}),
             (
-                "rover_planner.rover_simulator",
+                "rover_planner.nodes.traction_controller",
+                {"rate": rate, "realtime_priority": priority},
+            ),
+            (
+                "rover_planner.nodes.rover_simulator",
                 {
                     "rate": rate,
                     "terrain_file": file,
@@ -124,7 +127,7 @@ class Processes:
         """Start a node that answers with a plan."""
         file = self._folder / "plan.cdr"
         file.write_bytes(serialize_message(plan))
-        return self._start("echo_node", str(file))
+        return self._start("benchmarks.echo_node", str(file))
 
     def _start(self, module: str, *arguments: str) -> ChildProcess:
         log = self._folder / f"{module}{len(self._children)}.log"

@@ -1,6 +1,6 @@
 """Run all benchmarks, print one table and write it as JSON: `make bench`.
 
-Run from the repository: python benchmarks/run.py [topic ...]; the topics are the files bench_*.py.
+Run from the repository: python -m benchmarks.run [topic ...]; the topics are the files bench_*.py.
 Each runs in a process of its own, so that none disturbs another's memory or threads.
 """
 
@@ -11,8 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from measure import Figure, show, write
 from rich.console import Console
+
+from benchmarks.measure import Figure, show, write
 
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE.parent / "bench_output" / "results.json"
@@ -22,7 +23,8 @@ def run_topic(name: str) -> list[Figure]:
     """Run one benchmark in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "figures.json"
-        subprocess.run([sys.executable, __file__, "--only", name, str(out)], check=True)
+        command = [sys.executable, "-m", "benchmarks.run", "--only", name, str(out)]
+        subprocess.run(command, check=True, cwd=HERE.parent)
         rows = json.loads(out.read_text())
     return [Figure(**{k: v for k, v in row.items() if k != "met"}) for row in rows]
 
@@ -30,7 +32,7 @@ def run_topic(name: str) -> list[Figure]:
 def main(arguments: list[str]) -> int:
     """Run what is asked for, or everything."""
     if arguments[:1] == ["--only"]:
-        write(importlib.import_module(arguments[1]).measure(), Path(arguments[2]))
+        write(importlib.import_module(f"benchmarks.{arguments[1]}").measure(), Path(arguments[2]))
         return 0
     names = [f"bench_{name.removeprefix('bench_')}" for name in arguments]
     names = names or sorted(path.stem for path in HERE.glob("bench_*.py"))

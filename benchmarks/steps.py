@@ -1,11 +1,12 @@
 """Which steps a rover climbs in MuJoCo, by the height of its bogie pivot. See docs/studies.md.
 
-Run from the repository, with pivots in m if not all: python benchmarks/steps.py [Z ...]
+Run from the repository, with pivots in m if not all: python -m benchmarks.steps [Z ...]
 """
 
 import sys
 
-from rover_physics.rover import Rover, load_rover
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
 from rover_planner.simulator.mujoco_engine import MujocoPlant
 from rover_planner.studies.objectives import step_ground, tallest_step
 from rover_planner.studies.rover_keys import vary

@@ -1,13 +1,12 @@
 """Wheel torques in closed loop: speed servos, equal torques and the programme, in MuJoCo.
 
-Run from the repository: python benchmarks/traction.py [--quick] [--out FOLDER]
+Run from the repository: python -m benchmarks.traction [--quick] [--out FOLDER]
 It needs the extra `bench`. docs/traction.md has what it says.
 """
 
 import argparse
 import json
 import multiprocessing
-import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
@@ -18,16 +17,14 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from rover_physics.rover import Rover, load_rover
-from rover_physics.terrain import Terrain
-from rover_planner.mujoco_plant import RoverPlant
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.traction_service import TractionService, settings_from_parameters
-
-TESTS = Path(__file__).resolve().parents[1] / "test"
-sys.path.insert(0, str(TESTS))
-from reference_drives import drive_ground  # noqa: E402
-from rough_grounds import bouldered, fractal  # noqa: E402
+from rover_planner.simulator.mujoco_rover import RoverPlant
+from rover_planner.traction.traction_service import TractionService, settings_from_parameters
+from support.reference_drives import drive_ground
+from support.rough_grounds import bouldered, fractal
 
 PERIOD = 0.02
 SPEED = 0.06

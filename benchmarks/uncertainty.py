@@ -1,23 +1,21 @@
 """How often maps drawn at random leave the bounds: the tables of docs/uncertainty.md.
 
-Run from the repository: python benchmarks/uncertainty.py [maps per case]
+Run from the repository: python -m benchmarks.uncertainty [maps per case]
 """
 
 import sys
 import time
-from pathlib import Path
 
 import numba
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rover_physics.rover import Rover, load_rover
-from rover_physics.sweep import sweep_path
-from rover_physics.uncertainty import BOUNDED_VALUES, bound_path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
-from uncertain_grounds import (
+from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from support.uncertain_grounds import (
     Outcome,
     draw_path,
     path_across,

@@ -1,21 +1,15 @@
 """The model against MuJoCo, as tables: settled cases and drives. See docs/validation.md.
 
-Run from the repository: python benchmarks/validate.py
+Run from the repository: python -m benchmarks.validate
 """
-
-import sys
-from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rover_physics.rover import load_rover
-
-TESTS = Path(__file__).resolve().parents[1] / "test"
-sys.path.insert(0, str(TESTS))
-from reference_cases import reference_predictions  # noqa: E402
-from reference_drives import PASSED, Drive, judge_drives  # noqa: E402
+from rover_physics.rover.rover_file import load_rover
+from support.reference_cases import reference_predictions
+from support.reference_drives import PASSED, Drive, judge_drives
 
 
 def settled_errors() -> dict[str, np.ndarray]:

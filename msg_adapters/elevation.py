@@ -26,7 +26,7 @@ from msg_adapters.gridding import (
     rounding_error,
     typical_spacing,
 )
-from rover_physics.terrain import Terrain
+from rover_physics.terrain.grid import Terrain
 
 CELL_HEIGHTS = ("max", "mean")
 LAYERS = ("friction", "elevation_std")

@@ -9,8 +9,8 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.paths import quaternions
-from rover_physics import grades
-from rover_physics.prediction import PathPrediction
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.traversability import traversability_class as grades
 
 PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
 WITH_TRACTION_CONTROL = ColorRGBA(r=0.95, g=0.65, b=0.10, a=1.0)

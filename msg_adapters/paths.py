@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
-from rover_physics.prediction import PathPrediction
+from rover_physics.prediction.path_prediction import PathPrediction
 
 _NORM_TOLERANCE = 0.01
 """How far the squared length of a quaternion may be from 1, as in tf2."""

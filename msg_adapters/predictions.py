@@ -9,7 +9,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.errors import MessageError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.prediction import PathPrediction
+from rover_physics.prediction.path_prediction import PathPrediction
 
 MEASURES = ("tip_over_ratio", "tip_over_force_angle")
 """Columns of the tip-over margin: the paper's ratio, and the force-angle measure over flat."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from rover_physics.plain import to_plain
+from rover_physics.numerics.plain_values import to_plain
 
 STATUS_NAME = "traverse_server: can the rover traverse"
 PER_WAYPOINT = (

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from rover_physics.errors import RoverError
+from rover_planner.command.extras import need
+from rover_planner.command.study import study
+from rover_planner.command.view import view
 from rover_planner.errors import DemoError, PlanningError
-from rover_planner.extras import need
-from rover_planner.study_command import study
-from rover_planner.view_command import view
 
 BAD_INPUT = 2
 """Exit code when the input makes no sense, with one line on stderr that says why."""
@@ -92,13 +92,13 @@ def predict(
 
     Exit code 0 when it ran, whatever the verdict; 2 for bad input.
     """
-    from rover_physics.grades import grade_judged
-    from rover_physics.rover import load_rover
-    from rover_physics.terrain import load_terrain
-    from rover_physics.torque_ranges import find_torque_ranges
-    from rover_physics.trap import judge_path
-    from rover_planner.arm_options import read_arm_angles
-    from rover_planner.prediction_files import read_poses, write_prediction
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.terrain.grid import load_terrain
+    from rover_physics.traversability.judge_path import judge_path
+    from rover_physics.traversability.torque_ranges import find_torque_ranges
+    from rover_physics.traversability.traversability_class import grade_judged
+    from rover_planner.command.arm_options import read_arm_angles
+    from rover_planner.command.prediction_files import read_poses, write_prediction
     from rover_planner.progress import show_progress
 
     model = load_rover(rover)
@@ -154,9 +154,9 @@ def reach(
 
     Exit code 0 when it ran, whatever the answer; 2 for bad input.
     """
-    from rover_physics.reach import judge_reach
-    from rover_physics.rover import load_rover
-    from rover_physics.terrain import load_terrain
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.terrain.grid import load_terrain
+    from rover_physics.traversability.reach import judge_reach
     from rover_planner.progress import show_progress
 
     model, ground = load_rover(rover), load_terrain(terrain)
@@ -195,9 +195,9 @@ def terrain(
     ] = 0.02,
 ) -> None:
     """Make a Mars-like terrain with fractal relief, craters and rocks."""
-    from rover_physics.terrain import save_terrain
-    from rover_planner.mars_terrain import make_mars_terrain
+    from rover_physics.terrain.grid import save_terrain
     from rover_planner.progress import show_progress
+    from rover_planner.worlds.mars_terrain import make_mars_terrain
 
     with show_progress() as progress:
         progress("make the terrain")
@@ -224,7 +224,7 @@ def demo(
     seed: Annotated[int, typer.Option(help="Seed of the terrain and the goals.")] = 1,
 ) -> None:
     """Ask a running traverse_server over ROS 2 for several goals, and picture its answers."""
-    from rover_planner.demo import run_demo
+    from rover_planner.demo.demo import run_demo
 
     run_demo(map_file, out, rover, seed)
 
@@ -238,8 +238,8 @@ def figure4(
 ) -> None:
     """Draw Figure 4 of the paper: how the torque of one wheel changes the loads of all."""
     need("matplotlib", "the picture")
-    from rover_physics.rover import load_rover
-    from rover_planner.figure4 import draw_figure4
+    from rover_physics.rover.rover_file import load_rover
+    from rover_planner.figures.figure4 import draw_figure4
     from rover_planner.progress import show_progress
 
     model = load_rover(rover)

@@ -21,7 +21,7 @@ def terrain_dir() -> Path:
 @pytest.fixture
 def ros():
     """Return a ROS context of the test's own; nodes spin in the background and end with it."""
-    from ros_fixtures import RosRun
+    from support.ros_fixtures import RosRun
 
     run = RosRun()
     yield run
@@ -31,7 +31,7 @@ def ros():
 @pytest.fixture
 def client(ros):
     """Return the other side of the traverse server's contract."""
-    from planner_client import PlannerClient
+    from support.planner_client import PlannerClient
 
     return ros.spin(PlannerClient(ros))
 
@@ -41,8 +41,8 @@ def start_server(ros):
     """Return a function that starts a traverse server with parameters."""
     from rclpy.parameter import Parameter
 
-    from rover_physics.sweep import warm_up
-    from rover_planner.traverse_server import TraverseServer
+    from rover_physics.warm_up import warm_up
+    from rover_planner.nodes.traverse_server import TraverseServer
 
     warm_up()
 
@@ -62,7 +62,7 @@ def server(start_server):
 @pytest.fixture
 def mapped(server, client):
     """Return a traverse server that has a passable map."""
-    from grounds import make_terrain, waves
+    from support.grounds import make_terrain, waves
 
     client.send_terrain(make_terrain(waves))
     return server

@@ -2,7 +2,7 @@
 
 from msg_adapters.elevation import CELL_HEIGHTS
 from rover_planner.parameters.spec import ParameterSpec
-from rover_planner.qos import MAP_DURABILITIES
+from rover_planner.ros.qos import MAP_DURABILITIES
 
 MAP_INTAKE = (
     ParameterSpec(

@@ -1,6 +1,6 @@
 """Parameters of `/traverse_server`."""
 
-from rover_physics.uncertainty import SIGMAS
+from rover_physics.bounds.path import SIGMAS
 from rover_planner.parameters.of_maps import MAP_INTAKE
 from rover_planner.parameters.spec import ParameterSpec
 

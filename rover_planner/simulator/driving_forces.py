@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
-from rover_physics.prediction import PathPrediction
-from rover_physics.traction_rows import BalanceWriter, MeasuredState
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.traction.balance import BalanceWriter, MeasuredState
 
 Floats = NDArray[np.float64]
 ROUNDS = 6

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.rover import Rover
-from rover_physics.terrain import Terrain
-from rover_planner.mujoco_plant import RoverPlant
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.simulator.mujoco_rover import RoverPlant
 from rover_planner.simulator.plant import PlantState
 
 Floats = NDArray[np.float64]

@@ -11,14 +11,14 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits import find_reasons
+from rover_physics.forces.soil import coulomb_slip
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.prediction import PathPrediction
-from rover_physics.rover import Rover
-from rover_physics.soil import coulomb_slip
-from rover_physics.sweep import sweep_path
-from rover_physics.terrain import Terrain
-from rover_physics.traction_rows import BalanceWriter
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traction.balance import BalanceWriter
+from rover_physics.traversability.verdict import find_reasons
 from rover_planner.errors import PlanningError
 from rover_planner.simulator.driving_forces import DrivingForces, find_driving_forces
 from rover_planner.simulator.plant import PlantState, quaternion

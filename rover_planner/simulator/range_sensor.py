@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.terrain import Terrain
+from rover_physics.terrain.grid import Terrain
 
 Floats = NDArray[np.float64]
 RAYS = 1440

@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.rover import Rover, load_rover
-from rover_physics.terrain import Terrain, load_terrain
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
-from rover_planner.mars_terrain import make_mars_terrain
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.plant import Plant, PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 Floats = NDArray[np.float64]
 ENGINES = ("quasi_static", "mujoco")

@@ -6,12 +6,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits import judge
-from rover_physics.model_setup import set_up
-from rover_physics.rover import Rover
-from rover_physics.sweep import sweep_path
-from rover_physics.terrain import Terrain, load_terrain
-from rover_physics.trap import judge_path
+from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.verdict import judge
 from rover_planner.studies.study_file import Study, StudyDrive
 
 Floats = NDArray[np.float64]

@@ -5,8 +5,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rover_physics.errors import RoverFileError
-from rover_physics.rover import Rover, rover_from_dict
-from rover_planner.viewer.rover_values import rover_to_dict
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import rover_from_dict
+from rover_planner.studies.rover_values import rover_to_dict
 
 Key = tuple[str | int, ...]
 AXES = ("x", "y", "z")

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rover_physics.config_section import ConfigSection
 from rover_physics.errors import RoverFileError
-from rover_physics.rover import Rover, load_rover
-from rover_physics.soil_file import soil_named
-from rover_physics.yaml_file import read_yaml
+from rover_physics.files.config_section import ConfigSection
+from rover_physics.files.yaml_file import read_yaml
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.soil_file import soil_named
 from rover_planner.studies.rover_keys import Key, find_key
-from rover_planner.viewer.rover_values import get_value, rover_to_dict
+from rover_planner.studies.rover_values import get_value, rover_to_dict
 
 OBJECTIVES = {
     "worst_utilisation": ("smallest", "largest friction utilisation on the drives", ""),

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rover_planner.pictures import STYLE, save_figure
+from rover_planner.figures.pictures import STYLE, save_figure
 from rover_planner.studies.runner import StudyResult
 from rover_planner.studies.study_file import OBJECTIVES
 

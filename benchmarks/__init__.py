@@ -1,0 +1,1 @@
+"""Benchmarks: what the product costs, and how it compares with MuJoCo."""

@@ -1,0 +1,103 @@
+"""Bounds on how far the belly stays above ground whose heights are known within bounds."""
+
+import numpy as np
+
+from rover_physics.contact.clearance import POINTS, point_of_underside
+from rover_physics.numerics.kernels import kernel
+from rover_physics.terrain.ground import elevation_of, height_at_cell, look_up
+
+
+@kernel
+def bound_clearance(ground, error, linkage, spread, bounds):
+    """Write the smallest and largest possible clearance [m] into bounds (2,); NaN over nothing.
+
+    Above each cell the underside is lowest where each wheel is at the end of its interval that
+    lowers it there. The rover is placed at its nominal configuration. Second-order terms of the
+    turn, and the shift of the outline that goes with it, are added at their largest.
+    """
+    placement, belly = spread.model.placement, linkage.belly
+    R, origin = placement.R, placement.origin
+    bounds[0] = bounds[1] = np.nan
+    if not R[2, 2] > 0.0:
+        return
+    turn = max(spread.q_high[1] - spread.q[1], spread.q[1] - spread.q_low[1])
+    turn += max(spread.q_high[2] - spread.q[2], spread.q[2] - spread.q_low[2])
+    half = 0.5 * np.hypot(belly[2] - belly[1], belly[4] - belly[3])
+    reach = np.hypot(half + max(abs(belly[1] + belly[2]), abs(belly[3] + belly[4])), belly[0])
+    shift = turn * (abs(belly[0]) + reach * (np.hypot(R[0, 2], R[1, 2]) + turn))
+    bend = turn * turn * reach
+    slope_x, slope_y = -R[0, 2] / R[2, 2], -R[1, 2] / R[2, 2]
+    cell = 1.0 / ground.inverse_resolution
+    extent = np.hypot(half + reach, belly[0]) + shift
+    first_j = max(int(np.ceil((origin[0] - extent - ground.x0) / cell)), 0)
+    last_j = min(int(np.floor((origin[0] + extent - ground.x0) / cell)), ground.columns - 1)
+    first_i = max(int(np.ceil((origin[1] - extent - ground.y0) / cell)), 0)
+    last_i = min(int(np.floor((origin[1] + extent - ground.y0) / cell)), ground.rows - 1)
+    least, most = np.inf, np.inf
+    for i in range(first_i, last_i + 1):
+        dy = ground.y0 + i * cell - origin[1]
+        for j in range(first_j, last_j + 1):
+            dx = ground.x0 + j * cell - origin[0]
+            z = belly[0] / R[2, 2] + slope_x * dx + slope_y * dy
+            along = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * z
+            across = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * z
+            inside = min(along - belly[1], belly[2] - along, across - belly[3], belly[4] - across)
+            height = elevation_of(ground, i, j)
+            if inside < -shift or height != height:
+                continue
+            above = origin[2] + z - height
+            lowered, raised = _plane_change(R, spread, dx, dy, z)
+            wrong = elevation_of(error, i, j)
+            least = min(least, above - wrong + lowered - bend)
+            if inside >= shift:
+                most = min(most, above + wrong + raised + bend)
+    if most == np.inf:
+        least, most = _bound_points(ground, error, spread, belly, shift, bend, least)
+    if least < np.inf:
+        bounds[0], bounds[1] = least, most
+
+
+@kernel
+def _bound_points(ground, error, spread, belly, shift, bend, least):
+    """Return smaller of `least` and the least clearance below POINTS, and the most there [m].
+
+    For outlines with no known cell inside, where `belly_clearance` looks at these points.
+    """
+    R, origin = spread.model.placement.R, spread.model.placement.origin
+    most = np.inf
+    for k in range(POINTS):
+        x, y, z = point_of_underside(R, origin, belly, k)
+        height, slope_x, slope_y = look_up(ground, x, y)
+        if height != height:
+            continue
+        gx = (x - ground.x0) * ground.inverse_resolution
+        gy = (y - ground.y0) * ground.inverse_resolution
+        wrong = height_at_cell(error, gx, gy) + bend + shift * (abs(slope_x) + abs(slope_y))
+        lowered, raised = _plane_change(R, spread, x - origin[0], y - origin[1], z - origin[2])
+        least = min(least, z - height + lowered - wrong)
+        most = min(most, z - height + raised + wrong)
+    return least, most
+
+
+@kernel
+def _plane_change(R, spread, dx, dy, z):
+    """Return how far the plane of the underside at (dx, dy) from the origin may fall and rise [m].
+
+    A turn of d about a horizontal axis a raises the plane's point at distance p by (a x p) d seen
+    along its normal, which is what it rises vertically divided by the normal's z.
+    """
+    length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
+    nx, ny = R[0, 2] / R[2, 2], R[1, 2] / R[2, 2]
+    # roll turns about the body's x axis, pitch about the horizontal axis across the heading
+    ax, ay, az = R[0, 0], R[1, 0], R[2, 0]
+    by_roll = nx * (ay * z - az * dy) + ny * (az * dx - ax * z) + (ax * dy - ay * dx)
+    ax, ay = -R[1, 0] / length, R[0, 0] / length
+    by_pitch = nx * (ay * z) + ny * (-ax * z) + (ax * dy - ay * dx)
+    lowered, raised = 0.0, 0.0
+    for wheel in range(6):
+        rate = spread.response[0, wheel]
+        rate += by_roll * spread.response[1, wheel] + by_pitch * spread.response[2, wheel]
+        low, high = rate * spread.low[wheel], rate * spread.high[wheel]
+        lowered += min(low, high)
+        raised += max(low, high)
+    return lowered, raised

@@ -1,0 +1,287 @@
+"""Bounds on where the wheels touch ground whose heights are known within bounds.
+
+A point of the rim can touch only where its gap, less the error of the height difference, is
+smaller than all gaps on the way from there to the nearest point. The error of a difference is that
+of cells that err independently; cells that err alike, as neighbours do, differ by less. It also
+counts that the wheel moves along as the others rise and fall, which changes gaps by the slope.
+"""
+
+import numpy as np
+
+from rover_physics.contact.circle_search import search_circle
+from rover_physics.contact.wheel import COMPLIANCE
+from rover_physics.contact.wheel_samples import MOST_ANGLES, MOST_CIRCLES
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.records import record_type
+from rover_physics.terrain.ground import elevation_of, height_at_cell, is_cell_on_map
+
+RUNGS = 4
+"""Places between a point and the nearest one that it is held against."""
+STEEPEST = np.radians(70.0)
+"""Contact angle from which on steeper ones count as that steep, where the wheel moves along."""
+SQRT2 = np.sqrt(2.0)
+HALVINGS = 5
+"""How often the way from the last sample that may touch to the first that can't is halved."""
+
+RIM = record_type(
+    ("gap", float, (MOST_CIRCLES, MOST_ANGLES)),  # vertical gap of each sample [m]
+    ("lowest", float, (MOST_CIRCLES, MOST_ANGLES)),  # angle of a smallest gap near, NaN if none
+    ("largest_error", float),  # of the ground anywhere near [m]
+    ("reach", float),  # how far the wheel may move forward or back [m]
+    ("nearest", float, (MOST_CIRCLES,)),  # smallest gap of each circle [m]
+    ("nearest_angle", float, (MOST_CIRCLES,)),  # contact angle there [rad]
+)
+"""The gaps all around a wheel."""
+
+CONTACTS = record_type(
+    ("rim", RIM),
+    ("angle", float, (6,)),  # nominal contact angle [rad]
+    ("angle_low", float, (6,)),  # smallest possible [rad]
+    ("angle_high", float, (6,)),  # largest possible [rad]
+    ("lateral", float, (6,)),  # nominal place of the contact along the axis [m]
+    ("lateral_low", float, (6,)),  # smallest possible [m]
+    ("lateral_high", float, (6,)),  # largest possible [m]
+)
+"""Where the wheels may touch."""
+
+
+@kernel
+def bound_contacts(ground, error, samples, placement, angles, points, reach, contacts):
+    """Write the possible contacts of all wheels of a placed rover into `contacts`.
+
+    `error` is a GROUND whose elevation bounds the error of each cell's height [m]; angles (6,)
+    [rad] and points (6, 3) [m] are the nominal contacts; reach (6,) bounds how far the wheels move
+    along [m].
+    """
+    R, rim = placement.R, contacts.rim
+    for wheel in range(6):
+        lateral = 0.0
+        for i in range(3):
+            lateral += R[i, 1] * (points[wheel, i] - placement.centres[wheel, i])
+        angle = angles[wheel]
+        contacts.angle[wheel] = contacts.angle_low[wheel] = contacts.angle_high[wheel] = angle
+        contacts.lateral[wheel] = lateral
+        contacts.lateral_low[wheel] = contacts.lateral_high[wheel] = lateral
+        rim.reach = reach[wheel]
+        rim.largest_error = _find_largest_error(ground, error, samples, placement, wheel)
+        if max(rim.largest_error, rim.reach) > 0.0:
+            _look_around(ground, samples, placement, wheel, angle, rim)
+            _widen(ground, error, samples, placement, wheel, contacts)
+
+
+@kernel
+def _find_largest_error(ground, error, samples, placement, wheel):
+    """Return the largest error [m] of a height within reach of a wheel."""
+    reach = samples.reach * ground.inverse_resolution
+    gx = (placement.centres[wheel, 0] - ground.x0) * ground.inverse_resolution
+    gy = (placement.centres[wheel, 1] - ground.y0) * ground.inverse_resolution
+    largest = 0.0
+    for i in range(max(int(gy - reach), 0), min(int(gy + reach) + 2, error.rows)):
+        for j in range(max(int(gx - reach), 0), min(int(gx + reach) + 2, error.columns)):
+            wrong = elevation_of(error, i, j)
+            if wrong > largest:
+                largest = wrong
+    return largest
+
+
+@kernel
+def _look_around(ground, samples, placement, wheel, angle, rim):
+    """Write the gaps of all samples of a wheel, and where each circle comes nearest."""
+    s, c = np.sin(angle), np.cos(angle)
+    for m in range(samples.circles):
+        gap, gx, gy = _gap_at(ground, samples, placement, wheel, m, s, c)
+        rim.nearest[m], rim.nearest_angle[m] = np.inf, angle
+        if gap == gap:
+            rim.nearest[m] = gap
+        for k in range(samples.rows):
+            gap, gx, gy = _gap_at(
+                ground, samples, placement, wheel, m, samples.sines[k], samples.cosines[k]
+            )
+            rim.gap[m, k] = gap
+        _find_lowest(ground, samples, placement, wheel, m, rim)
+
+
+@kernel
+def _find_lowest(ground, samples, placement, wheel, m, rim):
+    """Write where the gap of circle m is smallest near each sample that is below its neighbours.
+
+    Beside a face or on an edge much lies between two samples.
+    """
+    for k in range(samples.rows):
+        gap = rim.gap[m, k]
+        rim.lowest[m, k] = np.nan
+        before = rim.gap[m, max(k - 1, 0)]
+        after = rim.gap[m, min(k + 1, samples.rows - 1)]
+        if gap != gap or gap > before or gap > after:
+            continue
+        gap, s, c, _, _ = search_circle(
+            ground, samples, placement, wheel, samples.laterals[m],
+            samples.sines[k], samples.cosines[k],
+        )  # fmt: skip
+        angle = np.arctan2(s, c)
+        rim.lowest[m, k] = angle
+        if gap < rim.nearest[m]:
+            rim.nearest[m], rim.nearest_angle[m] = gap, angle
+
+
+@kernel
+def _gap_at(ground, samples, placement, wheel, m, s, c):
+    """Return the gap [m] at one point of the rim, NaN off known ground, and its place in cells."""
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    across, radius = samples.laterals[m], samples.radius
+    x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
+    y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
+    z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+    gx = (x - ground.x0) * ground.inverse_resolution
+    gy = (y - ground.y0) * ground.inverse_resolution
+    if not is_cell_on_map(ground, gx, gy):
+        return np.nan, gx, gy
+    return z - height_at_cell(ground, gx, gy), gx, gy
+
+
+@kernel
+def _error_between(error, ax, ay, bx, by):
+    """Return a bound on the error [m] of the height difference of two places, in cells.
+
+    Exact for errors that are independent from cell to cell, too large for such that are alike.
+    """
+    total = 0.0
+    for place in range(2):
+        gx, gy = (ax, ay) if place == 0 else (bx, by)
+        other_x, other_y = (bx, by) if place == 0 else (ax, ay)
+        i = min(int(gy), error.rows - 2)
+        j = min(int(gx), error.columns - 2)
+        for row in range(i, i + 2):
+            for column in range(j, j + 2):
+                here = _weight(gx, gy, row, column)
+                there = _weight(other_x, other_y, row, column)
+                if place == 0 or there == 0.0:
+                    change = (here - there) * elevation_of(error, row, column)
+                    total += change * change
+    return np.sqrt(total)
+
+
+@kernel
+def _weight(gx, gy, row, column):
+    """Return the share of a cell in the bilinear height at a place."""
+    return max(0.0, 1.0 - abs(gx - column)) * max(0.0, 1.0 - abs(gy - row))
+
+
+@kernel
+def _angle_of_row(samples, k):
+    return np.pi * (k / (samples.rows - 1) - 0.5)
+
+
+@kernel
+def _widen(ground, error, samples, placement, wheel, contacts):
+    """Widen the contact of a wheel to all points of its rim that may touch."""
+    rim = contacts.rim
+    best = 0
+    for m in range(samples.circles):
+        if rim.nearest[m] < rim.nearest[best]:
+            best = m
+    give = COMPLIANCE * samples.radius
+    first, last, largest = contacts.lateral[wheel], contacts.lateral[wheel], 0.0
+    for m in range(samples.circles):
+        reach = _error_to_circle(ground, error, samples, placement, wheel, m, best, rim)
+        largest = max(largest, reach)
+        if rim.nearest[m] - rim.nearest[best] <= reach + give:
+            first, last = min(first, samples.laterals[m]), max(last, samples.laterals[m])
+            _widen_angles(ground, error, samples, placement, wheel, m, contacts)
+    # Circles closer to each other than the give share the load: small errors shift it a little.
+    share = min(1.0, largest / give)
+    middle = contacts.lateral[wheel]
+    contacts.lateral_low[wheel] = middle + share * (first - middle)
+    contacts.lateral_high[wheel] = middle + share * (last - middle)
+
+
+@kernel
+def _error_to_circle(ground, error, samples, placement, wheel, m, best, rim):
+    """Return a bound on the error [m] between the gaps of the nearest points of two circles."""
+    here, there = rim.nearest_angle[m], rim.nearest_angle[best]
+    gap, ax, ay = _gap_at(ground, samples, placement, wheel, m, np.sin(here), np.cos(here))
+    gap, bx, by = _gap_at(ground, samples, placement, wheel, best, np.sin(there), np.cos(there))
+    return np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, here, there))
+
+
+@kernel
+def _shift_between(rim, angle, other):
+    """Return how much the gaps at two contacts change apart [m] as the wheel moves along."""
+    angle = min(max(angle, -STEEPEST), STEEPEST)
+    other = min(max(other, -STEEPEST), STEEPEST)
+    return rim.reach * abs(np.tan(angle) - np.tan(other))
+
+
+@kernel
+def _widen_angles(ground, error, samples, placement, wheel, m, contacts):
+    """Widen the angles of a wheel to those at which circle m may touch."""
+    rim = contacts.rim
+    nearest = rim.nearest_angle[m]
+    contacts.angle_low[wheel] = min(contacts.angle_low[wheel], nearest)
+    contacts.angle_high[wheel] = max(contacts.angle_high[wheel], nearest)
+    for side in range(2):
+        inside, outside = _find_farthest(ground, error, samples, placement, wheel, m, side, rim)
+        if contacts.angle_low[wheel] <= outside <= contacts.angle_high[wheel]:
+            continue
+        for _ in range(HALVINGS):
+            middle = 0.5 * (inside + outside)
+            if _may_touch(ground, error, samples, placement, wheel, m, middle, nearest, rim):
+                inside = middle
+            else:
+                outside = middle
+        contacts.angle_low[wheel] = min(contacts.angle_low[wheel], outside)
+        contacts.angle_high[wheel] = max(contacts.angle_high[wheel], outside)
+
+
+@kernel
+def _find_farthest(ground, error, samples, placement, wheel, m, side, rim):
+    """Return the last sampled angle [rad] at which circle m may touch, and the next outwards.
+
+    Behind the nearest point (side 0) or ahead of it (1); samples count with the smallest gap
+    near them.
+    """
+    nearest = rim.nearest_angle[m]
+    away = -1.0 if side == 0 else 1.0
+    spacing = np.pi / (samples.rows - 1)
+    outside = nearest
+    for step in range(samples.rows):
+        k = step if side == 0 else samples.rows - 1 - step
+        angle = _angle_of_row(samples, k)
+        if away * (angle - nearest) <= 0.0:
+            break
+        outside = angle
+        lowest = rim.lowest[m, k]
+        doubt = np.hypot(SQRT2 * rim.largest_error, _shift_between(rim, angle, nearest))
+        if lowest != lowest and rim.gap[m, k] - rim.nearest[m] > doubt:
+            continue
+        if lowest == lowest and _may_touch(
+            ground, error, samples, placement, wheel, m, lowest, nearest, rim
+        ):
+            return lowest, _clip_angle(max(away * angle, away * lowest + spacing) * away)
+        if _may_touch(ground, error, samples, placement, wheel, m, angle, nearest, rim):
+            return angle, _clip_angle(angle + away * spacing)
+    return nearest, outside
+
+
+@kernel
+def _clip_angle(angle):
+    return min(max(angle, -0.5 * np.pi), 0.5 * np.pi)
+
+
+@kernel
+def _may_touch(ground, error, samples, placement, wheel, m, angle, nearest, rim):
+    """Tell whether circle m may touch at `angle` [rad] rather than on the way to `nearest`."""
+    s, c = np.sin(angle), np.cos(angle)
+    gap, ax, ay = _gap_at(ground, samples, placement, wheel, m, s, c)
+    if gap != gap:
+        return False
+    for rung in range(RUNGS):
+        other = angle + (nearest - angle) * ((rung + 1.0) / RUNGS) ** 2
+        s, c = np.sin(other), np.cos(other)
+        lower, bx, by = _gap_at(ground, samples, placement, wheel, m, s, c)
+        if not gap - lower > 0.0:
+            continue
+        doubt = np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, angle, other))
+        if gap - lower > doubt:
+            return False
+    return True

@@ -1,0 +1,373 @@
+"""Bounds on forces and tip-over angles over all configurations and contacts a rover may have.
+
+What the forces depend on are 18 numbers: the heights of the wheels, through the response of the
+configuration, and angle and place of each contact. What either end of the interval of each number
+changes tells where a force is extreme, and there the balance is solved. Heights and
+places go to their worst ends together, whatever their correlation; angles as errors under
+different wheels do that know nothing of each other: to the point of equal deviation at which the
+linear change is largest.
+
+Source of the latter: Hasofer and Lind, "Exact and invariant second-moment code format", Journal of
+the Engineering Mechanics Division 100(1), 1974.
+"""
+
+import numpy as np
+
+from rover_physics.forces.equilibrium import FREE_FORCES, balance_forces
+from rover_physics.forces.soil import solve_wheel
+from rover_physics.forces.stability import CORNERS, measure_edge
+from rover_physics.forces.torques import (
+    EQUAL,
+    apply_torques,
+    minimise_friction,
+    take_equal_torques,
+)
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.records import record_type
+from rover_physics.prediction.evaluation import find_tip_over
+from rover_physics.rover.linkage import place, place_masses
+from rover_physics.terrain.ground import SOIL_NUMBERS, copy_soil, friction_at, soil_row_at
+
+HEIGHT, ANGLE, PLACE = 0, 6, 12
+"""Where the heights of the wheels [m], the angles [rad] and the places of their contacts [m] begin
+among the inputs."""
+INPUTS = 18
+LOAD, PULL, SIDE, USE, TIP = 0, 6, 12, 18, 24
+"""Where loads, tractions, lateral forces (all in weights), utilisations and tip-over angles [rad]
+begin among the outputs."""
+OUTPUTS = 24 + CORNERS
+LEAST_LOAD = 1e-6
+"""Load, in weights, that counts where there is less, so that one may divide by it."""
+TOGETHER = 2.0
+"""Sum of the squares of the contact angles' deviations, in their intervals: the errors under
+different wheels are taken as independent, so that the probability of a sum of them is that of one
+deviation at the square root of this, not that of all angles at their ends at once."""
+MOST_SOILS = 32
+"""Largest number of soils on a map, the default included."""
+
+BOX = record_type(
+    ("base", float, (INPUTS,)),  # the nominal inputs
+    ("low", float, (INPUTS,)),  # their smallest
+    ("high", float, (INPUTS,)),  # and largest values
+    ("at", float, (INPUTS,)),  # a point of the box
+    ("value", float, (OUTPUTS,)),  # the outputs there
+    ("base_value", float, (OUTPUTS,)),  # the nominal outputs
+    ("gain_low", float, (INPUTS, OUTPUTS)),  # change of the outputs with one input at its lowest
+    ("gain_high", float, (INPUTS, OUTPUTS)),  # the same with one at its highest
+    ("smallest", float, (OUTPUTS,)),  # smallest outputs
+    ("largest", float, (OUTPUTS,)),  # largest outputs
+    ("mu_low", float, (6,)),  # smallest friction coefficient that a wheel may touch
+    ("mu_high", float, (6,)),  # largest one
+    ("soils", np.int64, (6, MOST_SOILS)),  # rows of the soils that it may touch
+    ("soil_count", np.int64, (6,)),  # number of these
+    ("soil", float, (SOIL_NUMBERS,)),  # one of them
+    ("aim", float, (OUTPUTS,)),  # weights of the outputs in the sum that is taken to its extreme
+    ("gain", float, (INPUTS,)),  # change of that sum with one input at its better end
+    ("end", float, (INPUTS,)),  # that end
+    ("columns", np.int64),  # columns of the balance that the torque policy needs
+)
+"""The box of inputs, and the outputs over it."""
+
+
+@kernel
+def bound_forces(ground, linkage, samples, settings, pose, spread, contacts, box):
+    """Write smallest and largest outputs into `box`; False where the balance is singular.
+
+    Under policy optimal the differences of the torques are those that are best for the nominal
+    rover, the common pull makes up for the rest: the best torques of any other rover need
+    no more friction than these. On soil they need no more than equal ones.
+    """
+    _fill_box(spread, contacts, box)
+    place(linkage, pose[0], pose[1], pose[2], spread.q, spread.model.placement)
+    _find_grounds(ground, samples, settings, spread.model.placement, contacts, box)
+    box.columns = 1 if settings.policy == EQUAL or settings.on_soil else 1 + FREE_FORCES
+    if not _choose_torques(ground, linkage, settings, pose, spread, box):
+        return False
+    for output in range(OUTPUTS):
+        box.base_value[output] = box.smallest[output] = box.largest[output] = box.value[output]
+    if not _find_gains(ground, linkage, settings, pose, spread, box):
+        return False
+    for wheel in range(6):
+        _bound_output(ground, linkage, settings, pose, LOAD + wheel, spread, box)
+        if wheel == 0 or box.columns > 1:
+            _bound_output(ground, linkage, settings, pose, PULL + wheel, spread, box)
+        else:
+            box.smallest[PULL + wheel] = box.smallest[PULL]
+            box.largest[PULL + wheel] = box.largest[PULL]
+        _bound_use(ground, linkage, settings, pose, wheel, spread, box)
+    for edge in range(CORNERS):
+        _bound_output(ground, linkage, settings, pose, TIP + edge, spread, box)
+    return True
+
+
+@kernel
+def _fill_box(spread, contacts, box):
+    for wheel in range(6):
+        box.base[HEIGHT + wheel] = 0.0
+        box.low[HEIGHT + wheel], box.high[HEIGHT + wheel] = spread.low[wheel], spread.high[wheel]
+        box.base[ANGLE + wheel] = contacts.angle[wheel]
+        box.low[ANGLE + wheel] = contacts.angle_low[wheel]
+        box.high[ANGLE + wheel] = contacts.angle_high[wheel]
+        box.base[PLACE + wheel] = contacts.lateral[wheel]
+        box.low[PLACE + wheel] = contacts.lateral_low[wheel]
+        box.high[PLACE + wheel] = contacts.lateral_high[wheel]
+
+
+@kernel
+def _find_grounds(ground, samples, settings, placement, contacts, box):
+    """Write friction and soils of all cells that each wheel of a placed rover may touch."""
+    cell = 1.0 / ground.inverse_resolution
+    layered = ground.friction != 0 or ground.soil != 0
+    for wheel in range(6):
+        left, right, near, far = _find_footprint(samples, placement, wheel, contacts)
+        box.mu_low[wheel], box.mu_high[wheel] = np.inf, 0.0
+        box.soil_count[wheel] = 0
+        columns = int((right - left) / cell) + 2 if layered else 1
+        rows = int((far - near) / cell) + 2 if layered else 1
+        for i in range(rows):
+            for j in range(columns):
+                x, y = min(left + j * cell, right), min(near + i * cell, far)
+                mu = friction_at(ground, x, y, settings.friction)
+                box.mu_low[wheel] = min(box.mu_low[wheel], mu)
+                box.mu_high[wheel] = max(box.mu_high[wheel], mu)
+                _note_soil(soil_row_at(ground, x, y), wheel, box)
+
+
+@kernel
+def _find_footprint(samples, placement, wheel, contacts):
+    """Return smallest and largest x and y [m] of the points of a wheel that may touch."""
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    left = near = np.inf
+    right = far = -np.inf
+    for corner in range(4):
+        angle, across = contacts.angle_low[wheel], contacts.lateral_low[wheel]
+        if corner > 1:
+            angle = contacts.angle_high[wheel]
+        if corner % 2 == 1:
+            across = contacts.lateral_high[wheel]
+        s, c = samples.radius * np.sin(angle), samples.radius * np.cos(angle)
+        x = centres[wheel, 0] + across * R[0, 1] + s * forward[0] - c * up[0]
+        y = centres[wheel, 1] + across * R[1, 1] + s * forward[1] - c * up[1]
+        left, right, near, far = min(left, x), max(right, x), min(near, y), max(far, y)
+    return left, right, near, far
+
+
+@kernel
+def _note_soil(row, wheel, box):
+    for k in range(box.soil_count[wheel]):
+        if box.soils[wheel, k] == row:
+            return
+    box.soils[wheel, box.soil_count[wheel]] = row
+    box.soil_count[wheel] += 1
+
+
+@kernel
+def _choose_torques(ground, linkage, settings, pose, spread, box):
+    """Balance the nominal rover and keep its torques for all others; False where singular."""
+    work = spread.model
+    for k in range(INPUTS):
+        box.at[k] = box.base[k]
+    work.search.y[:] = 0.0
+    work.search.resistance[:] = 0.0
+    if not _evaluate(ground, linkage, settings, pose, spread, box):
+        return False
+    if box.columns > 1:
+        weight = linkage.mass * linkage.gravity
+        for wheel in range(6):
+            work.search.mu[wheel] = box.mu_low[wheel]
+        minimise_friction(
+            work.balance, settings.allowed_torque / (linkage.radius * weight), work.search
+        )
+        return _evaluate(ground, linkage, settings, pose, spread, box)
+    return True
+
+
+@kernel
+def _evaluate(ground, linkage, settings, pose, spread, box):
+    """Write the outputs at the inputs `box.at`; False where the balance is singular."""
+    work, q = spread.model, spread.trial
+    placement, touch, search = work.placement, work.touch, work.search
+    for i in range(6):
+        q[i] = spread.q[i]
+        for wheel in range(6):
+            q[i] += spread.response[i, wheel] * box.at[HEIGHT + wheel]
+    place(linkage, pose[0], pose[1], pose[2], q, placement)
+    place_masses(linkage, q, placement)
+    for wheel in range(6):
+        s, c = np.sin(box.at[ANGLE + wheel]), np.cos(box.at[ANGLE + wheel])
+        touch.sine[wheel], touch.cosine[wheel] = s, c
+        for i in range(3):
+            radial = linkage.radius * (s * placement.forward[i] - c * placement.up[i])
+            aside = box.at[PLACE + wheel] * placement.R[i, 1]
+            touch.point[wheel, i] = placement.centres[wheel, i] + aside + radial
+    if not balance_forces(linkage, placement, touch, box.columns, work.balance):
+        return False
+    if box.columns == 1:
+        take_equal_torques(work.balance, search)
+    else:
+        apply_torques(work.balance, FREE_FORCES, search)
+    for wheel in range(6):
+        N, T, S = search.wheel_loads[wheel], search.tangential[wheel], search.lateral[wheel]
+        box.value[LOAD + wheel], box.value[PULL + wheel], box.value[SIDE + wheel] = N, T, S
+        box.value[USE + wheel] = _worst_use(ground, linkage, settings, wheel, N, T, S, box)
+    find_tip_over(linkage, work)
+    for edge in range(CORNERS):
+        angle, measure = measure_edge(
+            work.corners, edge, (edge + 1) % CORNERS, work.centre, work.force, work.moment
+        )
+        box.value[TIP + edge] = angle
+    return True
+
+
+@kernel
+def _worst_use(ground, linkage, settings, wheel, N, T, S, box):
+    """Return the largest utilisation of a wheel on any of the grounds it may touch."""
+    N = max(N, LEAST_LOAD)
+    if not settings.on_soil:
+        return np.sqrt(T * T + S * S) / (box.mu_low[wheel] * N)
+    weight = linkage.mass * linkage.gravity
+    worst = 0.0
+    for k in range(box.soil_count[wheel]):
+        copy_soil(ground, box.soils[wheel, k], box.soil)
+        solved = solve_wheel(
+            box.soil, box.mu_low[wheel], linkage.radius, linkage.width,
+            weight * N, settings.direction * weight * T, weight * S,
+        )  # fmt: skip
+        worst = max(worst, solved[5])
+    return worst
+
+
+@kernel
+def _find_gains(ground, linkage, settings, pose, spread, box):
+    """Write what each input alone changes at either end; False where the balance is singular."""
+    for k in range(INPUTS):
+        box.at[k] = box.base[k]
+    for k in range(INPUTS):
+        for end in range(2):
+            box.at[k] = box.low[k] if end == 0 else box.high[k]
+            if box.at[k] == box.base[k]:
+                for output in range(OUTPUTS):
+                    if end == 0:
+                        box.gain_low[k, output] = 0.0
+                    else:
+                        box.gain_high[k, output] = 0.0
+                continue
+            if not _evaluate(ground, linkage, settings, pose, spread, box):
+                return False
+            _include_values(box)
+            for output in range(OUTPUTS):
+                gain = box.value[output] - box.base_value[output]
+                if end == 0:
+                    box.gain_low[k, output] = gain
+                else:
+                    box.gain_high[k, output] = gain
+        box.at[k] = box.base[k]
+    return True
+
+
+@kernel
+def _include_values(box):
+    """Widen the bounds to the outputs found last."""
+    for output in range(OUTPUTS):
+        box.smallest[output] = min(box.smallest[output], box.value[output])
+        box.largest[output] = max(box.largest[output], box.value[output])
+
+
+@kernel
+def _bound_output(ground, linkage, settings, pose, output, spread, box):
+    """Go where an output is largest and where it is smallest."""
+    for side in range(2):
+        box.aim[:] = 0.0
+        box.aim[output] = 1.0 - 2.0 * side
+        _go_to_extreme(ground, linkage, settings, pose, spread, box)
+
+
+@kernel
+def _bound_use(ground, linkage, settings, pose, wheel, spread, box):
+    """Go where the utilisation of a wheel is largest.
+
+    The utilisation sqrt(T^2 + S^2) / (mu N) is at least u where T cos(a) + S sin(a) - u mu N >= 0
+    at some direction a. So these sums, which have no edges where T and S change their signs, are
+    taken to their extremes, at first towards each combination of signs, then in the direction
+    and at the level that were found.
+    """
+    pull = max(abs(box.smallest[PULL + wheel]), abs(box.largest[PULL + wheel]))
+    side = abs(box.base_value[SIDE + wheel])
+    total = 0.0
+    for k in range(INPUTS):
+        gain = max(abs(box.gain_low[k, SIDE + wheel]), abs(box.gain_high[k, SIDE + wheel]))
+        if not ANGLE <= k < PLACE:
+            side += gain
+        else:
+            total += gain * gain
+    side += np.sqrt(TOGETHER * total)
+    length = np.hypot(pull, side)
+    if length == 0.0:
+        return
+    best, best_pull, best_side = 0.0, pull, side
+    for corner in range(5):
+        if corner < 4:
+            pull = abs(pull) if corner < 2 else -abs(pull)
+            side = abs(side) if corner % 2 == 0 else -abs(side)
+        else:
+            pull, side = best_pull, best_side
+            length = np.hypot(pull, side)
+        box.aim[:] = 0.0
+        box.aim[PULL + wheel], box.aim[SIDE + wheel] = pull / length, side / length
+        box.aim[LOAD + wheel] = -box.largest[USE + wheel] * box.mu_low[wheel]
+        _go_to_extreme(ground, linkage, settings, pose, spread, box)
+        if box.value[USE + wheel] > best:
+            best = box.value[USE + wheel]
+            best_pull, best_side = box.value[PULL + wheel], box.value[SIDE + wheel]
+
+
+@kernel
+def _go_to_extreme(ground, linkage, settings, pose, spread, box):
+    """Go where the sum of outputs that `box.aim` weighs is largest, as the gains have it."""
+    total = 0.0
+    for k in range(INPUTS):
+        low, high = 0.0, 0.0
+        for output in range(OUTPUTS):
+            if box.aim[output] != 0.0:
+                low += box.aim[output] * box.gain_low[k, output]
+                high += box.aim[output] * box.gain_high[k, output]
+        gain, end = low, box.low[k]
+        if high > low:
+            gain, end = high, box.high[k]
+        box.at[k] = box.base[k]
+        box.gain[k], box.end[k] = max(gain, 0.0), end
+        if gain > 0.0 and not ANGLE <= k < PLACE:
+            box.at[k] = end
+        elif gain > 0.0:
+            total += gain * gain
+    _share_deviation(total, box)
+    if _evaluate(ground, linkage, settings, pose, spread, box):
+        _include_values(box)
+
+
+@kernel
+def _share_deviation(total, box):
+    """Move the angles from their nominal values by their gains, none beyond its end.
+
+    `total` is the sum of the squares of their gains. What an angle at its end leaves is shared
+    among the others.
+    """
+    left = TOGETHER
+    for _ in range(6):
+        capped = False
+        for k in range(ANGLE, PLACE):
+            gain = box.gain[k]
+            if gain > 0.0 and gain * gain * left >= total:
+                box.at[k] = box.end[k]
+                box.gain[k] = 0.0
+                total -= gain * gain
+                left -= 1.0
+                capped = True
+                if left <= 0.0:
+                    return
+        if not capped:
+            break
+    for k in range(ANGLE, PLACE):
+        if box.gain[k] > 0.0:
+            share = box.gain[k] * np.sqrt(left / max(total, 1e-30))
+            box.at[k] = box.base[k] + min(share, 1.0) * (box.end[k] - box.base[k])

@@ -1,0 +1,131 @@
+"""Uncertain maps: bounds on what is predicted along a path.
+
+Where a terrain has a layer `elevation_std`, each height may be anywhere within so many standard
+deviations. docs/uncertainty.md has the method, what it assumes and how often it fails.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from rover_physics.bounds.forces import MOST_SOILS
+from rover_physics.bounds.kernel import NOMINAL, find_bounds
+from rover_physics.errors import ModelError
+from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.path_bounds import PathBounds
+from rover_physics.prediction.path_prediction import Floats, PathPrediction
+from rover_physics.prediction.sweep import one_sweep_at_a_time
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.ground import Ground, pack_ground
+
+SIGMAS = 3.0
+"""Standard deviations of the map that are allowed for unless told."""
+BOUNDED_VALUES = (
+    "roll",
+    "pitch",
+    "rocker_angle",
+    "bogie_angle",
+    "belly_clearance",
+    "tip_over_ratio",
+    "wheel_loads",
+    "friction_utilisation",
+    "torque_saturation",
+    "sinkage",
+)
+"""What is bounded, by its names in `PathPrediction` and `PathBounds`."""
+
+
+def check_sigmas(sigmas: float | None) -> float:
+    """Return the standard deviations to allow for, 0 for none.
+
+    Raises:
+        ModelError: Not a number, or negative.
+    """
+    value = 0.0 if sigmas is None else float(sigmas)
+    if not (np.isfinite(value) and value >= 0.0):
+        raise ModelError(
+            f"sigmas is {sigmas}; it must be a number of standard deviations, 0 to take the map "
+            "as exact"
+        )
+    return value
+
+
+def bound_path(
+    rover: Rover,
+    terrain: Terrain,
+    prediction: PathPrediction,
+    sigmas: float | None = SIGMAS,
+    **arguments: Any,
+) -> PathBounds | None:
+    """Bound what was predicted along a path where the heights of the map are uncertain.
+
+    Args:
+        rover: The rover.
+        terrain: The ground, with its layer `elevation_std`.
+        prediction: Of `sweep_path` over the same terrain.
+        sigmas: Standard deviations by which each height may be wrong; 0 or None for no bounds.
+        arguments: The further arguments that `sweep_path` had.
+
+    Returns:
+        Bounds on each waypoint that contain the prediction; None where there is nothing to
+        bound: a terrain without the layer, or no standard deviations to allow for.
+
+    Raises:
+        ModelError: `sigmas` is negative or no number, or an argument that makes no sense.
+        SoilError: As `sweep_path`.
+    """
+    allowed = check_sigmas(sigmas)
+    if terrain.elevation_std is None or allowed == 0.0:
+        return None
+    if len(terrain.soil_names) >= MOST_SOILS:
+        raise ModelError(
+            f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
+            f"most {MOST_SOILS - 1}"
+        )
+    low, high, error = _spread(terrain, allowed)
+    setup = set_up(rover, terrain, **arguments)
+    with one_sweep_at_a_time:
+        found = find_bounds(setup, low, high, error, prediction.poses, _pack_nominal(prediction))
+    values = {name: _include(found[name], prediction, name) for name in BOUNDED_VALUES}
+    return PathBounds(sigmas=allowed, status=found.status.copy(), **values)
+
+
+@lru_cache(maxsize=2)
+def _spread(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Ground]:
+    """Return the lowest and the highest ground, and how far they are from the one in between."""
+    assert terrain.elevation_std is not None
+    error = np.ascontiguousarray(sigmas * terrain.elevation_std)
+    low, high, between = (
+        pack_ground(replace(terrain, elevation=elevation))
+        for elevation in (terrain.elevation - error, terrain.elevation + error, error)
+    )
+    return low, high, between
+
+
+def _pack_nominal(prediction: PathPrediction) -> Any:
+    nominal = np.zeros(len(prediction.poses), NOMINAL)
+    nominal["settled"] = prediction.settled
+    nominal["q"] = np.column_stack(
+        [
+            prediction.position[:, 2],
+            prediction.roll,
+            prediction.pitch,
+            prediction.rocker_angle[:, 0],
+            prediction.bogie_angle,
+        ]
+    )
+    nominal["contact_angle"] = prediction.contact_angle
+    nominal["contact_points"] = prediction.contact_points
+    return nominal
+
+
+def _include(bounds: Floats, prediction: PathPrediction, name: str) -> Floats:
+    """Return bounds widened to the predicted values; NaN where there are none."""
+    value = getattr(prediction, name)
+    widened = np.array(bounds)
+    widened[..., 0] = np.minimum(bounds[..., 0], value)
+    widened[..., 1] = np.maximum(bounds[..., 1], value)
+    return widened

@@ -1,0 +1,318 @@
+"""Bounds on the configuration of a rover on ground whose heights are known within bounds.
+
+A wheel at a given place stands the higher the higher any of the ground below it is, so the lowest
+and the highest surface give the exact interval of its height. How the configuration follows the
+heights of the six wheels is the inverse of the derivatives of the gaps; its signs tell on which of
+the two surfaces each wheel has to stand for an angle to be extreme, and there the rover is settled
+anew, as wheels move sideways when the body turns.
+
+Source of the idea, for kinematics and without forces: Otsu, Matheron, Ghosh, Toupet and Ono, "Fast
+approximate clearance evaluation for rovers with articulated suspension systems", Journal of Field
+Robotics 37(5), 2020.
+"""
+
+import numpy as np
+
+from rover_physics.contact.contact_record import FULL, OFF_MAP, QUICK, TOUCHING
+from rover_physics.contact.settling import LEVEL, SLOPED, write_gap_rates
+from rover_physics.contact.wheel import find_touch
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.records import record_type
+from rover_physics.prediction.evaluation import WORK
+from rover_physics.rover.linkage import place, rocker_sign
+
+BOUNDED, NOT_SETTLED, ON_EDGE, UNKNOWN_NEAR, OFF_MAP_NEAR, SINGULAR = 0, 1, 2, 3, 4, 5
+"""What becomes of a pose: bounded; not settled to begin with; a wheel may climb or fall off an
+edge; unknown ground or the map's edge is within reach; the forces are not determined there."""
+NOMINAL_GAP = 1e-2
+"""Largest gap, in wheel radii, at which a predicted configuration counts as standing. Beside rocks
+a search may miss the nearest point by so much; bounds are then widened by it."""
+EXTREME_GAP = 3e-4
+"""Largest gap, in wheel radii, at which a wheel counts as standing without further doubt."""
+EXTREME_STEPS = 8
+LARGEST_LEFT = 0.2
+"""Gap, in wheel radii, from which on a wheel that finds no place counts as on an edge."""
+JUMP = 0.3
+"""Rise or fall, in wheel radii, beyond what the slope makes of it, within reach of a wheel from
+which on it counts as on an edge."""
+LEVELS = (0.8, 0.95, 1.1, 1.3)
+"""Rises and falls, in wheel radii, at which a wheel is looked for another place to stand. Where a
+face is higher than the wheel can roll over, there are two: at its foot and on top."""
+LARGEST_TURN = 0.3
+"""Largest turn of a step [rad]."""
+
+SPREAD = record_type(
+    ("model", WORK),  # work space of the model
+    ("q", float, (6,)),  # the nominal configuration, as in `settling`
+    ("rates", float, (6, 6)),  # derivatives of the gaps by q
+    ("response", float, (6, 6)),  # derivatives of q by the wheels' heights
+    ("lift", float, (6, 6)),  # the same as if the ground were level under each wheel
+    ("low", float, (6,)),  # height of each wheel at its lowest, over the nominal one [m]
+    ("high", float, (6,)),  # the same at its highest [m]
+    ("q_low", float, (6,)),  # smallest q
+    ("q_high", float, (6,)),  # largest q
+    ("reach", float, (6,)),  # how far each wheel may move forward or back [m]
+    ("rate", float, (6,)),  # how fast a wheel goes in one direction as q changes
+    ("trial", float, (6,)),  # a configuration on the way to an extreme one
+    ("raised", np.uint8, (6,)),  # 1 for the wheels that stand on the high surface in it
+)
+"""Where a rover may be; heights are those of wheels at their nominal places."""
+
+
+@kernel
+def bound_configuration(ground, low, high, linkage, samples, pose, spread):
+    """Write into `spread` how far its nominal q may change between two surfaces.
+
+    pose (3,) is x, y [m] and yaw [rad]. Returns BOUNDED or what keeps it from being bounded.
+    """
+    outcome = _find_heights(ground, low, high, linkage, samples, pose, spread)
+    if outcome != BOUNDED:
+        return outcome
+    if _may_change_level(low, high, linkage, samples, spread):
+        return ON_EDGE
+    for i in range(6):
+        spread.q_low[i] = spread.q_high[i] = spread.q[i]
+    for angle in range(1, 6):
+        for side in range(2):
+            outcome = _settle_extreme(
+                low, high, linkage, samples, pose, angle, 1.0 - 2.0 * side, spread
+            )
+            if outcome != BOUNDED:
+                return outcome
+    return BOUNDED
+
+
+@kernel
+def _find_heights(ground, low, high, linkage, samples, pose, spread):
+    """Write the response and the interval of each wheel's height; leave the nominal touch."""
+    work = spread.model
+    placement, touch = work.placement, work.touch
+    place(linkage, pose[0], pose[1], pose[2], spread.q, placement)
+    spread.low[:] = 0.0
+    spread.high[:] = 0.0
+    for wheel in range(6):
+        for surface in range(2):
+            outcome = _touch_on(low if surface == 0 else high, samples, placement, wheel, touch)
+            if outcome != BOUNDED:
+                return outcome
+            if surface == 0:
+                spread.low[wheel] = -touch.gap[wheel]
+            else:
+                spread.high[wheel] = -touch.gap[wheel]
+        outcome = _touch_on(ground, samples, placement, wheel, touch)
+        if outcome != BOUNDED:
+            return outcome
+        gap = touch.gap[wheel]
+        if abs(gap) > NOMINAL_GAP * linkage.radius:
+            return ON_EDGE
+        spread.low[wheel] = min(spread.low[wheel] + gap, 0.0)
+        spread.high[wheel] = max(spread.high[wheel] + gap, 0.0)
+        in_doubt = spread.high[wheel] > spread.low[wheel]
+        if in_doubt and abs(gap) > EXTREME_GAP * linkage.radius:
+            spread.low[wheel] -= abs(gap)
+            spread.high[wheel] += abs(gap)
+    write_gap_rates(linkage, placement, touch, LEVEL, spread.rates)
+    if not _invert(spread.rates, work.J, spread.lift):
+        return ON_EDGE
+    write_gap_rates(linkage, placement, touch, SLOPED, spread.rates)
+    return BOUNDED if _invert(spread.rates, work.J, spread.response) else ON_EDGE
+
+
+@kernel
+def _invert(matrix, copy, inverse):
+    """Write the inverse of a 6 x 6 matrix; False where it is singular."""
+    for i in range(6):
+        for k in range(6):
+            copy[i, k] = matrix[i, k]
+            inverse[i, k] = 1.0 if i == k else 0.0
+    return solve_in_place(copy, inverse, 6, 6)
+
+
+@kernel
+def _may_change_level(low, high, linkage, samples, spread):
+    """Tell whether any wheel of the placed rover may climb or fall to another level."""
+    placement, touch = spread.model.placement, spread.model.touch
+    fx, fy = placement.forward[0], placement.forward[1]
+    for wheel in range(6):
+        slope = -touch.normal[wheel, 0] * fx - touch.normal[wheel, 1] * fy
+        along, reach = _find_moves(linkage, wheel, spread)
+        spread.reach[wheel] = reach
+        ahead, arm = _find_arm(linkage, wheel, placement)
+        for way in range(2):
+            surface, sign = high if way == 0 else low, 1.0 - 2.0 * way
+            margin = spread.high[wheel] if way == 0 else -spread.low[wheel]
+            for side in range(2):
+                shift = reach * (1.0 - 2.0 * side)
+                rise = sign * _rise_at(surface, samples, placement, wheel, shift, touch)
+                if rise - sign * slope * shift - margin > JUMP * linkage.radius:
+                    return True
+                for level in LEVELS:
+                    needed = level * linkage.radius
+                    move = along * sign * needed + shift
+                    if ahead * shift <= 0.0:
+                        move -= np.copysign(0.5 * needed * needed / arm, ahead)
+                    rise = sign * _rise_at(surface, samples, placement, wheel, move, touch)
+                    if rise - margin > needed:
+                        return True
+    return False
+
+
+@kernel
+def _find_arm(linkage, wheel, placement):
+    """Return how far a wheel is ahead of the pivot that it hangs on, and from it [m].
+
+    A wheel that rises or falls far is drawn towards its pivot, by the square of the way over
+    twice the arm: the second order that `_find_moves` leaves out.
+    """
+    pivots = placement.bogie_pivots if linkage.on_bogie[wheel] else placement.rocker_pivots
+    forward, centre, pivot = placement.forward, placement.centres[wheel], pivots[wheel // 3]
+    ahead, square = 0.0, 0.0
+    for k in range(3):
+        ahead += forward[k] * (centre[k] - pivot[k])
+        square += (centre[k] - pivot[k]) ** 2
+    return ahead, np.sqrt(square)
+
+
+@kernel
+def _rise_at(surface, samples, placement, wheel, move, touch):
+    """Return how much higher than now a wheel is where it is moved forward [m]."""
+    x, y = placement.centres[wheel, 0], placement.centres[wheel, 1]
+    placement.centres[wheel, 0] += move * placement.forward[0]
+    placement.centres[wheel, 1] += move * placement.forward[1]
+    find_touch(surface, samples, placement, wheel, QUICK, touch)
+    placement.centres[wheel, 0], placement.centres[wheel, 1] = x, y
+    return -touch.gap[wheel]
+
+
+@kernel
+def _find_moves(linkage, wheel, spread):
+    """Return how far a wheel moves forward per metre that it alone rises, and at most [m].
+
+    The latter is as all wheels rise or fall on the uncertain ground.
+    """
+    placement, rate = spread.model.placement, spread.rate
+    R, origin, centre = placement.R, placement.origin, placement.centres[wheel]
+    forward = placement.forward
+    length, side = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0]), wheel // 3
+    rate[:] = 0.0
+    rate[1] = _shift(R[0, 0], R[1, 0], R[2, 0], centre, origin, forward)
+    rate[2] = _shift(-R[1, 0] / length, R[0, 0] / length, 0.0, centre, origin, forward)
+    ax, ay, az = R[0, 1], R[1, 1], R[2, 1]
+    pivot = placement.rocker_pivots[side]
+    rate[3] = rocker_sign(side) * _shift(ax, ay, az, centre, pivot, forward)
+    if linkage.on_bogie[wheel]:
+        pivot = placement.bogie_pivots[side]
+        rate[4 + side] = _shift(ax, ay, az, centre, pivot, forward)
+    own, reach = 0.0, 0.0
+    for other in range(6):
+        change = 0.0
+        for i in range(6):
+            change += rate[i] * spread.response[i, other]
+            if other == wheel:
+                own += rate[i] * spread.lift[i, other]
+        reach += abs(change) * max(spread.high[other], -spread.low[other])
+    return own, reach
+
+
+@kernel
+def _shift(ax, ay, az, point, pivot, forward):
+    """Return how fast a point goes forward in a turn about an axis through `pivot`."""
+    x, y, z = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
+    return forward[0] * (ay * z - az * y) + forward[1] * (az * x - ax * z)
+
+
+@kernel
+def _touch_on(ground, samples, placement, wheel, touch):
+    """Find the touch of a wheel on one surface."""
+    outcome = find_touch(ground, samples, placement, wheel, QUICK, touch)
+    if outcome != TOUCHING or touch.gap[wheel] != touch.gap[wheel]:
+        return OFF_MAP_NEAR if outcome == OFF_MAP else UNKNOWN_NEAR
+    find_touch(ground, samples, placement, wheel, FULL, touch)
+    return BOUNDED
+
+
+@kernel
+def _settle_extreme(low, high, linkage, samples, pose, angle, sign, spread):
+    """Settle where q[angle] is largest (sign 1) or smallest (-1); widen the bounds to that."""
+    q = spread.trial
+    largest = 0.0
+    for i in range(6):
+        q[i] = spread.q[i]
+    for wheel in range(6):
+        raised = sign * spread.response[angle, wheel] > 0.0
+        spread.raised[wheel] = 1 if raised else 0
+        height = spread.high[wheel] if raised else spread.low[wheel]
+        largest = max(largest, abs(height))
+        for i in range(6):
+            q[i] += spread.response[i, wheel] * height
+    if largest == 0.0:
+        return BOUNDED
+    outcome, worst = _approach(low, high, linkage, samples, pose, spread)
+    if outcome != BOUNDED:
+        return outcome
+    if worst > LARGEST_LEFT * linkage.radius:
+        return ON_EDGE
+    _include_trial(linkage, worst > EXTREME_GAP * linkage.radius, spread)
+    return BOUNDED
+
+
+@kernel
+def _approach(low, high, linkage, samples, pose, spread):
+    """Take Newton steps from the trial; return the outcome and the largest gap left [m]."""
+    work, q = spread.model, spread.trial
+    worst = 0.0
+    for attempt in range(EXTREME_STEPS):
+        outcome, worst = _touch_trial(low, high, linkage, samples, pose, spread)
+        if outcome != BOUNDED or worst <= EXTREME_GAP * linkage.radius:
+            return outcome, worst
+        if attempt == EXTREME_STEPS - 1:
+            break
+        write_gap_rates(linkage, work.placement, work.touch, SLOPED, work.J)
+        for wheel in range(6):
+            work.step[wheel, 0] = work.touch.gap[wheel]
+        if not solve_in_place(work.J, work.step, 6, 1):
+            return np.int64(ON_EDGE), worst
+        turn = 0.0
+        for i in range(1, 6):
+            turn = max(turn, abs(work.step[i, 0]))
+        share = min(1.0, LARGEST_TURN / turn) if turn > 0.0 else 1.0
+        if attempt > 3:
+            share *= 0.5
+        for i in range(6):
+            q[i] -= share * work.step[i, 0]
+    return np.int64(BOUNDED), worst
+
+
+@kernel
+def _touch_trial(low, high, linkage, samples, pose, spread):
+    """Touch with each wheel of the trial on its surface; return outcome and largest gap [m]."""
+    work = spread.model
+    place(linkage, pose[0], pose[1], pose[2], spread.trial, work.placement)
+    worst = 0.0
+    for wheel in range(6):
+        surface = high if spread.raised[wheel] == 1 else low
+        outcome = _touch_on(surface, samples, work.placement, wheel, work.touch)
+        if outcome != BOUNDED:
+            return np.int64(outcome), np.inf
+        worst = max(worst, abs(work.touch.gap[wheel]))
+    return np.int64(BOUNDED), worst
+
+
+@kernel
+def _include_trial(linkage, unsettled, spread):
+    """Widen the bounds on q and on the wheels' heights to the trial and what is left of gaps."""
+    q, gap = spread.trial, spread.model.touch.gap
+    for i in range(6):
+        left = 0.0
+        for wheel in range(6 if unsettled else 0):
+            left += abs(spread.response[i, wheel] * gap[wheel])
+        spread.q_low[i] = min(spread.q_low[i], q[i] - left)
+        spread.q_high[i] = max(spread.q_high[i], q[i] + left)
+    for wheel in range(6):
+        height = 0.0
+        for i in range(6):
+            height += spread.rates[wheel, i] * (q[i] - spread.q[i])
+        left = abs(gap[wheel]) if unsettled else 0.0
+        spread.low[wheel] = min(spread.low[wheel], height - left)
+        spread.high[wheel] = max(spread.high[wheel], height + left)

@@ -1,0 +1,166 @@
+"""The place of a circle of a wheel that is nearest to the ground, between the samples."""
+
+import numpy as np
+
+from rover_physics.contact.contact_record import CIRCLE_REACH
+from rover_physics.numerics.kernels import kernel
+from rover_physics.terrain.ground import look_up, look_up_cell
+
+REFINEMENTS = 9
+GAP_PRECISION = 1e-5
+"""How far the gap of a circle may be from its smallest, in wheel radii."""
+TURN_TOLERANCE = 3e-3
+"""Error of the contact angle [rad] at which the search along the circle stops."""
+BESIDE_REACH = 5e-3
+"""How far above the nearest circle, in wheel radii, another is looked at between its samples."""
+BESIDE_SHARE = 0.8
+"""Share of the circle's own rise from which on the ground counts as no plane."""
+
+
+@kernel
+def search_circle(ground, samples, placement, wheel, across, s, c):
+    """Return the smallest gap [m] of a circle near the angle of (s, c), and where.
+
+    That is sine and cosine of the angle, and the slope of the ground there along x and y.
+
+    On a plane the circle touches in the direction of the plane's normal, so the first trials look
+    in the direction of the normal found last. On an edge that leads to and fro: then the next
+    trial is where the tangents of the gap from both sides meet, which is also where the gap can't
+    be smaller. Infinite over unknown ground.
+    """
+    R, centres, forward, up = placement.R, placement.centres, placement.forward, placement.up
+    radius, scale = samples.radius, ground.inverse_resolution
+    x = (centres[wheel, 0] + across * R[0, 1] - ground.x0) * scale
+    y = (centres[wheel, 1] + across * R[1, 1] - ground.y0) * scale
+    z = centres[wheel, 2] + across * R[2, 1]
+    ahead_x, ahead_y = radius * scale * forward[0], radius * scale * forward[1]
+    down_x, down_y, down_z = radius * scale * up[0], radius * scale * up[1], radius * up[2]
+    best, best_s, best_c, best_x, best_y = np.inf, s, c, 0.0, 0.0
+    back_s, back_c, ahead_s, ahead_c = -1.0, 0.0, 1.0, 0.0
+    back_gap, ahead_gap, back_rate, ahead_rate = np.inf, np.inf, 0.0, 0.0
+    for trial in range(REFINEMENTS):
+        height, slope_x, slope_y = look_up_cell(
+            ground, x + s * ahead_x - c * down_x, y + s * ahead_y - c * down_y
+        )
+        gap = z - c * down_z - height
+        rise = slope_x * forward[0] + slope_y * forward[1]
+        fall = up[2] - slope_x * up[0] - slope_y * up[1]
+        turn = s * fall - c * rise
+        straight = s * rise + c * fall
+        converged = not abs(turn) > TURN_TOLERANCE * straight
+        if gap < best:
+            best, best_s, best_c, best_x, best_y = gap, s, c, slope_x, slope_y
+            if converged:
+                length = np.sqrt(rise * rise + fall * fall)
+                inverse = 1.0 / length
+                best += radius * (straight - length)
+                best_s, best_c = rise * inverse, fall * inverse
+        if converged:
+            break
+        if trial == 0:
+            turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine
+            if c * turn_c + s * turn_s > 0.0:
+                back_s, back_c = s * turn_c - c * turn_s, c * turn_c + s * turn_s
+            if c * turn_c - s * turn_s > 0.0:
+                ahead_s, ahead_c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
+        if turn > 0.0:
+            ahead_s, ahead_c, ahead_gap, ahead_rate = s, c, gap, radius * turn
+        else:
+            back_s, back_c, back_gap, back_rate = s, c, gap, radius * turn
+        share = 0.5
+        if back_gap < np.inf and ahead_gap < np.inf:
+            between = ahead_s * back_c - ahead_c * back_s
+            share = (ahead_gap - back_gap - ahead_rate * between) / (
+                (back_rate - ahead_rate) * between
+            )
+            if best - (back_gap + back_rate * share * between) < GAP_PRECISION * radius:
+                break
+        if trial < 2:
+            inverse = 1.0 / np.sqrt(rise * rise + fall * fall)
+            s, c = rise * inverse, fall * inverse
+        if trial > 1 or not (s * back_c > c * back_s and s * ahead_c < c * ahead_s):
+            share = min(max(share, 0.05), 0.95)
+            s, c = back_s + share * (ahead_s - back_s), back_c + share * (ahead_c - back_c)
+            inverse = 1.0 / np.sqrt(s * s + c * c)
+            s, c = s * inverse, c * inverse
+    return best, best_s, best_c, best_x, best_y
+
+
+@kernel
+def refine_from(ground, samples, placement, wheel, m, s, c, touch):
+    """Search circle m near (s, c), keep what is nearer than before, and return the gap found."""
+    gap, s, c, slope_x, slope_y = search_circle(
+        ground, samples, placement, wheel, samples.laterals[m], s, c
+    )
+    if gap < touch.circle_gap[wheel, m]:
+        touch.circle_gap[wheel, m] = gap
+        touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
+        touch.circle_slope[wheel, m, 0], touch.circle_slope[wheel, m, 1] = slope_x, slope_y
+    return gap
+
+
+@kernel
+def refine_circle(ground, samples, placement, wheel, m, touch):
+    """Search circle m anew from where it was nearest."""
+    s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+    touch.circle_gap[wheel, m] = np.inf
+    refine_from(ground, samples, placement, wheel, m, s, c, touch)
+    if touch.circle_gap[wheel, m] == np.inf:
+        touch.circle_gap[wheel, m] = np.nan
+
+
+@kernel
+def refine_others(ground, samples, placement, wheel, touch):
+    """Look closer at the circles with samples that come near to the smallest gap."""
+    reach = touch.noted_gap[wheel] + CIRCLE_REACH * samples.radius
+    nearest = touch.nearest[wheel]
+    s0, c0 = touch.circle_sine[wheel, nearest], touch.circle_cosine[wheel, nearest]
+    for m in range(samples.circles):
+        if m != nearest:
+            touch.circle_gap[wheel, m] = np.inf
+        if touch.first_gap[wheel, m] <= reach:
+            k = touch.first_row[wheel, m]
+            s, c = samples.sines[k], samples.cosines[k]
+            lower = m == nearest and touch.first_gap[wheel, m] < touch.circle_gap[wheel, m]
+            if abs(s * c0 - c * s0) < samples.spacing_sine and not lower:
+                s, c = s0, c0
+            if m != nearest or s != s0:
+                refine_from(ground, samples, placement, wheel, m, s, c, touch)
+        if touch.second_gap[wheel, m] <= reach:
+            k = touch.second_row[wheel, m]
+            s, c = samples.sines[k], samples.cosines[k]
+            refine_from(ground, samples, placement, wheel, m, s, c, touch)
+        if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
+            touch.nearest[wheel] = m
+    reach = touch.circle_gap[wheel, touch.nearest[wheel]] + BESIDE_REACH * samples.radius
+    for m in range(samples.circles):
+        if touch.circle_gap[wheel, m] <= reach:
+            _look_beside(ground, samples, placement, wheel, m, touch)
+            if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
+                touch.nearest[wheel] = m
+
+
+@kernel
+def _look_beside(ground, samples, placement, wheel, m, touch):
+    """Search circle m from between the samples, too, where the ground comes nearer there.
+
+    Over a plane the gap grows away from the smallest with the rise of the circle; where it grows
+    less, a wheel that bridges a hollow may come nearer to the hollow's other side.
+    """
+    R, forward, up = placement.R, placement.forward, placement.up
+    centres, radius, across = placement.centres, samples.radius, samples.laterals[m]
+    gap, s0, c0 = (
+        touch.circle_gap[wheel, m], touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+    )  # fmt: skip
+    limit = gap + BESIDE_SHARE * radius * (1.0 - samples.beside_cosine)
+    z = centres[wheel, 2] + across * R[2, 1]
+    for side in range(-1, 2, 2):
+        turn = side * samples.beside_sine
+        s, c = s0 * samples.beside_cosine + c0 * turn, c0 * samples.beside_cosine - s0 * turn
+        lowest = z - radius * c * up[2]
+        if c < 0.0 or lowest - touch.roof[wheel] >= limit:
+            continue
+        x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
+        y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
+        if lowest - look_up(ground, x, y)[0] < limit:
+            refine_from(ground, samples, placement, wheel, m, s, c, touch)

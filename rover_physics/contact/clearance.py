@@ -1,0 +1,178 @@
+"""How far the belly of the body stays above the ground."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rover_physics.numerics.addresses import read_float
+from rover_physics.numerics.kernels import kernel
+from rover_physics.terrain.ground import BLOCK, elevation_of, look_up
+
+HALF = 0.5 * (BLOCK - 1)
+"""Distance of a block's outer rows and columns from its middle, in cells."""
+POINTS = 9
+"""Corners, middles of edges and middle of the underside."""
+
+
+class Underside(NamedTuple):
+    """The underside's plane above the cells of a map; all linear in row i and column j."""
+
+    z: float
+    """Height of the plane above cell [0, 0] [m]."""
+    z_i: float
+    """Its rise per row."""
+    z_j: float
+    """Its rise per column."""
+    along: float
+    """Place of the plane's point above cell [0, 0] along the body [m]."""
+    along_i: float
+    """Its change per row."""
+    along_j: float
+    """Its change per column."""
+    across: float
+    """The same across the body."""
+    across_i: float
+    """Its change per row."""
+    across_j: float
+    """Its change per column."""
+
+
+@kernel
+def belly_clearance(ground, linkage, placement):
+    """Return the smallest height [m] of the underside above the known ground below it.
+
+    Looked up at all cell centres within the outline of the underside; where none is known there,
+    as between large cells, at nine points of it, and NaN where they too are unknown. The block of
+    cells that may come nearest is looked at first; others are passed over whose highest ground,
+    stays farther below than what is found already.
+    """
+    R, origin, belly = placement.R, placement.origin, linkage.belly
+    if not R[2, 2] > 0.0:
+        return np.nan
+    plane = _describe_underside(ground, R, origin, belly)
+    low_i, high_i, low_j, high_j = _blocks_below(ground, R, origin, belly)
+    nearest, nearest_i, nearest_j = np.inf, low_i, low_j
+    for bi in range(low_i, high_i + 1):
+        for bj in range(low_j, high_j + 1):
+            bound = _lowest_above(plane, bi, bj) - _ceiling_of(ground, bi, bj)
+            if bound < nearest and _is_below(plane, belly, bi, bj):
+                nearest, nearest_i, nearest_j = bound, bi, bj
+    smallest = np.inf
+    if nearest < np.inf:
+        smallest = _clear_block(ground, plane, belly, nearest_i, nearest_j, np.inf)
+    for bi in range(low_i, high_i + 1):
+        for bj in range(low_j, high_j + 1):
+            if _lowest_above(plane, bi, bj) - _ceiling_of(ground, bi, bj) < smallest and _is_below(
+                plane, belly, bi, bj
+            ):
+                smallest = _clear_block(ground, plane, belly, bi, bj, smallest)
+    return smallest if smallest < np.inf else _clear_points(ground, R, origin, belly)
+
+
+@kernel
+def _ceiling_of(ground, bi, bj):
+    """Return the highest known ground [m] of a block, -inf where none is known."""
+    return read_float(ground.ceiling, bi * ground.block_columns + bj)
+
+
+@kernel
+def _clear_points(ground, R, origin, belly):
+    """Return the smallest clearance [m] below POINTS of the underside, NaN if none is known."""
+    smallest = np.inf
+    for k in range(POINTS):
+        x, y, z = point_of_underside(R, origin, belly, k)
+        clearance = z - look_up(ground, x, y)[0]
+        if clearance < smallest:
+            smallest = clearance
+    return smallest if smallest < np.inf else np.nan
+
+
+@kernel
+def point_of_underside(R, origin, belly, k):
+    """Return x, y, z [m] of one of POINTS of the underside."""
+    along = belly[1] + 0.5 * (k % 3) * (belly[2] - belly[1])
+    across = belly[3] + 0.5 * (k // 3) * (belly[4] - belly[3])
+    return (
+        origin[0] + R[0, 0] * along + R[0, 1] * across + R[0, 2] * belly[0],
+        origin[1] + R[1, 0] * along + R[1, 1] * across + R[1, 2] * belly[0],
+        origin[2] + R[2, 0] * along + R[2, 1] * across + R[2, 2] * belly[0],
+    )
+
+
+@kernel
+def _describe_underside(ground, R, origin, belly):
+    cell = 1.0 / ground.inverse_resolution
+    dx, dy = ground.x0 - origin[0], ground.y0 - origin[1]
+    rise_x, rise_y = -R[0, 2] / R[2, 2], -R[1, 2] / R[2, 2]
+    z = belly[0] / R[2, 2] + rise_x * dx + rise_y * dy
+    z_i, z_j = rise_y * cell, rise_x * cell
+    return Underside(
+        origin[2] + z,
+        z_i,
+        z_j,
+        R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * z,
+        R[1, 0] * cell + R[2, 0] * z_i,
+        R[0, 0] * cell + R[2, 0] * z_j,
+        R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * z,
+        R[1, 1] * cell + R[2, 1] * z_i,
+        R[0, 1] * cell + R[2, 1] * z_j,
+    )
+
+
+@kernel
+def _lowest_above(plane, bi, bj):
+    """Return the lowest height [m] of the underside's plane above a block of cells."""
+    i = BLOCK * bi + (0 if plane.z_i > 0.0 else BLOCK - 1)
+    j = BLOCK * bj + (0 if plane.z_j > 0.0 else BLOCK - 1)
+    return plane.z + plane.z_i * i + plane.z_j * j
+
+
+@kernel
+def _is_below(plane, belly, bi, bj):
+    """Tell whether any cell of a block may be below the underside."""
+    i, j = BLOCK * bi + HALF, BLOCK * bj + HALF
+    along = plane.along + plane.along_i * i + plane.along_j * j
+    across = plane.across + plane.across_i * i + plane.across_j * j
+    beyond = HALF * (abs(plane.along_i) + abs(plane.along_j))
+    aside = HALF * (abs(plane.across_i) + abs(plane.across_j))
+    return (
+        belly[1] - beyond <= along <= belly[2] + beyond
+        and belly[3] - aside <= across <= belly[4] + aside
+    )
+
+
+@kernel
+def _clear_block(ground, plane, belly, bi, bj, smallest):
+    """Return the smaller of `smallest` and the clearance [m] above the cells of a block."""
+    for i in range(BLOCK * bi, min(BLOCK * (bi + 1), ground.rows)):
+        z = plane.z + plane.z_i * i
+        for j in range(BLOCK * bj, min(BLOCK * (bj + 1), ground.columns)):
+            clearance = z + plane.z_j * j - elevation_of(ground, i, j)
+            if clearance < smallest:
+                along = plane.along + plane.along_i * i + plane.along_j * j
+                across = plane.across + plane.across_i * i + plane.across_j * j
+                if belly[1] <= along <= belly[2] and belly[3] <= across <= belly[4]:
+                    smallest = clearance
+    return smallest
+
+
+@kernel
+def _blocks_below(ground, R, origin, belly):
+    """Return the smallest and largest row and column of the blocks around the underside."""
+    low_x = low_y = np.inf
+    high_x = high_y = -np.inf
+    for corner in range(4):
+        along = belly[1 + corner % 2]
+        across = belly[3 + corner // 2]
+        x = origin[0] + R[0, 0] * along + R[0, 1] * across + R[0, 2] * belly[0]
+        y = origin[1] + R[1, 0] * along + R[1, 1] * across + R[1, 2] * belly[0]
+        low_x, high_x = min(low_x, x), max(high_x, x)
+        low_y, high_y = min(low_y, y), max(high_y, y)
+    scale = ground.inverse_resolution
+    last_i, last_j = ground.block_rows - 1, ground.block_columns - 1
+    return (
+        max(int(np.floor((low_y - ground.y0) * scale)) // BLOCK, 0),
+        min(int(np.ceil((high_y - ground.y0) * scale)) // BLOCK, last_i),
+        max(int(np.floor((low_x - ground.x0) * scale)) // BLOCK, 0),
+        min(int(np.ceil((high_x - ground.x0) * scale)) // BLOCK, last_j),
+    )

@@ -1,0 +1,50 @@
+"""Where the cylinder of a wheel is sampled: angles along circles across its width."""
+
+from typing import Any
+
+import numpy as np
+
+from rover_physics.numerics.records import new_record, record_type
+from rover_physics.rover.model import Rover
+
+MOST_ANGLES, MOST_CIRCLES = 49, 9
+WHEEL_SAMPLES = record_type(
+    ("radius", float),  # wheel radius [m]
+    ("reach", float),  # farthest a sample can be from the wheel's centre in the plane [m]
+    ("rows", np.int64),  # number k of contact angles
+    ("circles", np.int64),  # number m of circles
+    ("sines", float, (MOST_ANGLES,)),  # (k,) sines of the contact angles, ascending
+    ("cosines", float, (MOST_ANGLES,)),  # (k,) their cosines
+    ("spacing_sine", float),  # sine of the angle between neighbouring samples
+    ("spacing_cosine", float),  # cosine of the angle between neighbouring samples
+    ("beside_sine", float),  # sine of half that angle
+    ("beside_cosine", float),  # cosine of half that angle
+    ("half_width", float),  # distance of the outer circles from the middle plane [m]
+    ("lateral_spacing", float),  # distance between neighbouring circles [m]
+    ("laterals", float, (MOST_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
+)
+"""Where the cylinder of a wheel is sampled: at k angles of m circles."""
+
+
+def sample_wheel(rover: Rover, resolution: float) -> Any:
+    """Choose samples no farther apart than the cells of a terrain of `resolution` [m]."""
+    wheel = rover.wheel
+    half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 10, 24))
+    half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 1, 4))
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * half_angles + 1)
+    samples = new_record(
+        WHEEL_SAMPLES,
+        radius=wheel.radius,
+        reach=np.hypot(wheel.radius, 0.5 * wheel.width),
+        rows=angles.size,
+        circles=2 * half_laterals + 1,
+        spacing_sine=np.sin(angles[1] - angles[0]),
+        spacing_cosine=np.cos(angles[1] - angles[0]),
+        beside_sine=np.sin(0.5 * (angles[1] - angles[0])),
+        beside_cosine=np.cos(0.5 * (angles[1] - angles[0])),
+    )
+    samples.sines[: angles.size], samples.cosines[: angles.size] = np.sin(angles), np.cos(angles)
+    half = 0.5 * wheel.width
+    samples.half_width, samples.lateral_spacing = half, half / half_laterals
+    samples.laterals[: samples.circles] = np.linspace(-half, half, samples.circles)
+    return samples

@@ -1,0 +1,50 @@
+"""Finds the package's own configuration files in a source checkout or an installed tree."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from rover_physics.errors import RoverError
+
+PACKAGE_NAME = "rover_planner"
+
+
+def find_config(relative: str) -> Path:
+    """Find a file or folder of the package's ``config`` folder.
+
+    A source checkout has ``config/`` beside the package. Installed by pip or colcon it is in
+    ``<prefix>/share/rover_planner/config``, where ``<prefix>`` is some folder above the package.
+
+    Args:
+        relative: Path below ``config``, with forward slashes, e.g. ``"rovers/lsr1.yaml"``.
+
+    Returns:
+        Absolute path of what was found.
+
+    Raises:
+        RoverError: Nothing of that name in any of the places searched.
+    """
+    searched = []
+    for folder in _config_folders():
+        candidate = folder / relative
+        if candidate.exists():
+            return candidate
+        searched.append(str(folder))
+    raise RoverError(
+        f"no configuration file {relative!r}; searched {', '.join(searched) or 'nowhere'}; "
+        f"is {PACKAGE_NAME} installed with its config/ folder?"
+    )
+
+
+def _config_folders() -> Iterator[Path]:
+    """Yield the existing config folders, the one of a source checkout first."""
+    # A linked installation keeps links to the sources: look beside both ends of the link.
+    here = Path(__file__).absolute()
+    packages = dict.fromkeys((here.parents[1], here.resolve().parents[1]))
+    for package in packages:
+        if (package.parent / "package.xml").is_file() and (package.parent / "config").is_dir():
+            yield package.parent / "config"
+    for package in packages:
+        for prefix in package.parents:
+            folder = prefix / "share" / PACKAGE_NAME / "config"
+            if folder.is_dir():
+                yield folder

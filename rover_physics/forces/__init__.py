@@ -1,0 +1,1 @@
+"""What the ground's forces are: balance, torques, soil, tip-over measures."""

@@ -1,0 +1,231 @@
+"""Static equilibrium of a settled rover: wheel loads for given torques (paper 3.2 in 3-D).
+
+In the contact frame of a wheel, n points from the ground to the wheel's centre, a is the axis of
+the wheel and t = a x n points forward along the ground; the ground's force is N n + T t + S a.
+Nine equations hold: six for the whole rover about its body origin, one about each bogie pivot for
+what hangs on the bogie (eq 15), and the differential's, which passes equal moments from both
+rockers (eq 14 for both sides). The unknowns are six N, the lateral forces' S_i = s0 + s1 x_i
+(the paper's equal share, and the linear term that yaw balance needs) and the common part of T;
+differences between the wheels' T are free: the over-actuation. Lengths are scaled by a reference
+length and forces by the weight, so that the system is of order one for any rover.
+"""
+
+import numpy as np
+
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.records import record_type
+
+UNKNOWNS = 9
+FREE_TORQUES = 5
+"""Degrees of freedom of the torques: how much more each wheel but the last pulls than all do."""
+FREE_FORCES = 9
+"""With four more of the lateral forces, which the suspension passes from wheel to wheel."""
+FREE_LATERAL = np.array([0, 1, 3, 4])
+"""Wheels whose lateral forces are the further degrees; the equal share makes up for them."""
+
+
+BALANCE = record_type(
+    ("normal", float, (6, 1 + FREE_FORCES)),  # wheel loads N
+    ("tangential", float, (6, 1 + FREE_FORCES)),  # tractions T
+    ("lateral", float, (6, 1 + FREE_FORCES)),  # lateral forces S
+    ("A", float, (UNKNOWNS, UNKNOWNS)),  # work space: the equations
+    ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
+    ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
+)
+"""How the forces of a settled rover depend on its wheel tractions, in units of its weight.
+
+Column 0 holds the forces when all wheels pull alike; column 1 + k, k < 5, how they change when
+wheel k pulls one unit more and the common pull makes up for it; column 6 + k how they change when
+wheel FREE_LATERAL[k] is pushed one unit more along its axis and the lateral shares make up for it.
+"""
+
+
+@kernel
+def balance_forces(linkage, placement, touch, columns, balance):
+    """Solve the balance of a settled rover into `balance`; False where the equations are singular.
+
+    `columns` is 1 for the common pull alone, 6 with the changes by torques, 10 with all.
+    """
+    _write_frames(placement, touch, balance.frames)
+    _write_equations(linkage, placement, touch, columns, balance)
+    B = balance.B
+    if not solve_in_place(balance.A, B, UNKNOWNS, columns):
+        return False
+    for k in range(columns):
+        for i in range(6):
+            balance.normal[i, k] = B[i, k]
+            balance.lateral[i, k] = B[6, k] + B[7, k] * _axle(linkage, placement, i)
+            balance.tangential[i, k] = B[8, k]
+        if 0 < k <= FREE_TORQUES:
+            balance.tangential[k - 1, k] += 1.0
+        elif k > FREE_TORQUES:
+            balance.lateral[FREE_LATERAL[k - 1 - FREE_TORQUES], k] += 1.0
+    return True
+
+
+@kernel
+def _axle(linkage, placement, wheel):
+    """Return the place of a wheel along the body, in reference lengths."""
+    R, origin, centres = placement.R, placement.origin, placement.centres
+    along = 0.0
+    for i in range(3):
+        along += R[i, 0] * (centres[wheel, i] - origin[i])
+    return along / linkage.length
+
+
+@kernel
+def _write_frames(placement, touch, frames):
+    R, forward, up = placement.R, placement.forward, placement.up
+    for wheel in range(6):
+        s, c = touch.sine[wheel], touch.cosine[wheel]
+        for i in range(3):
+            frames[wheel, 0, i] = c * up[i] - s * forward[i]
+            frames[wheel, 1, i] = s * up[i] + c * forward[i]
+            frames[wheel, 2, i] = R[i, 1]
+
+
+@kernel
+def _write_equations(linkage, placement, touch, columns, balance):
+    """Write the nine equations: forces, moments about the origin, bogies, differential."""
+    A, B, frames = balance.A, balance.B, balance.frames
+    A[:, :] = 0.0
+    B[:, :] = 0.0
+    origin, length = placement.origin, linkage.length
+    R, point = placement.R, touch.point
+    bogie_pivots, rocker_pivots = placement.bogie_pivots, placement.rocker_pivots
+    for wheel in range(6):
+        side = wheel // 3
+        sign = 1.0 if side == 0 else -1.0
+        axle = _axle(linkage, placement, wheel)
+        rx = (point[wheel, 0] - origin[0]) / length
+        ry = (point[wheel, 1] - origin[1]) / length
+        rz = (point[wheel, 2] - origin[2]) / length
+        for kind in range(3):
+            fx, fy, fz = frames[wheel, kind, 0], frames[wheel, kind, 1], frames[wheel, kind, 2]
+            mx, my, mz = ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx
+            about_axis = mx * R[0, 1] + my * R[1, 1] + mz * R[2, 1]
+            about_rocker = about_axis - _moment_about(
+                rocker_pivots, side, origin, length, R, fx, fy, fz
+            )
+            about_bogie = 0.0
+            if linkage.on_bogie[wheel]:
+                about_bogie = about_axis - _moment_about(
+                    bogie_pivots, side, origin, length, R, fx, fy, fz
+                )
+            for target in range(2):
+                column, share = wheel, 1.0
+                if kind == 1:
+                    column = 8
+                elif kind == 2:
+                    column = 6 + target
+                    share = 1.0 if target == 0 else axle
+                if kind < 2 and target == 1:
+                    continue
+                _add_column(
+                    A, column, share, fx, fy, fz, mx, my, mz, side, about_bogie,
+                    sign * about_rocker,
+                )  # fmt: skip
+            own = 0
+            if kind == 1 and wheel < FREE_TORQUES:
+                own = 1 + wheel
+            elif kind == 2:
+                for k in range(FREE_LATERAL.size):
+                    if FREE_LATERAL[k] == wheel:
+                        own = 1 + FREE_TORQUES + k
+            if 0 < own < columns:
+                _add_column(
+                    B, own, -1.0, fx, fy, fz, mx, my, mz, side, about_bogie, sign * about_rocker
+                )
+    _add_weights(linkage, placement, B)
+    if linkage.has_tool_load:
+        _add_tool_load(linkage, placement, B)
+
+
+@kernel
+def _add_column(
+    matrix, column, share, fx, fy, fz, mx, my, mz, side, about_bogie, about_differential
+):
+    matrix[0, column] += share * fx
+    matrix[1, column] += share * fy
+    matrix[2, column] += share * fz
+    matrix[3, column] += share * mx
+    matrix[4, column] += share * my
+    matrix[5, column] += share * mz
+    matrix[6 + side, column] += share * about_bogie
+    matrix[8, column] += share * about_differential
+
+
+@kernel
+def _moment_about(pivots, side, origin, length, R, fx, fy, fz):
+    """Return the moment about the wheel axes of a force at the pivot of `side`."""
+    px = (pivots[side, 0] - origin[0]) / length
+    py = (pivots[side, 1] - origin[1]) / length
+    pz = (pivots[side, 2] - origin[2]) / length
+    return (
+        (py * fz - pz * fy) * R[0, 1]
+        + (pz * fx - px * fz) * R[1, 1]
+        + (px * fy - py * fx) * R[2, 1]
+    )
+
+
+@kernel
+def _add_weights(linkage, placement, B):
+    """Add what the weights of all parts ask of the ground to the right-hand side."""
+    centres, part_coms = placement.centres, placement.part_coms
+    for part in range(5):
+        mass = linkage.body_mass
+        if part > 2:
+            mass = linkage.bogie_mass
+        elif part > 0:
+            mass = linkage.rocker_mass
+        _add_weight(
+            linkage, placement, B, part_coms, part, mass, (part - 1) % 2, part > 0, part > 2
+        )
+    for wheel in range(6):
+        on_bogie = linkage.on_bogie[wheel] > 0
+        mass = linkage.wheel_mass
+        _add_weight(linkage, placement, B, centres, wheel, mass, wheel // 3, wheel >= 0, on_bogie)
+
+
+@kernel
+def _add_tool_load(linkage, placement, B):
+    """Add what the tool's force and moment ask of the ground; they act on the body alone."""
+    weight = linkage.mass * linkage.gravity
+    for i in range(3):
+        force, moment = tool_load(placement.R, linkage.tool, i)
+        B[i, 0] -= force / weight
+        B[3 + i, 0] -= moment / (weight * linkage.length)
+
+
+@kernel
+def tool_load(R, tool, i):
+    """Return force [N] and moment about the body origin [N m] of the tool, along map axis i."""
+    x, y, z = tool[0, 0], tool[0, 1], tool[0, 2]
+    fx, fy, fz = tool[1, 0], tool[1, 1], tool[1, 2]
+    mx = tool[2, 0] + y * fz - z * fy
+    my = tool[2, 1] + z * fx - x * fz
+    mz = tool[2, 2] + x * fy - y * fx
+    force = R[i, 0] * fx + R[i, 1] * fy + R[i, 2] * fz
+    return force, R[i, 0] * mx + R[i, 1] * my + R[i, 2] * mz
+
+
+@kernel
+def _add_weight(linkage, placement, B, points, row, mass, side, on_rocker, on_bogie):
+    R, origin, length = placement.R, placement.origin, linkage.length
+    weight = mass / linkage.mass
+    rx = (points[row, 0] - origin[0]) / length
+    ry = (points[row, 1] - origin[1]) / length
+    B[2, 0] += weight
+    B[3, 0] += ry * weight
+    B[4, 0] -= rx * weight
+    if not on_rocker:
+        return
+    px = (placement.rocker_pivots[side, 0] - origin[0]) / length
+    py = (placement.rocker_pivots[side, 1] - origin[1]) / length
+    about = weight * ((ry - py) * R[0, 1] - (rx - px) * R[1, 1])
+    B[8, 0] += about if side == 0 else -about
+    if on_bogie:
+        px = (placement.bogie_pivots[side, 0] - origin[0]) / length
+        py = (placement.bogie_pivots[side, 1] - origin[1]) / length
+        B[6 + side, 0] += weight * ((ry - py) * R[0, 1] - (rx - px) * R[1, 1])

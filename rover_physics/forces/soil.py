@@ -1,0 +1,256 @@
+"""Wheel-soil models: the slip, sinkage and torque with which a wheel gets its pull from a soil.
+
+Coulomb friction, and Bekker's pressure-sinkage with Janosi and Hanamoto's shear for a rigid wheel.
+docs/soil.md has the formulas, their symbols and limits.
+
+Source: Wong, Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 2.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.numerics.kernels import kernel
+from rover_physics.terrain.ground import SOIL_NUMBERS
+from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, load_soils, soil_named
+
+MODEL, FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(SOIL_NUMBERS)
+"""Columns of a packed soil."""
+COULOMB, BEKKER_WONG = 0.0, 1.0
+"""Values of the column MODEL."""
+LEAST_FRICTION = 1e-3
+"""Effective friction of a wheel that cannot even pull itself, so that one may divide by it."""
+MODERATE_SINKAGE = 1.0 / 6.0
+"""Largest sinkage, in wheel diameters, at which Wong takes the sinkage formula to hold."""
+NEWTON_STEPS = 50
+
+
+def pack_soils(
+    names: Sequence[str] = (),
+    *,
+    default: str | None = None,
+    soils: Mapping[str, Soil] | None = None,
+) -> NDArray[np.float64]:
+    """Return soils in the form the kernels read.
+
+    Args:
+        names: Soils of a terrain's soil layer, ``terrain.soil_names``.
+        default: The soil where the layer says -1 or there is none; None: Coulomb friction with
+            the terrain's or the rover's own coefficient.
+        soils: Where the names are looked up; None for the presets.
+
+    Returns:
+        Array (1 + number of names, 8): row 0 is the default, row 1 + k is ``names[k]``.
+
+    Raises:
+        SoilError: A name that is not among the soils.
+    """
+    known = load_soils() if soils is None and (names or default is not None) else soils
+    table = np.zeros((1 + len(names), SOIL_NUMBERS))
+    table[:, FRICTION] = np.nan
+    for row, name in enumerate((default, *names)):
+        if name is not None:
+            _write_soil(soil_named(name, known), table[row])
+    return table
+
+
+def _write_soil(soil: Soil, row: NDArray[np.float64]) -> None:
+    if soil.model == COULOMB_MODEL:
+        row[MODEL], row[FRICTION] = COULOMB, soil.friction
+        return
+    row[MODEL] = BEKKER_WONG
+    row[COHESION], row[TAN_PHI] = soil.cohesion, np.tan(soil.friction_angle)
+    row[K_C], row[K_PHI], row[EXPONENT] = soil.k_c, soil.k_phi, soil.n
+    row[SHEAR_MODULUS] = soil.shear_modulus
+
+
+@kernel
+def coulomb_slip(utilisation):
+    """Return the slip ratio i = 1 - v / (r omega) on Coulomb ground.
+
+    A wheel sticks below the friction limit and spins freely above it: 0 or 1.
+    """
+    return 0.0 if utilisation <= 1.0 else 1.0
+
+
+@kernel
+def solve_wheel(soil, mu, radius, width, N, T, S):
+    """Find how a wheel gives the forces that the balance asks of it.
+
+    Args:
+        soil: (8,) a row of `pack_soils`.
+        mu: Coulomb coefficient where a Coulomb soil has none of its own.
+        radius: Wheel radius r [m].
+        width: Wheel width b [m].
+        N: Load along the contact normal [N].
+        T: Net traction forward along the ground (drawbar pull) [N]; negative brakes.
+        S: Lateral force [N].
+
+    Returns:
+        Slip ratio i = 1 - v / (r omega), from -1 (braked) to 1 (spins on the spot), both also
+        where the soil can't give the forces; sinkage [m]; motion resistance [N]; largest drawbar
+        pull [N], negative where the wheel can't even pull itself; wheel torque [N m], as needed;
+        utilisation: (T, S) relative to the largest forces in its direction, above 1 where they
+        are beyond what the soil can give, infinite where no forces in that direction are within.
+        A wheel without load has slip 1, infinite utilisation, and zeros else.
+    """
+    if not N > 0.0:
+        return 1.0, 0.0, 0.0, 0.0, radius * T, np.inf
+    if soil[MODEL] == COULOMB:
+        largest = _own_friction(soil, mu) * N
+        utilisation = np.sqrt(T * T + S * S) / largest
+        return coulomb_slip(utilisation), 0.0, 0.0, largest, radius * T, utilisation
+    sinkage = find_sinkage(soil, radius, width, N)
+    resistance = motion_resistance(soil, width, sinkage)
+    length = contact_length(radius, sinkage)
+    strength = shear_strength(soil, width * length, N)
+    largest = _largest_thrust(soil, radius, sinkage, length, strength)
+    thrust = T + resistance
+    utilisation = use_of_shear(T, S, resistance, largest)
+    slip = 1.0 if thrust >= 0.0 else -1.0
+    if utilisation <= 1.0:
+        slip = _slip_of_thrust(thrust, S, strength, soil[SHEAR_MODULUS] / length)
+    return slip, sinkage, resistance, largest - resistance, radius * thrust, utilisation
+
+
+@kernel
+def effective_friction(soil, mu, radius, width, N):
+    """Return the largest drawbar pull over the load N [N], at least LEAST_FRICTION.
+
+    All forces with sqrt(T^2 + S^2) up to this coefficient times N are within the soil's strength.
+    For Bekker-Wong it depends on the load.
+    """
+    if soil[MODEL] == COULOMB:
+        return _own_friction(soil, mu)
+    if not N > 0.0:
+        return LEAST_FRICTION
+    sinkage = find_sinkage(soil, radius, width, N)
+    length = contact_length(radius, sinkage)
+    strength = shear_strength(soil, width * length, N)
+    thrust = _largest_thrust(soil, radius, sinkage, length, strength)
+    return max((thrust - motion_resistance(soil, width, sinkage)) / N, LEAST_FRICTION)
+
+
+@kernel
+def is_sinkage_moderate(sinkage, radius):
+    """Tell whether the sinkage formula is within its limits of validity, z0 <= D / 6."""
+    return sinkage <= MODERATE_SINKAGE * 2.0 * radius
+
+
+@kernel
+def _own_friction(soil, mu):
+    """Return the Coulomb coefficient of a soil, else `mu`."""
+    own = soil[FRICTION]
+    return own if own > 0.0 else mu
+
+
+@kernel
+def find_sinkage(soil, radius, width, N):
+    """Return the sinkage z0 [m] of a rigid wheel under load N [N] (Bekker; Wong, section 2.4).
+
+    z0 = (3 N / ((3 - n) (k_c + b k_phi) sqrt(D)))^(2 / (2 n + 1))
+    """
+    n = soil[EXPONENT]
+    stiffness = (3.0 - n) * (soil[K_C] + width * soil[K_PHI]) * np.sqrt(2.0 * radius)
+    return (3.0 * N / stiffness) ** (2.0 / (2.0 * n + 1.0))
+
+
+@kernel
+def motion_resistance(soil, width, sinkage):
+    """Return the resistance [N] of compacting a rut, R = (k_c + b k_phi) z0^(n + 1) / (n + 1)."""
+    rise = soil[EXPONENT] + 1.0
+    return (soil[K_C] + width * soil[K_PHI]) * sinkage**rise / rise
+
+
+@kernel
+def contact_length(radius, sinkage):
+    """Return the arc [m] of rim in the soil, l = r arccos(1 - z0 / r), at most a quarter."""
+    # The arcsine keeps its digits where the sinkage is small against the radius.
+    return 2.0 * radius * np.arcsin(np.sqrt(0.5 * min(sinkage / radius, 1.0)))
+
+
+@kernel
+def shear_strength(soil, area, N):
+    """Return the shear force [N] of a fully mobilised contact (Mohr-Coulomb), A c + N tan(phi)."""
+    return area * soil[COHESION] + N * soil[TAN_PHI]
+
+
+@kernel
+def thrust_at_slip(soil, radius, width, N, slip):
+    """Return the thrust F [N] at a slip ratio, drawbar pull plus motion resistance.
+
+    F = (A c + N tan(phi)) (1 - K / (i l) (1 - exp(-i l / K))), of opposite sign for braking.
+    None from a wheel sunk to its axle.
+    """
+    sinkage = find_sinkage(soil, radius, width, N)
+    if sinkage >= radius:
+        return 0.0
+    length = contact_length(radius, sinkage)
+    share = mobilised_share(abs(slip) * length / soil[SHEAR_MODULUS])
+    return np.copysign(share * shear_strength(soil, width * length, N), slip)
+
+
+@kernel
+def mobilised_share(x):
+    """Return 1 - (1 - exp(-x)) / x for x >= 0: how much of the strength x = i l / K mobilises."""
+    if x < 1e-3:
+        return x * (1.0 / 2.0 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0)))
+    return 1.0 + np.expm1(-x) / x
+
+
+@kernel
+def find_mobilisation(share):
+    """Return the x >= 0 at which `mobilised_share` is `share`, from 0 to below 1.
+
+    The root of x (1 - share) = 1 - exp(-x). The difference of both sides is convex, so Newton's
+    steps from a bound above the root come down to it without a miss.
+    """
+    if share < 1e-5:
+        return share * (2.0 + share * 4.0 / 3.0)
+    rest = 1.0 - share
+    x = min(1.0, 2.0 * share) / rest
+    for _ in range(NEWTON_STEPS):
+        change = (x * rest + np.expm1(-x)) / (rest - np.exp(-x))
+        x -= change
+        if not change > 1e-14 * x:
+            break
+    return x
+
+
+@kernel
+def _largest_thrust(soil, radius, sinkage, length, strength):
+    """Return the thrust [N] at slip 1; none from a wheel sunk to its axle."""
+    if sinkage >= radius:
+        return 0.0
+    return strength * mobilised_share(length / soil[SHEAR_MODULUS])
+
+
+@kernel
+def use_of_shear(T, S, resistance, largest):
+    """Return (T, S) relative to the largest forces in its direction.
+
+    The forces that the soil can give are the circle sqrt((T + R)^2 + S^2) <= F(1).
+    """
+    room = (largest - resistance) * (largest + resistance)
+    if room > 0.0:
+        along = T * resistance
+        return (along + np.sqrt(along * along + (T * T + S * S) * room)) / room
+    # Zero forces are outside of the circle: such a wheel has to be dragged by the others.
+    thrust = T + resistance
+    needed = np.sqrt(thrust * thrust + S * S)
+    return needed / largest if needed < largest else np.inf
+
+
+@kernel
+def _slip_of_thrust(thrust, S, strength, shear_ratio):
+    """Return the slip ratio of a thrust within the strength; `shear_ratio` is K / l.
+
+    Shear stress opposes shear displacement, so the longitudinal slip is the share of the thrust in
+    the whole displacement.
+    """
+    needed = np.sqrt(thrust * thrust + S * S)
+    if needed == 0.0:
+        return 0.0
+    whole = min(find_mobilisation(needed / strength) * shear_ratio, 1.0)
+    return whole * thrust / needed

@@ -1,0 +1,116 @@
+"""Tip-over measures: the paper's ratio of angles, and the force-angle measure.
+
+The support polygon of a rocker-bogie rover has four corners. A bogie turns freely, so the ground
+carries it along the line through its pivot: it supports the rover where that line meets the line
+between its two contacts. The other two corners are the contacts of the wheels on the rockers. A
+rover tips over an edge of this polygon when the loads beyond the edge vanish: exactly so sideways;
+up and down a slope the tractions shift it by a few degrees.
+
+Source: Papadopoulos and Rey, "A New Measure of Tipover Stability Margin for Mobile Manipulators",
+IEEE ICRA 1996: eqs for a_i, l_i, f_i*, theta_i, d_i and alpha = min theta_i |d_i| |f_i*|.
+"""
+
+import numpy as np
+
+from rover_physics.numerics.kernels import kernel
+
+CORNERS = 4
+
+
+@kernel
+def find_support(linkage, placement, touch, corners):
+    """Write the support polygon into corners (4, 3) [m]: counter-clockwise from the rear right."""
+    for side in range(2):
+        first = 3 * side
+        _write_side(linkage, placement, touch, side, first, corners)
+
+
+@kernel
+def _write_side(linkage, placement, touch, side, first, corners):
+    point, pivot = touch.point, placement.bogie_pivots
+    rocker_is_rear = not linkage.on_bogie[first]
+    on_rocker = first if rocker_is_rear else first + 2
+    behind = first + 1 if rocker_is_rear else first
+    ahead = behind + 1
+    R = placement.R
+    along_x, along_y = R[0, 0], R[1, 0]
+    reach_behind = along_x * (point[behind, 0] - pivot[side, 0])
+    reach_behind += along_y * (point[behind, 1] - pivot[side, 1])
+    reach_ahead = along_x * (point[ahead, 0] - pivot[side, 0])
+    reach_ahead += along_y * (point[ahead, 1] - pivot[side, 1])
+    share = -reach_behind / (reach_ahead - reach_behind)
+    share = min(max(share, 0.0), 1.0)
+    rear = 0 if side == 0 else 3
+    front = 1 if side == 0 else 2
+    rocker_corner = rear if rocker_is_rear else front
+    bogie_corner = front if rocker_is_rear else rear
+    for i in range(3):
+        corners[rocker_corner, i] = point[on_rocker, i]
+        corners[bogie_corner, i] = point[behind, i] + share * (point[ahead, i] - point[behind, i])
+
+
+@kernel
+def tip_over_angles(corners, centre, force, moment):
+    """Return the smallest tip-over angle [rad] and the smallest force-angle measure [N m].
+
+    Args:
+        corners: (k, 3) support polygon, counter-clockwise seen from above [m].
+        centre: (3,) point where force and moment act, the centre of mass [m].
+        force: (3,) net force on the rover but for the ground's: weight and tool force [N].
+        moment: (3,) net moment about `centre` but for the ground's [N m].
+
+    Both are negative once the net force points outside the polygon.
+    """
+    smallest_angle = np.inf
+    smallest_measure = np.inf
+    count = corners.shape[0]
+    for edge in range(count):
+        angle, measure = measure_edge(corners, edge, (edge + 1) % count, centre, force, moment)
+        smallest_angle = min(smallest_angle, angle)
+        smallest_measure = min(smallest_measure, measure)
+    return smallest_angle, smallest_measure
+
+
+@kernel
+def measure_edge(corners, start, end, centre, force, moment):
+    """Return tip-over angle [rad] and force-angle measure [N m] of one edge of the polygon."""
+    ax, ay, az = (
+        corners[end, 0] - corners[start, 0],
+        corners[end, 1] - corners[start, 1],
+        corners[end, 2] - corners[start, 2],
+    )
+    length = np.sqrt(ax * ax + ay * ay + az * az)
+    if not length > 0.0:
+        return np.inf, np.inf
+    ax, ay, az = ax / length, ay / length, az / length
+    lx, ly, lz = _normal_to(
+        ax,
+        ay,
+        az,
+        corners[end, 0] - centre[0],
+        corners[end, 1] - centre[1],
+        corners[end, 2] - centre[2],
+    )
+    fx, fy, fz = _normal_to(ax, ay, az, force[0], force[1], force[2])
+    about = ax * moment[0] + ay * moment[1] + az * moment[2]
+    arm = lx * lx + ly * ly + lz * lz
+    if not arm > 0.0:
+        return 0.0, 0.0
+    fx += about * (ly * az - lz * ay) / arm
+    fy += about * (lz * ax - lx * az) / arm
+    fz += about * (lx * ay - ly * ax) / arm
+    size = np.sqrt(fx * fx + fy * fy + fz * fz)
+    if not size > 0.0:
+        return np.inf, np.inf
+    along = lx * fx + ly * fy + lz * fz
+    across = ax * (fy * lz - fz * ly) + ay * (fz * lx - fx * lz) + az * (fx * ly - fy * lx)
+    angle = np.arctan2(-across, along)
+    distance = abs(across) / size
+    return angle, angle * distance * size
+
+
+@kernel
+def _normal_to(ax, ay, az, x, y, z):
+    """Return the part of (x, y, z) normal to the unit vector (ax, ay, az)."""
+    along = ax * x + ay * y + az * z
+    return x - along * ax, y - along * ay, z - along * az

@@ -1,0 +1,40 @@
+"""Solving a small dense linear system inside a kernel."""
+
+from rover_physics.numerics.kernels import kernel
+
+
+@kernel
+def solve_in_place(A, B, n, m):
+    """Solve A X = B by Gaussian elimination with partial pivoting, overwriting both.
+
+    A (n, n) and B (n, m) are the upper left parts of the arrays; on return B holds X. Returns
+    False where A is singular to working precision.
+    """
+    for k in range(n):
+        pivot = k
+        largest = abs(A[k, k])
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > largest:
+                largest = abs(A[i, k])
+                pivot = i
+        if not largest > 1e-12:
+            return False
+        if pivot != k:
+            for j in range(k, n):
+                A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
+            for j in range(m):
+                B[k, j], B[pivot, j] = B[pivot, j], B[k, j]
+        for i in range(k + 1, n):
+            factor = A[i, k] / A[k, k]
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    A[i, j] -= factor * A[k, j]
+                for j in range(m):
+                    B[i, j] -= factor * B[k, j]
+    for j in range(m):
+        for i in range(n - 1, -1, -1):
+            total = B[i, j]
+            for k in range(i + 1, n):
+                total -= A[i, k] * B[k, j]
+            B[i, j] = total / A[i, i]
+    return True

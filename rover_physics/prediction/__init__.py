@@ -1,0 +1,1 @@
+"""The model along a path: poses in, predictions out."""

@@ -1,0 +1,278 @@
+"""The full model at one pose, and the compiled sweep of it over many poses."""
+
+from typing import Any
+
+import numpy as np
+from numba import prange
+
+from rover_physics.contact.clearance import belly_clearance
+from rover_physics.contact.contact_record import TOUCH
+from rover_physics.contact.settling import SETTLED, settle
+from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
+from rover_physics.forces.soil import coulomb_slip, effective_friction, solve_wheel
+from rover_physics.forces.soil_sharing import share_forces_on_soil
+from rover_physics.forces.stability import CORNERS, find_support, tip_over_angles
+from rover_physics.forces.torques import (
+    EQUAL,
+    TORQUE_SEARCH,
+    minimise_friction,
+    take_equal_torques,
+)
+from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.records import new_record, record_type, shared_array_of
+from rover_physics.numerics.threads import threads_worth
+from rover_physics.rover.linkage import PLACEMENT, place_masses
+from rover_physics.terrain.ground import SOIL_NUMBERS, friction_at
+
+NO_EQUILIBRIUM = 4
+CHUNK, MOST_CHUNKS = 16, 64
+"""Poses that share one work space at least, and most such chunks: enough to keep cores busy."""
+OPTIMAL_EFFORT = 5
+"""Time of a pose under optimal torques, in that of one under equal ones."""
+NONE_HELD = np.empty((0, 6, 2))
+"""No wheel climbs a face."""
+
+
+SETTINGS = record_type(
+    ("policy", np.int64),  # EQUAL or OPTIMAL
+    ("friction", float),  # friction coefficient where the terrain gives none
+    ("max_torque", float),  # largest wheel torque [N m]
+    ("allowed_torque", float),  # largest wheel torque within the safety limit [N m]
+    ("on_soil", np.bool_),  # whether anything but the ground's own Coulomb friction may hold
+    ("direction", float),  # 1 where the rover drives forwards, -1 backwards
+    ("speed", float),  # speed of the wheels over the ground [m/s]
+    ("max_wheel_speed", float),  # largest wheel speed [rad/s]
+    ("flat_angle", float),  # tip-over angle on flat ground [rad]
+    ("flat_measure", float),  # force-angle measure on flat ground [N m]
+)
+"""What a sweep is asked for."""
+
+RESULT = record_type(
+    ("status", np.int8),
+    ("q", float, (6,)),
+    ("wheel_centres", float, (6, 3)),
+    ("contact_points", float, (6, 3)),
+    ("contact_angle", float, (6,)),
+    ("wheel_loads", float, (6,)),
+    ("tangential", float, (6,)),
+    ("lateral", float, (6,)),
+    ("torque", float, (6,)),
+    ("friction", float, (6,)),
+    ("friction_utilisation", float, (6,)),
+    ("slip_ratio", float, (6,)),
+    ("torque_saturation", float, (6,)),
+    ("sinkage", float, (6,)),
+    ("motion_resistance", float, (6,)),
+    ("tip_over_ratio", float),
+    ("tip_over_force_angle", float),
+    ("belly_clearance", float),
+    ("power", float),
+)
+"""The results of one pose; all but q are as in `PathPrediction`."""
+
+WORK = record_type(
+    ("placement", PLACEMENT),
+    ("touch", TOUCH),
+    ("balance", BALANCE),
+    ("search", TORQUE_SEARCH),
+    ("J", float, (6, 6)),
+    ("step", float, (6, 1)),
+    ("corners", float, (CORNERS, 3)),
+    ("centre", float, (3,)),
+    ("force", float, (3,)),
+    ("moment", float, (3,)),
+    ("soils", float, (6, SOIL_NUMBERS)),
+    ("best", float, (3, 6)),
+)
+"""Work space of one thread."""
+
+
+def new_results(n: int) -> Any:
+    """Return the results (n,) of n poses, all NaN."""
+    numbers = np.full((n, RESULT.itemsize // 8), np.nan)
+    results = numbers.view(RESULT)[:, 0]
+    results["status"] = 0
+    return results
+
+
+def new_work() -> Any:
+    """Return empty work space, no wheel held."""
+    work = new_record(WORK)
+    work.touch.held_height = work.touch.held_angle = np.nan
+    return work
+
+
+_NEW_WORK = np.array([new_work()], WORK).view(np.float64)
+"""As numbers, for numpy copies records field by field."""
+
+
+def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
+    """Evaluate the model at poses (n, 3) and return the results (n,), a RESULT each.
+
+    held (n, 6, 2) gives height [m] and contact angle [rad] of wheels that climb a face, NaN for
+    those that rest on the ground; (0, 6, 2) where none climbs. The others are those of `Setup`.
+    """
+    results = new_results(len(poses))
+    records = [shared_array_of(record) for record in (linkage, samples, settings)]
+    with threads_worth(effort(settings, len(poses))) as threads:
+        works = new_works(threads, len(poses))
+        evaluate_poses(ground.records, *records, poses, held, works, results)
+    return results
+
+
+def new_works(threads: int, poses: int) -> Any:
+    """Return empty work spaces for a sweep, one for each chunk of poses."""
+    chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-poses // CHUNK))
+    return _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
+
+
+def effort(settings, poses: int) -> int:
+    """Return how long so many poses take, in that of one under equal torques."""
+    return poses * (1 if settings["policy"] == EQUAL else OPTIMAL_EFFORT)
+
+
+@sweep_kernel
+def evaluate_poses(grounds, linkages, samplings, settings, poses, held, works, results):
+    """Evaluate the poses into `results` in chunks, as many as there are work spaces.
+
+    Records can't be handed to the threads but as arrays, here of one element.
+    """
+    n, chunks = poses.shape[0], works.size
+    for chunk in prange(chunks):
+        for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
+            evaluate_pose(
+                grounds[0], linkages[0], samplings[0], settings[0],
+                poses, held, i, works[chunk], results[i],
+            )  # fmt: skip
+
+
+@kernel
+def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, result):
+    """Evaluate the model at pose i into `result`; where it does not settle only the status."""
+    q, placement, touch = result.q, work.placement, work.touch
+    for wheel in range(6 if held.shape[0] > 0 else 0):
+        touch.held_height[wheel] = held[i, wheel, 0]
+        touch.held_angle[wheel] = held[i, wheel, 1]
+    status = settle(
+        ground, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
+        q, placement, touch, work.J, work.step,
+    )  # fmt: skip
+    if status == SETTLED:
+        place_masses(linkage, q, placement)
+        columns_needed = 1 if settings.policy == EQUAL else 1 + FREE_FORCES
+        if not balance_forces(linkage, placement, touch, columns_needed, work.balance):
+            status = NO_EQUILIBRIUM
+    result.status = status
+    if status != SETTLED:
+        q[:] = np.nan
+        return
+    _write_geometry(placement, touch, result)
+    _write_forces(ground, linkage, settings, work, result)
+    angle, measure = find_tip_over(linkage, work)
+    result.tip_over_ratio = angle / settings.flat_angle
+    result.tip_over_force_angle = measure / settings.flat_measure
+    result.belly_clearance = belly_clearance(ground, linkage, placement)
+
+
+@kernel
+def _write_geometry(placement, touch, result):
+    for wheel in range(6):
+        result.contact_angle[wheel] = np.arctan2(touch.sine[wheel], touch.cosine[wheel])
+        for k in range(3):
+            result.wheel_centres[wheel, k] = placement.centres[wheel, k]
+            result.contact_points[wheel, k] = touch.point[wheel, k]
+
+
+@kernel
+def _write_forces(ground, linkage, settings, work, result):
+    search, point = work.search, work.touch.point
+    weight = linkage.mass * linkage.gravity
+    for wheel in range(6):
+        search.mu[wheel] = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
+    if settings.on_soil:
+        share_forces_on_soil(ground, linkage, settings, work)
+    elif settings.policy == EQUAL:
+        take_equal_torques(work.balance, search)
+    else:
+        largest = settings.allowed_torque / (linkage.radius * weight)
+        minimise_friction(work.balance, largest, search)
+    power = 0.0
+    for wheel in range(6):
+        N = weight * search.wheel_loads[wheel]
+        T = weight * search.tangential[wheel]
+        S = weight * search.lateral[wheel]
+        mu = search.mu[wheel]
+        sinkage, resistance = 0.0, 0.0
+        if settings.on_soil:
+            soil = work.soils[wheel]
+            slip, sinkage, resistance, pull, torque, utilisation = solve_wheel(
+                soil, mu, linkage.radius, linkage.width, N, settings.direction * T, S
+            )
+            torque *= settings.direction
+            mu = effective_friction(soil, mu, linkage.radius, linkage.width, N)
+        else:
+            torque = linkage.radius * T
+            utilisation = np.sqrt(T * T + S * S) / (mu * N) if N > 0.0 else np.inf
+            slip = coulomb_slip(utilisation)
+        result.wheel_loads[wheel] = N
+        result.tangential[wheel] = T
+        result.lateral[wheel] = S
+        result.torque[wheel] = torque
+        result.friction[wheel] = mu
+        result.friction_utilisation[wheel] = utilisation
+        result.slip_ratio[wheel] = slip
+        result.torque_saturation[wheel] = abs(torque) / settings.max_torque
+        result.sinkage[wheel] = sinkage
+        result.motion_resistance[wheel] = resistance
+        power += max(settings.direction * torque, 0.0) * _wheel_speed(
+            linkage.radius, slip, settings
+        )
+    result.power = power
+
+
+@kernel
+def _wheel_speed(radius, slip, settings):
+    if slip >= 1.0:
+        return settings.max_wheel_speed
+    return min(settings.speed / (radius * (1.0 - slip)), settings.max_wheel_speed)
+
+
+@kernel
+def find_tip_over(linkage, work):
+    """Return tip-over angle [rad] and force-angle measure [N m] of a placed rover."""
+    centre, force, moment = work.centre, work.force, work.moment
+    _write_centre_of_mass(linkage, work.placement, centre)
+    force[0], force[1], force[2] = 0.0, 0.0, -linkage.mass * linkage.gravity
+    moment[:] = 0.0
+    if linkage.has_tool_load:
+        _add_tool_load(linkage, work.placement, centre, force, moment)
+    find_support(linkage, work.placement, work.touch, work.corners)
+    return tip_over_angles(work.corners, centre, force, moment)
+
+
+@kernel
+def _add_tool_load(linkage, placement, centre, force, moment):
+    """Add the tool's force and its moment about `centre`."""
+    origin, tool = placement.origin, linkage.tool
+    fx, moment_x = tool_load(placement.R, tool, np.int64(0))
+    fy, moment_y = tool_load(placement.R, tool, np.int64(1))
+    fz, moment_z = tool_load(placement.R, tool, np.int64(2))
+    rx, ry, rz = origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2]
+    force[0] += fx
+    force[1] += fy
+    force[2] += fz
+    moment[0] += moment_x + ry * fz - rz * fy
+    moment[1] += moment_y + rz * fx - rx * fz
+    moment[2] += moment_z + rx * fy - ry * fx
+
+
+@kernel
+def _write_centre_of_mass(linkage, placement, centre):
+    coms, centres = placement.part_coms, placement.centres
+    for k in range(3):
+        total = linkage.body_mass * coms[0, k]
+        total += linkage.rocker_mass * (coms[1, k] + coms[2, k])
+        total += linkage.bogie_mass * (coms[3, k] + coms[4, k])
+        for wheel in range(6):
+            total += linkage.wheel_mass * centres[wheel, k]
+        centre[k] = total / linkage.mass

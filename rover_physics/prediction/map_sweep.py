@@ -1,0 +1,170 @@
+"""Many poses that form no path, such as all cells of a map: few numbers each.
+
+A prediction keeps some 100 numbers a pose; of a map of a million cells at eight headings that
+would be 6 GB. Here the results of each pose are boiled down at once to what decides whether the
+rover can stand and drive there.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import prange
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.contact.settling import SETTLED
+from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.records import shared_array_of
+from rover_physics.numerics.threads import threads_worth
+from rover_physics.prediction.evaluation import (
+    NONE_HELD,
+    effort,
+    evaluate_pose,
+    new_results,
+    new_works,
+)
+from rover_physics.prediction.model_setup import Setup, set_up
+from rover_physics.prediction.sweep import check_poses, one_sweep_at_a_time
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+
+BATCH = 32_768
+"""About how many poses of a map are scored at a time."""
+NUMBERS = 6
+"""Numbers that a score has beside the status."""
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseScores:
+    """What decides about poses; arrays of one shape, NaN where the rover does not settle."""
+
+    status: NDArray[np.int8]
+    """SETTLED, OFF_MAP, UNKNOWN_GROUND, NOT_SETTLED or NO_EQUILIBRIUM of `sweep`."""
+    friction_utilisation: Floats
+    """Largest of the six wheels; infinite where one lifts off."""
+    torque_saturation: Floats
+    """Largest of the six wheels."""
+    least_load: Floats
+    """Smallest of the six wheel loads [N]."""
+    tip_over_ratio: Floats
+    """Tip-over angle over that on flat ground."""
+    tilt: Floats
+    """Angle between body z and the vertical [rad]."""
+    belly_clearance: Floats
+    """Smallest height of the underside above the ground [m]."""
+
+    def within_limits(self, rover: Rover) -> NDArray[np.bool_]:
+        """Tell where the rover keeps the limits of its file, but for sinkage and suspension."""
+        limits = rover.limits
+        return np.asarray(
+            (self.status == SETTLED)
+            & (self.friction_utilisation <= limits.friction_utilisation)
+            & (self.torque_saturation <= limits.torque_saturation)
+            & (self.least_load >= 0.0)
+            & (self.tip_over_ratio >= limits.tip_over_ratio)
+            & (self.tilt <= limits.tilt)
+            & (self.belly_clearance >= limits.belly_clearance)
+        )
+
+
+def score_poses(rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: Any) -> PoseScores:
+    """Score poses each for itself, with nothing between them.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        poses: (..., 3) x, y [m] and yaw [rad] of base_link in the map frame, of any shape.
+        arguments: Further arguments of `sweep_path`.
+
+    Returns:
+        Arrays of the shape of the poses without the last axis.
+
+    Raises:
+        PoseError: poses of wrong shape, or not finite.
+        ModelError, SoilError: As `sweep_path`.
+    """
+    given = np.asarray(poses)
+    flat = check_poses(given.reshape(-1, 3) if given.shape[-1:] == (3,) else given)
+    return _score(set_up(rover, terrain, **arguments), flat, given.shape[:-1])
+
+
+def sweep_map(
+    rover: Rover, terrain: Terrain, headings: int = 8, **arguments: Any
+) -> Iterator[tuple[int, PoseScores]]:
+    """Score the rover over each cell of a map at headings all around, a few rows at a time.
+
+    Args:
+        rover: The rover.
+        terrain: The map of (ny, nx) cells.
+        headings: Number of headings, the first along x, then equally spaced to the left.
+        arguments: Further arguments of `sweep_path`.
+
+    Yields:
+        The first row, and scores (rows, nx, headings) of that row and those that follow. Whoever
+        keeps all of them keeps 25 bytes a pose.
+
+    Raises:
+        ModelError, SoilError: As `sweep_path`.
+    """
+    ny, nx = terrain.elevation.shape
+    x = terrain.origin[0] + terrain.resolution * np.arange(nx)
+    yaw = np.arange(headings) * (2.0 * np.pi / headings)
+    setup = set_up(rover, terrain, **arguments)
+    rows = max(1, BATCH // (nx * headings))
+    for first in range(0, ny, rows):
+        y = terrain.origin[1] + terrain.resolution * np.arange(first, min(first + rows, ny))
+        grid = np.stack(np.broadcast_arrays(x[:, None], y[:, None, None], yaw), axis=-1)
+        poses = np.ascontiguousarray(grid.reshape(-1, 3))
+        yield first, _score(setup, poses, grid.shape[:-1])
+
+
+def _score(setup: Setup, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
+    """Score poses (n, 3); the scores have another shape of n elements."""
+    n = len(poses)
+    status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
+    records = [shared_array_of(record) for record in setup[1:]]
+    with one_sweep_at_a_time, threads_worth(effort(setup.settings, n)) as threads:
+        works = new_works(threads, n)
+        results = new_results(len(works))
+        score_all(
+            setup.ground.records, *records, poses, NONE_HELD, works, results, status, numbers
+        )
+    return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
+
+
+@sweep_kernel
+def score_all(
+    grounds, linkages, samplings, settings, poses, held, works, results, status, numbers
+):
+    """Score the poses in chunks, as many as there are work spaces and results."""
+    n, chunks = poses.shape[0], works.size
+    for chunk in prange(chunks):
+        for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
+            evaluate_pose(
+                grounds[0], linkages[0], samplings[0], settings[0],
+                poses, held, i, works[chunk], results[chunk],
+            )  # fmt: skip
+            status[i] = results[chunk].status
+            _write_score(results[chunk], i, numbers)
+
+
+@kernel
+def _write_score(result, i, numbers):
+    """Write column i of numbers (NUMBERS, n), in the order of `PoseScores`."""
+    if result.status != SETTLED:
+        for k in range(NUMBERS):
+            numbers[k, i] = np.nan
+        return
+    use, saturation, least = 0.0, 0.0, np.inf
+    for wheel in range(6):
+        use = max(use, result.friction_utilisation[wheel])
+        saturation = max(saturation, result.torque_saturation[wheel])
+        least = min(least, result.wheel_loads[wheel])
+    upright = np.cos(result.q[1]) * np.cos(result.q[2])
+    numbers[0, i], numbers[1, i], numbers[2, i] = use, saturation, least
+    numbers[3, i] = result.tip_over_ratio
+    numbers[4, i] = np.arccos(min(max(upright, -1.0), 1.0))
+    numbers[5, i] = result.belly_clearance

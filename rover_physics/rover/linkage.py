@@ -1,0 +1,193 @@
+"""The rocker-bogie linkage as the kernels see it: its constants, and where its parts are."""
+
+from typing import Any
+
+import numpy as np
+
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.records import new_record, record_type
+from rover_physics.rover.model import Rover
+
+LINKAGE = record_type(
+    ("radius", float),  # wheel radius [m]
+    ("width", float),  # wheel width [m]
+    ("wheels", float, (6, 3)),  # wheel centres [m] in wheel order
+    ("on_bogie", np.uint8, (6,)),  # 1 for the wheels that hang on a bogie
+    ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
+    ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
+    ("gravity", float),  # gravity [m/s^2]
+    ("wheel_mass", float),  # mass of one wheel [kg]
+    ("body_mass", float),  # mass of the body with its arm and payload [kg]
+    ("body_com", float, (3,)),  # centre of mass of the body with its arm and payload [m]
+    ("rocker_mass", float),  # mass of one rocker [kg]
+    ("rocker_coms", float, (2, 3)),  # centres of mass of the rockers [m]
+    ("bogie_mass", float),  # mass of one bogie [kg]
+    ("bogie_coms", float, (2, 3)),  # centres of mass of the bogies [m]
+    ("mass", float),  # mass of the whole rover [kg]
+    ("length", float),  # rear to front axle [m]: makes moments comparable with forces
+    ("belly", float, (5,)),  # underside: z, smallest and largest x, smallest and largest y [m]
+    ("has_tool_load", np.bool_),  # whether the arm's tool is pushed or turned
+    ("tool", float, (3, 3)),  # tip of the arm [m], force [N] and moment [N m] on the tool
+)
+"""Geometry and masses of a rover, body frame, flat ground, right side first."""
+
+NO_TOOL = np.zeros((3, 3))
+"""A tool that nothing acts on."""
+
+
+def pack_linkage(
+    rover: Rover, body_mass: float, body_com: np.ndarray, tool: np.ndarray = NO_TOOL
+) -> Any:
+    """Return the constants of `rover` as a record LINKAGE.
+
+    Args:
+        rover: The rover.
+        body_mass: Mass of the body with its arm and payload [kg].
+        body_com: (3,) centre of mass of the same [m], body frame.
+        tool: (3, 3) tip of the arm [m], force [N] and moment [N m] on the tool, body frame.
+    """
+    suspension, masses, belly = rover.suspension, rover.masses, rover.belly
+    names = ("rear", "middle", "front")
+    left = [suspension.wheels[name] for name in names]
+    on_bogie = [name != suspension.rocker_wheel for name in names]
+    return new_record(
+        LINKAGE,
+        radius=float(rover.wheel.radius),
+        width=float(rover.wheel.width),
+        wheels=np.array([_mirror(p) for p in left] + left, dtype=float),
+        on_bogie=np.array(on_bogie * 2),
+        rocker_pivots=_both_sides(suspension.rocker_pivot),
+        bogie_pivots=_both_sides(suspension.bogie_pivot),
+        gravity=float(rover.gravity),
+        wheel_mass=float(rover.wheel.mass),
+        body_mass=float(body_mass),
+        body_com=np.asarray(body_com, dtype=float),
+        rocker_mass=float(masses.rocker.mass),
+        rocker_coms=_both_sides(masses.rocker.com),
+        bogie_mass=float(masses.bogie.mass),
+        bogie_coms=_both_sides(masses.bogie.com),
+        mass=float(
+            body_mass + 2 * (masses.rocker.mass + masses.bogie.mass) + 6 * rover.wheel.mass
+        ),
+        length=float(suspension.wheels["front"][0] - suspension.wheels["rear"][0]),
+        belly=np.array([belly.z, *belly.x, *belly.y], dtype=float),
+        has_tool_load=bool(np.any(tool[1:])),
+        tool=np.ascontiguousarray(tool, dtype=float),
+    )
+
+
+def _mirror(point) -> tuple[float, float, float]:
+    return (point[0], -point[1], point[2])
+
+
+def _both_sides(left) -> np.ndarray:
+    return np.array([_mirror(left), left], dtype=float)
+
+
+@kernel
+def attitude_matrix(roll, pitch, yaw, R):
+    """Write R = Rz(yaw) Ry(pitch) Rx(roll), body to map, into R (3, 3)."""
+    cr, sr = np.cos(roll), np.sin(roll)
+    cp, sp = np.cos(pitch), np.sin(pitch)
+    cy, sy = np.cos(yaw), np.sin(yaw)
+    R[0, 0] = cy * cp
+    R[0, 1] = cy * sp * sr - sy * cr
+    R[0, 2] = cy * sp * cr + sy * sr
+    R[1, 0] = sy * cp
+    R[1, 1] = sy * sp * sr + cy * cr
+    R[1, 2] = sy * sp * cr - cy * sr
+    R[2, 0] = -sp
+    R[2, 1] = cp * sr
+    R[2, 2] = cp * cr
+
+
+PLACEMENT = record_type(
+    ("R", float, (3, 3)),  # attitude, body to map; its second column is the axis of all wheels
+    ("origin", float, (3,)),  # body origin [m]
+    ("centres", float, (6, 3)),  # wheel centres [m]
+    ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
+    ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
+    ("part_coms", float, (5, 3)),  # centres of mass of body, rockers and bogies, right first [m]
+    ("forward", float, (3,)),  # horizontal direction in the plane of the wheels
+    ("up", float, (3,)),  # direction in the plane of the wheels normal to `forward`, upwards
+)
+"""Where a rover's parts are in one configuration, map frame; written by `place`."""
+
+
+@kernel
+def to_map(R, origin, x, y, z, out, row):
+    """Write the point (x, y, z) of the body frame in the map frame into row `row` of `out`."""
+    for i in range(3):
+        out[row, i] = origin[i] + R[i, 0] * x + R[i, 1] * y + R[i, 2] * z
+
+
+@kernel
+def rocker_sign(side):
+    """Return the sign of the rocker angle on `side`: the differential mirrors the rockers."""
+    return 1.0 if side == 0 else -1.0
+
+
+@kernel
+def place(linkage, x, y, yaw, q, placement):
+    """Write where all parts are into `placement`.
+
+    q (6,): z of the body origin [m], roll, pitch, right rocker angle, right and left bogie angle
+    [rad].
+    """
+    R, origin, wheels = placement.R, placement.origin, linkage.wheels
+    pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
+    attitude_matrix(q[1], q[2], yaw, R)
+    origin[0], origin[1], origin[2] = x, y, q[0]
+    for side in range(2):
+        px, py, pz = pivots[side, 0], pivots[side, 1], pivots[side, 2]
+        angle = rocker_sign(side) * q[3]
+        rocker_c, rocker_s = np.cos(angle), np.sin(angle)
+        bogie_c, bogie_s = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
+        to_map(R, origin, px, py, pz, placement.rocker_pivots, side)
+        dx, dz = bogie_pivots[side, 0] - px, bogie_pivots[side, 2] - pz
+        bx, bz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
+        to_map(R, origin, bx, bogie_pivots[side, 1], bz, placement.bogie_pivots, side)
+        for i in range(3 * side, 3 * side + 3):
+            if linkage.on_bogie[i]:
+                dx, dz = wheels[i, 0] - bogie_pivots[side, 0], wheels[i, 2] - bogie_pivots[side, 2]
+                wx, wz = bx + bogie_c * dx + bogie_s * dz, bz - bogie_s * dx + bogie_c * dz
+            else:
+                dx, dz = wheels[i, 0] - px, wheels[i, 2] - pz
+                wx, wz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
+            to_map(R, origin, wx, wheels[i, 1], wz, placement.centres, i)
+    _span_wheel_plane(R, placement.forward, placement.up)
+
+
+@kernel
+def place_masses(linkage, q, placement):
+    """Write where the centres of mass are into a placement written by `place` with q (6,)."""
+    R, origin, coms = placement.R, placement.origin, placement.part_coms
+    pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
+    to_map(R, origin, linkage.body_com[0], linkage.body_com[1], linkage.body_com[2], coms, 0)
+    for side in range(2):
+        px, pz = pivots[side, 0], pivots[side, 2]
+        angle = rocker_sign(side) * q[3]
+        c, s = np.cos(angle), np.sin(angle)
+        point = linkage.rocker_coms
+        dx, dz = point[side, 0] - px, point[side, 2] - pz
+        to_map(
+            R, origin, px + c * dx + s * dz, point[side, 1], pz - s * dx + c * dz, coms, 1 + side
+        )
+        dx, dz = bogie_pivots[side, 0] - px, bogie_pivots[side, 2] - pz
+        bx, bz = px + c * dx + s * dz, pz - s * dx + c * dz
+        c, s = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
+        point = linkage.bogie_coms
+        dx, dz = point[side, 0] - bogie_pivots[side, 0], point[side, 2] - bogie_pivots[side, 2]
+        to_map(
+            R, origin, bx + c * dx + s * dz, point[side, 1], bz - s * dx + c * dz, coms, 3 + side
+        )
+
+
+@kernel
+def _span_wheel_plane(R, forward, up):
+    axis_x, axis_y, axis_z = R[0, 1], R[1, 1], R[2, 1]
+    length = np.sqrt(axis_x * axis_x + axis_y * axis_y)
+    forward[0], forward[1], forward[2] = axis_y / length, -axis_x / length, 0.0
+    up[0] = forward[1] * axis_z
+    up[1] = -forward[0] * axis_z
+    up[2] = forward[0] * axis_y - forward[1] * axis_x

@@ -1,0 +1,186 @@
+"""The paper's three-joint arm: its kinematics, and what it and its tool do to the body."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.errors import ModelError
+from rover_physics.rover.model import Manipulator, Rover
+
+JOINT_TOLERANCE = 1e-6
+"""How far [rad] an angle may be beyond the limit of its joint, for rounding."""
+
+
+def link_points(arm: Manipulator, angles: np.ndarray) -> np.ndarray:
+    """Return the ends of the links, from the base to the tip: (4, 3) [m], body frame.
+
+    Args:
+        arm: The manipulator.
+        angles: (3,) base yaw about z, shoulder and elbow pitch about y, positive downwards [rad].
+    """
+    yaw, shoulder, elbow = angles
+    column, upper, fore = arm.link_lengths
+    base = np.asarray(arm.base, dtype=float)
+    pitch = np.array([shoulder, shoulder + elbow])
+    reach, height = np.cos(pitch), -np.sin(pitch)
+    away = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    top = base + column * up
+    wrist = top + upper * (reach[0] * away + height[0] * up)
+    tip = wrist + fore * (reach[1] * away + height[1] * up)
+    return np.array([base, top, wrist, tip])
+
+
+def distance_to_reach(arm: Manipulator, point: ArrayLike) -> float:
+    """Return how far [m] a point (3,), body frame, is from what the tip can reach.
+
+    Above 0 the point is too far, below 0 too near to the shoulder; 0 where it can be reached.
+    """
+    _, upper, fore = arm.link_lengths
+    distance = float(np.linalg.norm(_from_shoulder(arm, point)))
+    return max(distance - (upper + fore), 0.0) + min(distance - abs(upper - fore), 0.0)
+
+
+def inverse_kinematics(arm: Manipulator, point: ArrayLike) -> list[np.ndarray]:
+    """Return the joint angles (3,) [rad] that bring the tip to a point (3,) [m], body frame.
+
+    Elbow up comes first, then elbow down; the arm faces the point. Angles are from -pi to pi, or
+    a whole turn away where that brings them within the joint's limits. The list is empty where
+    the point is out of reach, and lacks the solutions beyond the joint limits.
+    """
+    if distance_to_reach(arm, point) != 0.0:
+        return []
+    _, upper, fore = arm.link_lengths
+    x, y, z = _from_shoulder(arm, point)
+    away = np.hypot(x, y)
+    yaw = np.arctan2(y, x) if away > 0.0 else arm.stowed[0]
+    bend = 0.0
+    if upper > 0.0 and fore > 0.0:
+        cosine = (away**2 + z**2 - upper**2 - fore**2) / (2.0 * upper * fore)
+        bend = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    solutions = []
+    for elbow in (bend, -bend):
+        inner = np.arctan2(fore * np.sin(elbow), upper + fore * np.cos(elbow))
+        shoulder = np.arctan2(-z, away) - inner
+        solutions.append(_within_limits(arm, np.array([yaw, shoulder, elbow])))
+    return [angles for angles in solutions if angles is not None]
+
+
+def _from_shoulder(arm: Manipulator, point: ArrayLike) -> np.ndarray:
+    shoulder = np.add(arm.base, [0.0, 0.0, arm.link_lengths[0]])
+    return np.asarray(point, dtype=np.float64) - shoulder
+
+
+def _within_limits(arm: Manipulator, angles: np.ndarray) -> np.ndarray | None:
+    angles = (angles + np.pi) % (2.0 * np.pi) - np.pi
+    for k, (low, high) in enumerate(arm.joint_limits or ()):
+        turns = angles[k] + 2.0 * np.pi * np.array([0.0, -1.0, 1.0])
+        fits = turns[(turns >= low) & (turns <= high)]
+        if not fits.size:
+            return None
+        angles[k] = fits[0]
+    return angles
+
+
+def body_mass_and_com(
+    rover: Rover, joint_angles: Mapping[str, float] | None = None, payload: float | None = None
+) -> tuple[float, np.ndarray]:
+    """Return mass [kg] and centre of mass (3,) [m], body frame, of the body with arm and payload.
+
+    The body of the rover file holds the stowed arm, so the arm moves the centre of mass by the
+    difference to its stowed pose; the payload hangs at the tip.
+
+    Args:
+        rover: The rover.
+        joint_angles: Arm angles [rad] by joint name; joints left out stay stowed, other names
+            are passed over.
+        payload: Mass at the tip [kg]; the rover file's by default.
+
+    Raises:
+        ModelError: An angle that is not finite or beyond its limits, a payload that is negative
+            or without an arm.
+    """
+    body = rover.masses.body
+    mass, moment = body.mass, body.mass * np.asarray(body.com, dtype=float)
+    arm = rover.manipulator
+    if arm is None:
+        if payload:
+            raise ModelError(f"payload {payload} kg, but rover {rover.name!r} has no manipulator")
+        return mass, moment / mass
+    load = arm.payload if payload is None else payload
+    if not (np.isfinite(load) and load >= 0.0):
+        raise ModelError(f"payload is {load}; it must be a mass of 0 kg or more")
+    now = link_points(arm, arm_angles(arm, joint_angles))
+    stowed = link_points(arm, np.asarray(arm.stowed, dtype=float))
+    for k, link_mass in enumerate(arm.link_masses):
+        moment = moment + link_mass * (now[k] + now[k + 1] - stowed[k] - stowed[k + 1]) / 2.0
+    return mass + load, (moment + load * now[3]) / (mass + load)
+
+
+def pack_tool(
+    rover: Rover,
+    joint_angles: Mapping[str, float] | None = None,
+    force: ArrayLike | None = None,
+    moment: ArrayLike | None = None,
+) -> np.ndarray:
+    """Return where the arm's tip is and what acts on it: (3, 3), rows tip, force and moment.
+
+    Args:
+        rover: The rover.
+        joint_angles: Arm angles [rad] by joint name, as in `body_mass_and_com`.
+        force: (3,) force [N] that the surroundings exert on the tool, body frame.
+        moment: (3,) moment [N m] that they exert on it about the tip, body frame.
+
+    Raises:
+        ModelError: Force or moment of wrong shape, not finite, or without an arm.
+    """
+    tool = np.zeros((3, 3))
+    for row, (name, given) in enumerate((("tool_force", force), ("tool_moment", moment)), start=1):
+        if given is not None:
+            tool[row] = as_vector(name, given)
+            if rover.manipulator is None:
+                raise ModelError(
+                    f"{name} {tool[row].tolist()}, but rover {rover.name!r} has no manipulator"
+                )
+    if rover.manipulator is not None:
+        angles = arm_angles(rover.manipulator, joint_angles)
+        tool[0] = link_points(rover.manipulator, angles)[3]
+    return tool
+
+
+def as_vector(name: str, given: ArrayLike) -> np.ndarray:
+    """Return a vector (3,) of finite numbers.
+
+    Raises:
+        ModelError: Anything else; says `name`.
+    """
+    try:
+        vector = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"{name} is {given!r}; it must be three numbers x, y, z") from error
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ModelError(f"{name} is {given!r}; it must be three finite numbers x, y, z")
+    return vector
+
+
+def arm_angles(arm: Manipulator, joint_angles: Mapping[str, float] | None) -> np.ndarray:
+    """Return the angles (3,) [rad] of the arm's joints, stowed where `joint_angles` has none.
+
+    Raises:
+        ModelError: An angle that is not finite or beyond the limits of its joint.
+    """
+    given = joint_angles or {}
+    angles = [
+        given.get(name, at_rest) for name, at_rest in zip(arm.joints, arm.stowed, strict=True)
+    ]
+    for name, angle in zip(arm.joints, angles, strict=True):
+        if not np.isfinite(angle):
+            raise ModelError(f"angle of joint {name!r} is {angle}; it must be finite, in rad")
+    for k, (low, high) in enumerate(arm.joint_limits or ()):
+        if not low - JOINT_TOLERANCE <= angles[k] <= high + JOINT_TOLERANCE:
+            raise ModelError(
+                f"angle of joint {arm.joints[k]!r} is {angles[k]:.6g}; it must be within "
+                f"{low:g} to {high:g} rad"
+            )
+    return np.asarray(angles, dtype=float)

@@ -1,0 +1,1 @@
+"""The ground: elevation maps, soils, and how kernels look heights up."""

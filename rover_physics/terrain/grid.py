@@ -1,0 +1,304 @@
+"""The terrain: an elevation grid with unknown cells; layers of friction, soil and uncertainty."""
+
+import zipfile
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.errors import TerrainError
+from rover_physics.terrain.checks import (
+    as_elevation,
+    as_elevation_std,
+    as_friction,
+    as_origin,
+    as_resolution,
+    as_soil,
+    as_soil_names,
+)
+
+_EDGE_TOLERANCE = 1e-9  # cells; rounding of (x - origin) / resolution at the map's edge
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Ground heights on a regular grid in the map frame.
+
+    Cell [j, i] is centred at x = origin[0] + i * resolution, y = origin[1] + j * resolution.
+    Arrays are taken as they are where type and layout fit, not copied: do not write into them.
+
+    Raises:
+        TerrainError: Wrong shape or type, resolution not above 0, infinite heights, no known cell,
+            or a value of a layer out of its range.
+    """
+
+    elevation: NDArray[np.float64]
+    """Heights (ny, nx) in [m], row 0 at smallest y, column 0 at smallest x, NaN where unknown."""
+    resolution: float
+    """Cell size in [m]."""
+    origin: tuple[float, float] = (0.0, 0.0)
+    """Centre (x, y) of cell [0, 0] in [m], map frame."""
+    friction: NDArray[np.float64] | None = None
+    """Coulomb coefficients (ny, nx), NaN where the rover's default holds; None: everywhere."""
+    soil: NDArray[np.int32] | None = None
+    """Indices (ny, nx) into ``soil_names``, -1 where the default soil holds; None: everywhere."""
+    soil_names: tuple[str, ...] = ()
+    """Names of the soils that ``soil`` points to. Which soils exist is not checked here."""
+    elevation_std: NDArray[np.float64] | None = None
+    """Standard deviation of the heights (ny, nx) in [m], at least 0, known wherever the height is
+    known; None: the heights are exact."""
+
+    def __post_init__(self) -> None:
+        elevation = as_elevation(self.elevation)
+        soil_names = as_soil_names(self.soil_names)
+        checked: dict[str, Any] = {
+            "elevation": elevation,
+            "resolution": as_resolution(self.resolution),
+            "origin": as_origin(self.origin),
+            "soil_names": soil_names,
+        }
+        if self.friction is not None:
+            checked["friction"] = as_friction(self.friction, elevation)
+        if self.soil is not None:
+            checked["soil"] = as_soil(self.soil, soil_names, elevation)
+        elif soil_names:
+            raise TerrainError(
+                f"soil_names are {', '.join(soil_names)} without a soil layer that points to them"
+            )
+        if self.elevation_std is not None:
+            checked["elevation_std"] = as_elevation_std(self.elevation_std, elevation)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Extent (xmin, xmax, ymin, ymax) in [m] between the centres of the outermost cells."""
+        ny, nx = self.elevation.shape
+        x, y = self.origin
+        return (x, x + (nx - 1) * self.resolution, y, y + (ny - 1) * self.resolution)
+
+    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which points are on the map, within `bounds`; known or not.
+
+        Args:
+            x: Positions in [m], map frame, any shape.
+            y: The same, of a shape that broadcasts with x.
+        """
+        ny, nx = self.elevation.shape
+        column, row = self._grid_coordinates(x, y)
+        inside = (column >= -_EDGE_TOLERANCE) & (column <= nx - 1 + _EDGE_TOLERANCE)
+        return inside & (row >= -_EDGE_TOLERANCE) & (row <= ny - 1 + _EDGE_TOLERANCE)
+
+    def elevation_at(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """Interpolate the height bilinearly between the four cell centres around each point.
+
+        Args:
+            x: Positions in [m], map frame, any shape.
+            y: The same, of a shape that broadcasts with x.
+
+        Returns:
+            Heights in [m] of the broadcast shape, NaN where one of the four cells is unknown, and
+            off the map.
+        """
+        ny, nx = self.elevation.shape
+        column, row = self._grid_coordinates(x, y)
+        inside = self.contains(x, y)
+        column = np.where(inside, column, 0.0)
+        row = np.where(inside, row, 0.0)
+        i = np.clip(np.floor(column).astype(np.intp), 0, nx - 2)
+        j = np.clip(np.floor(row).astype(np.intp), 0, ny - 2)
+        u, v = column - i, row - j
+        z = self.elevation
+        lower = (1.0 - u) * z[j, i] + u * z[j, i + 1]
+        upper = (1.0 - u) * z[j + 1, i] + u * z[j + 1, i + 1]
+        return np.where(inside, (1.0 - v) * lower + v * upper, np.nan)
+
+    def fill_gaps(self, max_gap: float) -> "Terrain":
+        """Close small unknown regions by a smooth surface through their rims.
+
+        A region of unknown cells, joined by their sides, is filled when no square wider than
+        ``max_gap`` fits into it and it does not touch the map's edge, so that known ground
+        is all around it. The surface is harmonic (each filled height is the mean of its four
+        neighbours): it continues planes exactly and makes no new peaks or pits.
+
+        Args:
+            max_gap: Largest width of a region in [m].
+
+        Returns:
+            A terrain with the gaps filled; larger regions stay NaN. Friction and soil are as they
+            were. A filled cell is as uncertain as the most uncertain cell around its gap.
+
+        Raises:
+            TerrainError: max_gap is negative or not a number.
+        """
+        if not (np.isfinite(max_gap) and max_gap >= 0.0):
+            raise TerrainError(f"max_gap is {max_gap}; it must be a width of at least 0 in m")
+        gaps = _small_gaps(np.isnan(self.elevation), int(max_gap / self.resolution + 1e-9))
+        if not gaps.any():
+            return self
+        std = self.elevation_std
+        return replace(
+            self,
+            elevation=_fill_harmonic(self.elevation, gaps),
+            elevation_std=None if std is None else _fill_with_largest(std, gaps),
+        )
+
+    def _grid_coordinates(
+        self, x: ArrayLike, y: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return fractional column and row of points, broadcast to one shape."""
+        xs, ys = np.broadcast_arrays(
+            np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        )
+        column = (xs - self.origin[0]) / self.resolution
+        row = (ys - self.origin[1]) / self.resolution
+        return column, row
+
+
+def load_terrain(path: str | Path) -> Terrain:
+    """Load a terrain from an ``.npz`` file.
+
+    Args:
+        path: File with ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
+            optionally layers (ny, nx): ``friction``, ``soil`` with ``soil_names``, and
+            ``elevation_std`` [m]. Other entries, such as ``source``, are left alone.
+
+    Raises:
+        TerrainError: Unreadable file, or a missing or impossible entry; names file and entry.
+    """
+    entries = _read_npz(Path(path))
+    for key in ("elevation", "resolution", "origin"):
+        if key not in entries:
+            raise TerrainError(
+                f"{path}: no entry {key}; a terrain file has elevation, resolution and origin"
+            )
+    try:
+        return Terrain(
+            elevation=entries["elevation"],
+            resolution=entries["resolution"],
+            origin=entries["origin"],
+            friction=entries.get("friction"),
+            soil=entries.get("soil"),
+            soil_names=entries.get("soil_names", ()),
+            elevation_std=entries.get("elevation_std"),
+        )
+    except TerrainError as error:
+        raise TerrainError(f"{path}: {error}") from None
+
+
+def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
+    """Save a terrain as an ``.npz`` file that `load_terrain` reads.
+
+    Args:
+        path: File to write, taken as it is; a file of that name is replaced.
+        terrain: The terrain.
+        notes: Further texts to keep in the file, e.g. ``source``.
+
+    Raises:
+        TerrainError: The file cannot be written.
+    """
+    entries: dict[str, Any] = dict(notes)
+    entries["elevation"] = terrain.elevation
+    entries["resolution"] = np.float64(terrain.resolution)
+    entries["origin"] = np.asarray(terrain.origin)
+    for layer in ("friction", "soil", "elevation_std"):
+        if getattr(terrain, layer) is not None:
+            entries[layer] = getattr(terrain, layer)
+    if terrain.soil_names:
+        entries["soil_names"] = np.array(terrain.soil_names)
+    try:
+        with open(path, "wb") as file:
+            np.savez_compressed(file, **entries)
+    except OSError as error:
+        raise TerrainError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _read_npz(path: Path) -> dict[str, Any]:
+    """Read the entries that a terrain needs, without unpickling anything."""
+    wanted = (
+        "elevation",
+        "resolution",
+        "origin",
+        "friction",
+        "soil",
+        "soil_names",
+        "elevation_std",
+    )
+    name = ""
+    try:
+        archive = np.load(path, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise TerrainError(f"{path}: a single array; it must be an .npz file with elevation")
+        with archive:
+            entries = {}
+            for name in (key for key in wanted if key in archive.files):
+                entries[name] = archive[name]
+            return entries
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise TerrainError(f"{path}: cannot be read: {error.strerror}") from error
+        what = f"entry {name} is damaged or not numeric" if name else "not an .npz file"
+        reason = " ".join(str(error).split())
+        raise TerrainError(f"{path}: {what} ({reason})") from error
+
+
+def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:
+    """Select the unknown regions in the map's inside that are at most max_cells wide."""
+    from scipy import ndimage  # takes as long to import as the rest of the package
+
+    labels, count = ndimage.label(unknown)
+    small = np.ones(count + 1, dtype=bool)
+    small[0] = False
+    side = max_cells + 1
+    if side <= min(unknown.shape):
+        # A square that is too wide fits where the erosion by it leaves a cell.
+        wide = ndimage.minimum_filter(
+            unknown.astype(np.uint8), size=side, mode="constant", cval=0
+        ).astype(bool)
+        small[labels[wide]] = False
+    for edge in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        small[edge] = False
+    chosen: NDArray[np.bool_] = small[labels]
+    return chosen
+
+
+def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Solve for heights in the gaps that are the mean of their four neighbours each."""
+    from scipy import sparse
+    from scipy.sparse import linalg
+
+    count = int(gaps.sum())
+    index = np.full(gaps.shape, -1)
+    index[gaps] = np.arange(count)
+    rows, columns = np.nonzero(gaps)
+    matrix = sparse.eye(count, format="csr") * 4.0
+    right_side = np.zeros(count)
+    for down, along in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        neighbour = index[rows + down, columns + along]
+        inner = neighbour >= 0
+        coupling = sparse.csr_matrix(
+            (np.ones(inner.sum()), (np.nonzero(inner)[0], neighbour[inner])), shape=(count, count)
+        )
+        matrix = matrix - coupling
+        right_side[~inner] += elevation[rows + down, columns + along][~inner]
+    filled = elevation.copy()
+    filled[gaps] = linalg.spsolve(matrix.tocsc(), right_side)
+    return filled
+
+
+def _fill_with_largest(std: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Give the cells of each gap the largest standard deviation around it."""
+    from scipy import ndimage
+
+    filled = std.copy()
+    labels, _ = ndimage.label(gaps)
+    for label, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
+        # A gap is off the map's edge, so there is a cell all around it.
+        window = (slice(rows.start - 1, rows.stop + 1), slice(columns.start - 1, columns.stop + 1))
+        gap = labels[window] == label
+        rim = ndimage.binary_dilation(gap) & ~gap
+        filled[window][gap] = std[window][rim].max()
+    return filled

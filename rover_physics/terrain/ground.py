@@ -1,0 +1,233 @@
+"""Bilinear look-ups of elevation and friction inside kernels; gaps and the edge are told apart."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numba import int64
+
+from rover_physics.numerics.addresses import address_of, read_float, read_int
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.records import array_of, new_record, record_type
+from rover_physics.terrain.grid import Terrain
+
+BLOCK_BITS = 2
+BLOCK = 1 << BLOCK_BITS
+"""Cells along the side of a block."""
+SOIL_NUMBERS = 8
+"""Numbers that describe a soil to the kernels."""
+NO_SOILS = np.zeros((1, SOIL_NUMBERS))
+"""A table of soils with one that is none."""
+
+
+GROUND = record_type(
+    ("elevation", np.int64),  # address of (rows, columns) elevation [m], NaN where unknown
+    ("roof", np.int64),  # address of (block_rows, block_columns) highest elevation of each block
+    # [m], infinite where any of it is unknown
+    ("ceiling", np.int64),  # address of the same, -inf where none of it is known
+    ("friction", np.int64),  # address of (rows, columns) friction coefficient, 0 if there is none
+    ("soil", np.int64),  # address of (rows, columns) rows of the table of soils, 0 if none
+    ("soils", np.int64),  # address of that table, (1 + k, SOIL_NUMBERS)
+    ("rows", np.int64),  # rows of cells
+    ("columns", np.int64),  # columns of cells
+    ("block_rows", np.int64),  # rows of blocks of BLOCK x BLOCK cells
+    ("block_columns", np.int64),  # columns of blocks
+    ("x0", float),  # x of the centre of cell [0, 0] [m]
+    ("y0", float),  # y of the centre of cell [0, 0] [m]
+    ("inverse_resolution", float),  # cells per metre [1/m]
+)
+"""A terrain as kernels read it, by the addresses of the arrays of a `Ground`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A terrain as a sweep needs it: the record that kernels read, and what it points to."""
+
+    records: np.ndarray
+    """(1,) GROUND."""
+    elevation: np.ndarray
+    """(ny, nx) elevation [m], NaN where unknown."""
+    roof: np.ndarray
+    """Highest elevation of each block of BLOCK x BLOCK cells [m], infinite where any of it is
+    unknown."""
+    ceiling: np.ndarray
+    """Highest elevation of each block [m], -inf where none is known."""
+    friction: np.ndarray | None
+    """(ny, nx) friction coefficient, NaN where the rover's own holds."""
+    soil: np.ndarray | None
+    """(ny, nx) int32 rows of the table of soils, 0 for the default."""
+    soils: np.ndarray
+    """(1 + k, SOIL_NUMBERS) table of `pack_soils`: the default soil, then those of the layer."""
+
+
+@lru_cache(maxsize=4)
+def pack_ground(terrain: Terrain) -> Ground:
+    """Return `terrain` as the kernels read it, with a soil that is none."""
+    elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
+    highest = _reduce_blocks(elevation, np.fmax)
+    some_unknown = _reduce_blocks(np.isnan(elevation), np.logical_or)
+    return _point_to(
+        terrain,
+        elevation=elevation,
+        roof=np.where(some_unknown, np.inf, highest),
+        ceiling=np.where(np.isnan(highest), -np.inf, highest),
+        friction=None
+        if terrain.friction is None
+        else np.ascontiguousarray(terrain.friction, dtype=np.float64),
+        soil=None if terrain.soil is None else terrain.soil + np.int32(1),
+        soils=NO_SOILS,
+    )
+
+
+def _point_to(terrain: Terrain, **arrays: np.ndarray | None) -> Ground:
+    """Return the Ground of these arrays, its record pointing to them."""
+    elevation, roof = arrays["elevation"], arrays["roof"]
+    assert elevation is not None and roof is not None
+    record = new_record(
+        GROUND,
+        **{name: 0 if array is None else address_of(array) for name, array in arrays.items()},
+        rows=elevation.shape[0],
+        columns=elevation.shape[1],
+        block_rows=roof.shape[0],
+        block_columns=roof.shape[1],
+        x0=float(terrain.origin[0]),
+        y0=float(terrain.origin[1]),
+        inverse_resolution=1.0 / float(terrain.resolution),
+    )
+    return Ground(array_of(record), **arrays)  # type: ignore[arg-type]
+
+
+def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
+    """Return `ground` with another table of soils (1 + k, SOIL_NUMBERS)."""
+    records = ground.records.copy()
+    records["soils"] = address_of(soils)
+    return replace(ground, records=records, soils=soils)
+
+
+def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
+    """Reduce each block of cells to one; blocks at the far edges count their last cells twice."""
+    ny, nx = cells.shape
+    missing = (0, -ny % BLOCK), (0, -nx % BLOCK)
+    if missing != ((0, 0), (0, 0)):
+        cells = np.pad(cells, missing, mode="edge")
+    for _ in range(BLOCK_BITS):
+        cells = reduce(cells[0::2], cells[1::2])
+    for _ in range(BLOCK_BITS):
+        cells = reduce(cells[:, 0::2], cells[:, 1::2])
+    return cells
+
+
+@kernel
+def elevation_of(ground, i, j):
+    """Return the elevation [m] of cell [i, j], which must be on the map; NaN where unknown."""
+    return read_float(ground.elevation, i * ground.columns + j)
+
+
+@kernel
+def find_roof(ground, gx, gy, reach_x, reach_y):
+    """Return the highest elevation [m] of a box around (gx, gy), all in cells.
+
+    Infinite where there is unknown ground or the map ends in it. Block by block, so somewhat more
+    than asked for is looked at.
+    """
+    low_x, high_x, low_y, high_y = gx - reach_x, gx + reach_x, gy - reach_y, gy + reach_y
+    if not (
+        low_x >= 0.0 and low_y >= 0.0 and high_x < ground.columns - 1 and high_y < ground.rows - 1
+    ):
+        return np.inf
+    first, last = int64(low_x) >> BLOCK_BITS, int64(high_x + 1.0) >> BLOCK_BITS
+    roof = -np.inf
+    for i in range(int64(low_y) >> BLOCK_BITS, (int64(high_y + 1.0) >> BLOCK_BITS) + 1):
+        row = i * ground.block_columns
+        for j in range(first, last + 1):
+            height = read_float(ground.roof, row + j)
+            if height > roof:
+                roof = height
+    return roof
+
+
+@kernel
+def height_inside(ground, gx, gy):
+    """Return the elevation [m] at (gx, gy), in cells from cell [0, 0], well within the map."""
+    i, j = int64(gy), int64(gx)
+    return _interpolate(ground.elevation, i * ground.columns + j, ground.columns, gx - j, gy - i)
+
+
+@kernel
+def is_cell_on_map(ground, gx, gy):
+    """Tell whether (gx, gy), in cells from cell [0, 0], lies within the outermost centres."""
+    return gx >= 0.0 and gy >= 0.0 and gx <= ground.columns - 1 and gy <= ground.rows - 1
+
+
+@kernel
+def height_at_cell(ground, gx, gy):
+    """Return the elevation [m] at (gx, gy), counted in cells from cell [0, 0], on the map."""
+    i, j = min(int64(gy), ground.rows - 2), min(int64(gx), ground.columns - 2)
+    return _interpolate(ground.elevation, i * ground.columns + j, ground.columns, gx - j, gy - i)
+
+
+@kernel
+def _interpolate(elevation, at, columns, u, v):
+    """Return the height [m] a share u along and v across from element `at` to the next ones."""
+    here, above = read_float(elevation, at), read_float(elevation, at + columns)
+    lower = here + u * (read_float(elevation, at + 1) - here)
+    upper = above + u * (read_float(elevation, at + columns + 1) - above)
+    return lower + v * (upper - lower)
+
+
+@kernel
+def look_up(ground, x, y):
+    """Return elevation [m] and its gradient at (x, y) [m]; NaN where there is none."""
+    scale = ground.inverse_resolution
+    return look_up_cell(ground, (x - ground.x0) * scale, (y - ground.y0) * scale)
+
+
+@kernel
+def look_up_cell(ground, gx, gy):
+    """Return elevation [m] and its gradient at (gx, gy), in cells; NaN where there is none."""
+    if not is_cell_on_map(ground, gx, gy):
+        return np.nan, np.nan, np.nan
+    i, j = min(int64(gy), ground.rows - 2), min(int64(gx), ground.columns - 2)
+    u, v = gx - j, gy - i
+    elevation, at = ground.elevation, i * ground.columns + j
+    above_at = at + ground.columns
+    here, above = read_float(elevation, at), read_float(elevation, above_at)
+    along_lower = read_float(elevation, at + 1) - here
+    along_upper = read_float(elevation, above_at + 1) - above
+    lower = here + u * along_lower
+    upper = above + u * along_upper
+    slope_x = (along_lower + v * (along_upper - along_lower)) * ground.inverse_resolution
+    slope_y = (upper - lower) * ground.inverse_resolution
+    return lower + v * (upper - lower), slope_x, slope_y
+
+
+@kernel
+def friction_at(ground, x, y, default):
+    """Return the friction coefficient of the cell nearest to (x, y) [m], else `default`."""
+    if ground.friction == 0:
+        return default
+    mu = read_float(ground.friction, _nearest_cell(ground, x, y))
+    return mu if mu > 0.0 else default
+
+
+@kernel
+def soil_row_at(ground, x, y):
+    """Return the row of the table of soils that holds in the cell nearest to (x, y) [m]."""
+    if ground.soil == 0:
+        return 0
+    return read_int(ground.soil, _nearest_cell(ground, x, y))
+
+
+@kernel
+def copy_soil(ground, row, soil):
+    """Copy a row of the table of soils into soil (SOIL_NUMBERS,)."""
+    for k in range(SOIL_NUMBERS):
+        soil[k] = read_float(ground.soils, row * SOIL_NUMBERS + k)
+
+
+@kernel
+def _nearest_cell(ground, x, y):
+    j = int((x - ground.x0) * ground.inverse_resolution + 0.5)
+    i = int((y - ground.y0) * ground.inverse_resolution + 0.5)
+    j = min(max(j, 0), ground.columns - 1)
+    return min(max(i, 0), ground.rows - 1) * ground.columns + j

@@ -1,0 +1,1 @@
+"""What a prediction means: limits, verdicts, classes, traps and reach."""

@@ -1,0 +1,104 @@
+"""What the bounds of an uncertain map add to a verdict: refusals at worst."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rover_physics.bounds.pose import OFF_MAP_NEAR, ON_EDGE, SINGULAR, UNKNOWN_NEAR
+from rover_physics.prediction.path_bounds import PathBounds
+from rover_physics.prediction.path_prediction import Floats, PathPrediction
+from rover_physics.rover.model import Rover
+from rover_physics.traversability.verdict import Verdict, find_reasons
+
+_UNBOUNDED = {
+    ON_EDGE: ("not_settled", "a wheel may climb or fall off an edge"),
+    UNKNOWN_NEAR: ("unknown_ground", "a wheel may reach unknown ground"),
+    OFF_MAP_NEAR: ("off_map", "a wheel may leave the map"),
+    SINGULAR: ("no_equilibrium", "the wheel loads may not be determined"),
+}
+
+
+def judge_bounds(
+    rover: Rover, prediction: PathPrediction, bounds: PathBounds, verdict: Verdict
+) -> Verdict:
+    """Add to a verdict what the bounds refuse; nothing that it refuses is taken back.
+
+    Args:
+        rover: The rover, with its limits.
+        prediction: The prediction that was bounded.
+        bounds: Its bounds.
+        verdict: The verdict on the prediction itself.
+
+    Returns:
+        The verdict with the further refusals and with the extremes of the bounds. The reason of a
+        waypoint that the prediction passes says that it holds at worst.
+    """
+    codes, reasons = list(verdict.codes), list(verdict.reasons)
+    within = f"within {bounds.sigmas:g} sigma of the map"
+    for i, (code, reason) in enumerate(zip(*_find_worst(rover, prediction, bounds), strict=True)):
+        if not codes[i] and code:
+            codes[i], reasons[i] = code, f"{reason}, at worst {within}"
+    for i, status in enumerate(bounds.status.tolist()):
+        if not codes[i] and status in _UNBOUNDED:
+            codes[i], what = _UNBOUNDED[status]
+            reasons[i] = f"{what} {within}"
+    first: int = next((k for k, code in enumerate(codes) if code), -1)
+    falls = np.asarray(prediction.falling.any(axis=1))
+    needed = bounds.bounded & ~falls
+    return replace(
+        verdict,
+        traversable=first < 0,
+        reasons=tuple(reasons),
+        codes=tuple(codes),
+        first_failure=first,
+        code=codes[first] if first >= 0 else "",
+        reason=reasons[first] if first >= 0 else "",
+        map_sigmas=bounds.sigmas,
+        tip_over_ratio_bound=_extreme(np.min, bounds.tip_over_ratio[bounds.bounded, 0]),
+        friction_utilisation_bound=_extreme(np.max, bounds.friction_utilisation[needed, :, 1]),
+        torque_saturation_bound=_extreme(np.max, bounds.torque_saturation[needed, :, 1]),
+        tilt_bound=_extreme(np.max, bounds.tilt[bounds.bounded, 1]),
+        belly_clearance_bound=_extreme(np.min, bounds.belly_clearance[bounds.bounded, 0]),
+    )
+
+
+def _extreme(choose, values: Floats) -> float:
+    known = values[~np.isnan(values)]
+    return float(choose(known)) if known.size else float("nan")
+
+
+def _find_worst(
+    rover: Rover, prediction: PathPrediction, bounds: PathBounds
+) -> tuple[list[str], list[str]]:
+    """Return code and reason of the limits that are broken at worst, empty where none is."""
+
+    def at(name: str, end: int) -> Floats:
+        values = getattr(bounds, name)[..., end]
+        return np.where(np.isnan(values), getattr(prediction, name), values)
+
+    worst = replace(
+        prediction,
+        roll=_largest(prediction.roll, bounds.roll),
+        pitch=_largest(prediction.pitch, bounds.pitch),
+        rocker_angle=at("rocker_angle", 0),
+        bogie_angle=at("bogie_angle", 0),
+        belly_clearance=at("belly_clearance", 0),
+        tip_over_ratio=at("tip_over_ratio", 0),
+        wheel_loads=at("wheel_loads", 0),
+        friction_utilisation=at("friction_utilisation", 1),
+        torque_saturation=at("torque_saturation", 1),
+        sinkage=at("sinkage", 1),
+    )
+    other = replace(worst, rocker_angle=at("rocker_angle", 1), bogie_angle=at("bogie_angle", 1))
+    codes, reasons = find_reasons(rover, other)
+    for i, (code, reason) in enumerate(zip(*find_reasons(rover, worst), strict=True)):
+        if code and codes[i] != "suspension":
+            codes[i], reasons[i] = code, reason
+    return codes, reasons
+
+
+def _largest(value: Floats, bounds: Floats) -> Floats:
+    """Return of intervals (n, 2) the end farther from zero, the value (n,) where there is none."""
+    rows = np.arange(len(bounds))
+    farther = bounds[rows, np.argmax(np.abs(bounds), axis=1)]
+    return np.where(np.isnan(farther), value, farther)

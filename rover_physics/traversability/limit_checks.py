@@ -1,0 +1,239 @@
+"""Each limit held against a prediction: where it is broken, and in which words that is told."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from rover_physics.forces.soil import MODERATE_SINKAGE
+from rover_physics.names import SIDES, WHEELS
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.rover.model import Rover
+
+TOLERANCE = 1e-9
+
+
+class Check(NamedTuple):
+    """One limit held against all waypoints of a prediction."""
+
+    code: str
+    """Its code in a verdict."""
+    extreme: float
+    """The value that comes closest to the limit or goes furthest beyond it, NaN where none is
+    known; NaN too for limits that are no single number."""
+    breaks: bool
+    """Whether the limit is broken anywhere."""
+    broken: Callable[[], np.ndarray]
+    """Gives (n,) True where the limit is broken."""
+    margins: Callable[[], np.ndarray]
+    """Gives the share of the limit (n,) that is left, negative where it is broken."""
+    wheels: Callable[[], np.ndarray]
+    """Gives the index of the wheel (n,) that it is about, -1 for none."""
+    describe: Callable[[int], str]
+    """Says of a waypoint by how much."""
+
+
+def tilt_of(prediction: PathPrediction) -> np.ndarray:
+    """Return the angle (n,) [rad] between the body's z axis and the vertical."""
+    upright = np.cos(prediction.roll) * np.cos(prediction.pitch)
+    return np.arccos(np.minimum(np.maximum(upright, -1.0), 1.0))
+
+
+def compare(value: float, limit: float, digits: int, unit: str = "") -> str:
+    """Return "value, limit ..." with as many digits as it takes to tell the two apart."""
+    while digits < 9 and f"{value:.{digits}f}" == f"{limit:.{digits}f}":
+        digits += 1
+    return f"{value:.{digits}f}{unit}, limit {limit:.{digits}f}{unit}"
+
+
+def _share_left(values: np.ndarray, limit: float) -> np.ndarray:
+    """Return the share of an upper limit that is left; the amount where the limit is 0."""
+    return 1.0 - values / limit if limit > 0.0 else limit - values
+
+
+def _no_wheel(values: np.ndarray) -> Callable[[], np.ndarray]:
+    return lambda: np.full(len(values), -1)
+
+
+def largest_of(values: np.ndarray) -> float:
+    """Return the largest of values that are not NaN, NaN where there is none."""
+    return float(np.fmax.reduce(values, axis=None)) if values.size else np.nan
+
+
+def smallest_of(values: np.ndarray) -> float:
+    """Return the smallest of values that are not NaN, NaN where there is none."""
+    return float(np.fmin.reduce(values, axis=None)) if values.size else np.nan
+
+
+def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
+    """Return the checks of a prediction, the most telling reason first."""
+    return [
+        _check_suspension(rover, prediction),
+        _check_tilt(rover, prediction),
+        _check_tip_over(rover, prediction),
+        _check_wheel_lift(prediction),
+        _check_sinkage(rover, prediction),
+        _check_friction(rover, prediction),
+        _check_torque(rover, prediction),
+        _check_wheel_drop(rover, prediction),
+        _check_belly(rover, prediction),
+    ]
+
+
+def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
+    rocker, bogie = prediction.rocker_angle, prediction.bogie_angle
+    limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
+    breaks = any(
+        smallest_of(angle) < least - TOLERANCE or largest_of(angle) > most + TOLERANCE
+        for angle, (least, most) in zip((rocker, bogie), limits, strict=True)
+    )
+
+    def joints_and_limits() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        low, high = np.repeat(limits, 2, axis=0).T
+        return np.hstack([rocker, bogie]), low, high
+
+    def beyond() -> np.ndarray:
+        joints, low, high = joints_and_limits()
+        return (joints < low - TOLERANCE) | (joints > high + TOLERANCE)
+
+    def margins() -> np.ndarray:
+        joints, low, high = joints_and_limits()
+        left = np.minimum(joints - low, high - joints) / (high - low)
+        return np.asarray(left.min(axis=1))
+
+    def describe(i: int) -> str:
+        joint = int(np.argmax(beyond()[i]))
+        joints, low, high = joints_and_limits()
+        name = f"{SIDES[joint % 2]} {('rocker', 'bogie')[joint // 2]}"
+        limit = low[joint] if joints[i, joint] < low[joint] else high[joint]
+        return f"{name} angle {compare(joints[i, joint], limit, 2, ' rad')}"
+
+    return Check(
+        "suspension",
+        np.nan,
+        breaks,
+        lambda: np.any(beyond(), axis=1),
+        margins,
+        _no_wheel(rocker),
+        describe,
+    )
+
+
+def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
+    tilt, limit = tilt_of(prediction), np.degrees(rover.limits.tilt)
+    extreme = largest_of(tilt)
+
+    def describe(i: int) -> str:
+        return f"tilt {compare(np.degrees(tilt[i]), limit, 1, ' deg')}"
+
+    return Check(
+        "tilt",
+        extreme,
+        bool(np.degrees(extreme) > limit + TOLERANCE),
+        lambda: np.degrees(tilt) > limit + TOLERANCE,
+        lambda: _share_left(np.degrees(tilt), limit),
+        _no_wheel(tilt),
+        describe,
+    )
+
+
+def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
+    ratio, limit = prediction.tip_over_ratio, rover.limits.tip_over_ratio
+
+    def describe(i: int) -> str:
+        return f"tip-over ratio {compare(ratio[i], limit, 2)}"
+
+    return _check_lower("tip_over", ratio, limit, describe)
+
+
+def _check_wheel_lift(prediction: PathPrediction) -> Check:
+    loads = prediction.wheel_loads
+
+    def describe(i: int) -> str:
+        wheel = int(np.argmin(loads[i]))
+        return (
+            f"{WHEELS[wheel]} wheel lifts off: load {loads[i, wheel]:.2f} N "
+            f"under {prediction.policy} torques"
+        )
+
+    def margins() -> np.ndarray:
+        share = loads.min(axis=1) / np.maximum(loads.sum(axis=1) / 6.0, TOLERANCE)
+        return np.asarray(share)
+
+    least = smallest_of(loads)
+    return Check(
+        "wheel_lift",
+        least,
+        least < 0.0,
+        lambda: np.any(loads < 0.0, axis=1),
+        margins,
+        lambda: np.argmin(loads, axis=1),
+        describe,
+    )
+
+
+def _check_sinkage(rover: Rover, prediction: PathPrediction) -> Check:
+    limit = MODERATE_SINKAGE * 2.0 * rover.wheel.radius
+    words = "wheel sinks deeper than the soil model holds: sinkage"
+    return _check_wheels("sinkage", prediction.sinkage, limit, words, 3, " m")
+
+
+def _check_friction(rover: Rover, prediction: PathPrediction) -> Check:
+    limit = rover.limits.friction_utilisation
+    words = "wheel slips: friction utilisation"
+    return _check_wheels("friction", prediction.friction_utilisation, limit, words)
+
+
+def _check_torque(rover: Rover, prediction: PathPrediction) -> Check:
+    limit = rover.limits.torque_saturation
+    words = "motor saturates: torque saturation"
+    return _check_wheels("torque", prediction.torque_saturation, limit, words)
+
+
+def _check_wheel_drop(rover: Rover, prediction: PathPrediction) -> Check:
+    limit = rover.limits.wheel_drop
+    words = "wheel drops off an edge:"
+    return _check_wheels("wheel_drop", prediction.wheel_drop, limit, words, 3, " m")
+
+
+def _check_wheels(
+    code: str, values: np.ndarray, limit: float, words: str, digits: int = 2, unit: str = ""
+) -> Check:
+    def describe(i: int) -> str:
+        wheel = int(np.argmax(values[i]))
+        return f"{WHEELS[wheel]} {words} {compare(values[i, wheel], limit, digits, unit)}"
+
+    extreme = largest_of(values)
+    return Check(
+        code,
+        extreme,
+        extreme > limit + TOLERANCE,
+        lambda: np.any(values > limit + TOLERANCE, axis=1),
+        lambda: _share_left(np.max(values, axis=1), limit),
+        lambda: np.argmax(values, axis=1),
+        describe,
+    )
+
+
+def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
+    clearance, limit = prediction.belly_clearance, rover.limits.belly_clearance
+
+    def describe(i: int) -> str:
+        return f"belly clearance {compare(clearance[i], limit, 3, ' m')}"
+
+    return _check_lower("belly", clearance, limit, describe)
+
+
+def _check_lower(
+    code: str, values: np.ndarray, limit: float, describe: Callable[[int], str]
+) -> Check:
+    extreme = smallest_of(values)
+    return Check(
+        code,
+        extreme,
+        extreme < limit - TOLERANCE,
+        lambda: values < limit - TOLERANCE,
+        lambda: -_share_left(values, limit),
+        _no_wheel(values),
+        describe,
+    )

@@ -1,0 +1,196 @@
+"""A query of the rover at rest: whether the arm can reach a point and push there."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.errors import ModelError, PoseError
+from rover_physics.numerics.plain_values import to_plain
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import check_poses, sweep_path
+from rover_physics.rover.manipulator import as_vector, distance_to_reach, inverse_kinematics
+from rover_physics.rover.model import Manipulator, Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.verdict import Verdict, judge
+
+OF_THE_VERDICT = (
+    "policy",
+    "min_tip_over_ratio",
+    "max_friction_utilisation",
+    "max_torque_saturation",
+    "max_tilt",
+    "min_belly_clearance",
+    "max_sinkage",
+)
+"""What an answer in words tells of its verdict."""
+PER_WHEEL = ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation")
+"""What it tells of each wheel, in the order of `names.WHEELS`."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReachAnswer:
+    """Whether the arm can reach a point and bear a load there, and the reason where it cannot."""
+
+    possible: bool
+    """True if the tip reaches the point and the rover holds still within all its limits."""
+    reachable: bool
+    """True if the arm can bring its tip to the point, whether or not the rover holds."""
+    code: str
+    """Empty if possible; "too_far", "too_near" or "joint_limits", else a code of a verdict."""
+    reason: str
+    """The same in words, with amounts."""
+    target: np.ndarray
+    """(3,) the point in the body frame [m], NaN where the rover does not settle."""
+    out_of_reach: float
+    """How far [m] the point is out of reach: above 0 too far, below 0 too near, NaN unknown."""
+    joint_angles: Mapping[str, float] | None
+    """Arm angles [rad] by joint name, of the two ways to reach the point the one that is safer."""
+    verdict: Verdict | None
+    """The limits held against the rover with the arm there; None where it was not asked."""
+    prediction: PathPrediction | None
+    """Loads, utilisations and margins with the arm there, one row; None where not asked."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the answer as JSON can hold it; what is not known is None or left out."""
+        names = ("possible", "reachable", "code", "reason", "target", "out_of_reach")
+        answer = {name: getattr(self, name) for name in (*names, "joint_angles")}
+        if self.verdict is not None:
+            told = asdict(self.verdict)
+            answer |= {name: told[name] for name in OF_THE_VERDICT}
+        if self.prediction is not None:
+            answer |= {name: getattr(self.prediction, name)[0] for name in PER_WHEEL}
+        return to_plain(answer)
+
+
+def judge_reach(
+    rover: Rover,
+    terrain: Terrain,
+    pose: ArrayLike,
+    target: ArrayLike,
+    *,
+    tool_force: ArrayLike | None = None,
+    tool_moment: ArrayLike | None = None,
+    payload: float | None = None,
+    friction: float | None = None,
+    max_torque: float | None = None,
+    policy: str = "equal",
+    soil: str | None = None,
+) -> ReachAnswer:
+    """Tell whether the arm can reach a point, and whether the rover holds a load there.
+
+    The rover stands still; its wheels hold it with torques as `policy` has them. Neither what the
+    arm's own joints can bear nor whether its links hit something is looked at.
+
+    Args:
+        rover: The rover; it must have a manipulator.
+        terrain: The ground.
+        pose: (3,) x, y [m] and yaw [rad] of base_link, map frame.
+        target: (3,) where the tip of the arm shall be [m], map frame.
+        tool_force: (3,) force [N] that the surroundings exert on the tip there, map frame: a
+            tool that presses on the ground is pushed up.
+        tool_moment: (3,) moment [N m] that they exert on it, map frame.
+        payload: Mass at the tip [kg] instead of the rover's own.
+        friction: Friction coefficient instead of the rover's own.
+        max_torque: Largest wheel torque [N m] instead of the rover's own.
+        policy: Torque policy, "equal" or "optimal".
+        soil: Preset soil, see `sweep_path`.
+
+    Raises:
+        PoseError: A pose of wrong shape, or not finite.
+        ModelError: A rover without an arm, or an argument that makes no sense.
+        SoilError: A soil that is not among the presets.
+    """
+    arm = rover.manipulator
+    if arm is None:
+        raise ModelError(f"rover {rover.name!r} has no manipulator to reach with")
+    poses = check_poses(np.atleast_2d(pose))
+    if len(poses) != 1:
+        raise PoseError(f"pose has shape {np.shape(pose)}; it must be one pose (3,): x, y, yaw")
+    point = as_vector("target", target)
+    force, moment = (
+        as_vector(name, [0.0, 0.0, 0.0] if value is None else value)
+        for name, value in (("tool_force", tool_force), ("tool_moment", tool_moment))
+    )
+    ground: dict[str, Any] = {
+        "friction": friction,
+        "max_torque": max_torque,
+        "policy": policy,
+        "soil": soil,
+        "payload": payload,
+    }
+    standing = sweep_path(rover, terrain, poses, **ground)
+    if not standing.settled[0]:
+        verdict = judge(rover, standing)
+        unknown = np.full(3, np.nan)
+        return ReachAnswer(
+            False, False, verdict.code, verdict.reason, unknown, np.nan, None, verdict, None
+        )
+    to_map = _attitude(standing)
+    local = to_map.T @ (point - standing.position[0])
+    solutions = inverse_kinematics(arm, local)
+    if not solutions:
+        return _refuse_reach(arm, local)
+    answers = []
+    for angles in solutions:
+        joints = dict(zip(arm.joints, angles.tolist(), strict=True))
+        prediction = sweep_path(
+            rover,
+            terrain,
+            poses,
+            joint_angles=joints,
+            tool_force=to_map.T @ force,
+            tool_moment=to_map.T @ moment,
+            **ground,
+        )
+        verdict = judge(rover, prediction)
+        answers.append(
+            ReachAnswer(
+                verdict.traversable, True, verdict.code, verdict.reason, local, 0.0, joints,
+                verdict, prediction,
+            )
+        )  # fmt: skip
+    return max(answers, key=_safety)
+
+
+def _safety(answer: ReachAnswer) -> tuple[bool, float]:
+    margin = answer.verdict.min_tip_over_ratio if answer.verdict else -np.inf
+    return answer.possible, round(margin, 9)
+
+
+def _refuse_reach(arm: Manipulator, local: np.ndarray) -> ReachAnswer:
+    gap = distance_to_reach(arm, local)
+    if gap == 0.0:
+        code, reason = "joint_limits", _describe_limits(arm, local)
+    elif gap > 0.0:
+        reach = arm.link_lengths[1] + arm.link_lengths[2]
+        code = "too_far"
+        reason = f"target is {gap:.3f} m out of reach: {reach + gap:.3f} m from the arm's "
+        reason += f"shoulder, which reaches {reach:.3f} m"
+    else:
+        least = abs(arm.link_lengths[1] - arm.link_lengths[2])
+        code = "too_near"
+        reason = f"target is {-gap:.3f} m too near: {least + gap:.3f} m from the arm's shoulder, "
+        reason += f"which reaches no nearer than {least:.3f} m"
+    return ReachAnswer(False, False, code, reason, local, gap, None, None, None)
+
+
+def _describe_limits(arm: Manipulator, local: np.ndarray) -> str:
+    beyond = []
+    for angles in inverse_kinematics(replace(arm, joint_limits=None), local):
+        for k, (low, high) in enumerate(arm.joint_limits or ()):
+            if not low <= angles[k] <= high:
+                beyond.append(
+                    f"{arm.joints[k]} at {angles[k]:.2f} rad, limits {low:.2f} to {high:.2f} rad"
+                )
+                break
+    return f"target is within the arm's length but needs {' or '.join(beyond)}"
+
+
+def _attitude(standing: PathPrediction) -> np.ndarray:
+    angles = [standing.poses[0, 2], standing.pitch[0], standing.roll[0]]
+    from scipy.spatial.transform import Rotation  # long to import
+
+    return Rotation.from_euler("ZYX", angles).as_matrix()

@@ -1,0 +1,172 @@
+"""Safety limits held against a prediction: whether each waypoint is passable, and if not, why."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from rover_physics.contact.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
+from rover_physics.numerics.plain_values import to_plain
+from rover_physics.prediction.evaluation import NO_EQUILIBRIUM
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.rover.model import Rover
+from rover_physics.traversability.limit_checks import check_limits, largest_of
+
+CODES = (
+    "off_map",
+    "unknown_ground",
+    "not_settled",
+    "no_equilibrium",
+    "suspension",
+    "tilt",
+    "tip_over",
+    "wheel_lift",
+    "sinkage",
+    "friction",
+    "torque",
+    "wheel_drop",
+    "belly",
+    "trapped",
+)
+UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
+"""Limits that do not count while a wheel rolls off an edge."""
+_LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
+_PLACELESS = {
+    OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
+    UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
+    NOT_SETTLED: (
+        "not_settled",
+        "no configuration found in which all six wheels touch the ground",
+    ),
+    NO_EQUILIBRIUM: ("no_equilibrium", "the wheel loads are not determined in this configuration"),
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a path is traversable, and the physical reason where it is not."""
+
+    traversable: bool
+    """True if every waypoint is passable."""
+    reasons: tuple[str, ...]
+    """For each waypoint the reason why it is not passable, empty where it is."""
+    codes: tuple[str, ...]
+    """For each waypoint one of CODES, empty where it is passable."""
+    first_failure: int
+    """Index of the first waypoint that is not passable, -1 if none."""
+    code: str
+    """Code of the first failure, empty if none."""
+    reason: str
+    """Reason of the first failure, empty if none."""
+    policy: str
+    """Torque policy that was assumed."""
+    min_tip_over_ratio: float
+    """Smallest tip-over ratio on the settled part of the path, NaN if none is settled."""
+    max_friction_utilisation: float
+    """Largest friction utilisation on the settled part."""
+    max_torque_saturation: float
+    """Largest torque saturation on the settled part."""
+    max_tilt: float
+    """Largest tilt of the body on the settled part [rad]."""
+    min_belly_clearance: float
+    """Smallest belly clearance on the settled part [m]."""
+    max_wheel_drop: float
+    """Largest drop of a wheel that rolled off an edge [m]."""
+    max_sinkage: float
+    """Largest sinkage of a wheel on the settled part [m]; 0 on ground that does not yield."""
+    map_sigmas: float = 0.0
+    """Standard deviations by which the heights of the map may be wrong; 0 where it is exact."""
+    tip_over_ratio_bound: float = float("nan")
+    """Smallest tip-over ratio that is possible then, NaN where the map is exact."""
+    friction_utilisation_bound: float = float("nan")
+    """Largest possible friction utilisation."""
+    torque_saturation_bound: float = float("nan")
+    """Largest possible torque saturation."""
+    tilt_bound: float = float("nan")
+    """Largest possible tilt of the body [rad]."""
+    belly_clearance_bound: float = float("nan")
+    """Smallest possible belly clearance [m]."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the verdict as JSON can hold it: lists for tuples, None for NaN and infinity."""
+        return to_plain({field.name: getattr(self, field.name) for field in fields(self)})
+
+
+def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
+    """Hold a prediction against the limits of the rover.
+
+    The first limit broken, in the order of CODES, is the reason of a waypoint; a limit broken on
+    the way to a waypoint counts there, unless the waypoint has a reason of its own.
+    """
+    found, extremes = _hold_against_limits(rover, prediction)
+    between = prediction.between
+    if between is not None and len(between.poses):
+        on_the_way, others = _hold_against_limits(rover, between)
+        for row in sorted(on_the_way):
+            code, reason = on_the_way[row]
+            found.setdefault(int(between.waypoint[row]), (code, f"on the way here: {reason}"))
+        extremes = {
+            code: float((np.fmin if code in _LOWER_LIMITS else np.fmax)(value, others[code]))
+            for code, value in extremes.items()
+        }
+    first = min(found, default=-1)
+    code, reason = found.get(first, ("", ""))
+    codes, reasons = _spread_out(found, len(prediction.poses))
+    return Verdict(
+        traversable=first < 0,
+        reasons=tuple(reasons),
+        codes=tuple(codes),
+        first_failure=first,
+        code=code,
+        reason=reason,
+        policy=prediction.policy,
+        min_tip_over_ratio=extremes["tip_over"],
+        max_friction_utilisation=extremes["friction"],
+        max_torque_saturation=extremes["torque"],
+        max_tilt=extremes["tilt"],
+        min_belly_clearance=extremes["belly"],
+        max_wheel_drop=extremes["wheel_drop"],
+        max_sinkage=extremes["sinkage"],
+    )
+
+
+def find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
+    """Return code and reason of each row of a prediction, empty where passable."""
+    return _spread_out(_hold_against_limits(rover, prediction)[0], len(prediction.poses))
+
+
+def _spread_out(found: dict[int, tuple[str, str]], n: int) -> tuple[list[str], list[str]]:
+    """Return code and reason of each of n rows, empty where none was found."""
+    codes, reasons = [""] * n, [""] * n
+    for row, (code, reason) in found.items():
+        codes[row], reasons[row] = code, reason
+    return codes, reasons
+
+
+def _hold_against_limits(
+    rover: Rover, prediction: PathPrediction
+) -> tuple[dict[int, tuple[str, str]], dict[str, float]]:
+    """Return code and reason of the rows that aren't passable, and the extreme of each limit."""
+    found = {
+        row: _PLACELESS[int(prediction.status[row])]
+        for row in np.flatnonzero(prediction.status != SETTLED).tolist()
+    }
+    checks = check_limits(rover, prediction)
+    extremes = {check.code: check.extreme for check in checks}
+    needed = _where_forces_count(prediction)
+    for check in checks:
+        if check.breaks:
+            counts = needed if check.code in UNNEEDED_IN_A_FALL else True
+            for row in np.flatnonzero(check.broken() & counts).tolist():
+                if row not in found:
+                    found[row] = check.code, check.describe(row)
+    if needed is not True:
+        extremes["friction"] = largest_of(prediction.friction_utilisation[needed])
+        extremes["torque"] = largest_of(prediction.torque_saturation[needed])
+    return found, extremes
+
+
+def _where_forces_count(prediction: PathPrediction) -> np.ndarray | bool:
+    """Return (n,) False where a wheel rolls off an edge, True where none does anywhere."""
+    falling = prediction.falling
+    return ~np.asarray(falling.any(axis=1)) if falling.any() else True

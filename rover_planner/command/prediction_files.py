@@ -1,0 +1,160 @@
+"""The files of the `predict` command: poses in, the model's predictions out, and back again."""
+
+import io
+import zipfile
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.bounds.path import BOUNDED_VALUES
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.traversability.torque_ranges import TorqueRanges
+from rover_physics.traversability.traversability_class import Grade
+from rover_physics.traversability.verdict import Verdict
+from rover_planner.errors import PlanningError
+
+ARRAYS = (
+    "settled",
+    "position",
+    "roll",
+    "pitch",
+    "rocker_angle",
+    "bogie_angle",
+    "wheel_centres",
+    "wheel_loads",
+    "tangential",
+    "lateral",
+    "friction_utilisation",
+    "slip_ratio",
+    "torque_saturation",
+    "tip_over_ratio",
+    "tip_over_force_angle",
+    "belly_clearance",
+    "energy",
+    "time",
+)
+"""The arrays of a prediction that the output file holds, under the same names."""
+REPLAY_ARRAYS = (
+    "poses",
+    "status",
+    "contact_points",
+    "contact_angle",
+    "torque",
+    "friction",
+    "sinkage",
+    "motion_resistance",
+    "power",
+    "distance",
+    "wheel_drop",
+    "falling",
+)
+"""What it holds besides, so that `rover_planner view` can replay it."""
+SOIL_ARRAYS = ("sinkage", "motion_resistance")
+"""Those that it holds besides where soil was asked for, or the terrain names soils."""
+
+
+def read_poses(path: Path) -> NDArray[np.float64]:
+    """Read `poses` (n, 3), x, y [m] and yaw [rad] of the body origin, from an .npz file.
+
+    Raises:
+        PlanningError: No such file, no .npz file, no such array, or not numbers of that shape.
+    """
+    poses = _read_arrays(path, ("poses",), "poses")["poses"]
+    if poses.dtype.kind not in "fiu":
+        raise PlanningError(f"poses in {path} are of type {poses.dtype}; they must be numbers")
+    if poses.ndim != 2 or poses.shape[1] != 3 or len(poses) == 0:
+        raise PlanningError(
+            f"poses in {path} have shape {poses.shape}; they must be (n, 3): x, y, yaw"
+        )
+    return poses.astype(np.float64)
+
+
+def _read_arrays(path: Path, names: Sequence[str], what: str) -> dict[str, Any]:
+    """Read arrays by name from an .npz file of `what`."""
+    try:
+        archive = np.load(path, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise PlanningError(f"{path} holds one bare array; it must be an .npz file")
+        with archive:
+            for name in names:
+                if name not in archive:
+                    there = ", ".join(archive.files) or "nothing"
+                    raise PlanningError(f"{path} has no array {name!r}; it has {there}")
+            return {name: archive[name] for name in names}
+    except FileNotFoundError:
+        raise PlanningError(f"no {what} file {path}") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise PlanningError(f"{path} is no readable .npz file of {what}: {error}") from None
+
+
+def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
+    """Read what `write_prediction` wrote, without what lies between waypoints and bounds.
+
+    Returns:
+        The prediction of n waypoints, and for each the reason why it is not passable, or "".
+
+    Raises:
+        PlanningError: No such file, or not one of predictions.
+    """
+    arrays = _read_arrays(path, (*ARRAYS, *REPLAY_ARRAYS, "reason"), "predictions")
+    reasons = tuple(arrays.pop("reason").tolist())
+    lengths = {name: len(values) for name, values in arrays.items()}
+    if set(lengths.values()) != {len(reasons)}:
+        raise PlanningError(f"the arrays of {path} differ in length: {lengths}")
+    rest: dict[str, Any] = {"between": None, "policy": "recorded"}
+    return PathPrediction(**arrays, waypoint=np.arange(len(reasons)), **rest), reasons
+
+
+def write_prediction(
+    path: Path,
+    prediction: PathPrediction,
+    verdict: Verdict,
+    *,
+    on_soil: bool = False,
+    grades: Sequence[Grade] | None = None,
+    ranges: TorqueRanges | None = None,
+) -> None:
+    """Write a prediction and its verdict to an .npz file of exactly that name.
+
+    Beside the ARRAYS it holds `reason` (n,) text, empty where passable, `traversable` () bool and
+    `first_failure` () int, -1 if there is none; on an uncertain map `map_sigmas` () and for each
+    of BOUNDED_VALUES its `..._bounds`, smallest and largest in the last axis.
+
+    Args:
+        path: The file; it is overwritten.
+        prediction: The path of n waypoints.
+        verdict: What the limits say to it.
+        on_soil: Whether to write SOIL_ARRAYS (n, 6), in m and N.
+        grades: Of each waypoint, written as `grade`, `grade_constraint` and `grade_wheel` (n,)
+            text and `grade_margin` (n,).
+        ranges: Written as `torque_range` (n, 6, 2), lowest and highest torque [N m].
+
+    Raises:
+        PlanningError: The file cannot be written.
+    """
+    names = dict.fromkeys(ARRAYS + REPLAY_ARRAYS + (SOIL_ARRAYS if on_soil else ()))
+    arrays = {name: getattr(prediction, name) for name in names}
+    arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
+    arrays["traversable"] = np.array(verdict.traversable, dtype=np.bool_)
+    arrays["first_failure"] = np.array(verdict.first_failure, dtype=np.int64)
+    if prediction.bounds is not None:
+        arrays["map_sigmas"] = np.array(prediction.bounds.sigmas)
+        for name in BOUNDED_VALUES:
+            arrays[f"{name}_bounds"] = getattr(prediction.bounds, name)
+    if grades is not None:
+        for name, field in (("", "grade"), ("_constraint", "constraint"), ("_wheel", "wheel")):
+            texts = [getattr(grade, field) for grade in grades]
+            arrays[f"grade{name}"] = np.array(texts, dtype=np.str_)
+        arrays["grade_margin"] = np.array([grade.margin for grade in grades])
+    if ranges is not None:
+        arrays["torque_range"] = np.stack([ranges.lowest, ranges.highest], axis=-1)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    try:
+        path.write_bytes(buffer.getvalue())
+    except OSError as error:
+        raise PlanningError(f"cannot write {path}: {error.strerror}") from None

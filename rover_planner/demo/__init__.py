@@ -1,0 +1,1 @@
+"""The demo: a server, a planner that asks it, a table and a picture."""

@@ -1,0 +1,60 @@
+"""The answers to a mission's goals as a table for the terminal."""
+
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from rover_physics.rover.model import Rover
+from rover_planner.planning.goals import Mission
+
+
+def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) -> Table:
+    """Make a table of the verdicts of a traverse_server, one row a goal.
+
+    Args:
+        rover: The rover that was asked about.
+        mission: The goals.
+        answers: The verdict on each goal, as `MissionPlanner.ask` returns it.
+    """
+    table = Table(
+        title=f"Answers of /traverse_server for {rover.name}",
+        title_justify="left",
+        row_styles=("", "dim"),
+        expand=False,
+    )
+    for heading in ("goal", "verdict", "reason"):
+        table.add_column(heading, overflow="fold")
+    for heading in (
+        "length\n[m]",
+        "time\n[s]",
+        "energy\n[J]",
+        "smallest\ntip-over\nmargin",
+        "highest\nfriction\nuse",
+        "highest\ntorque\nuse",
+        "highest\nload [N]",
+    ):
+        table.add_column(escape(heading), justify="right", no_wrap=True)
+    for goal, answer in zip(mission.goals, answers, strict=True):
+        passable = answer["traversable"]
+        table.add_row(
+            f"{goal.name} {goal.intent}",
+            Text("traversable", style="bold blue")
+            if passable
+            else Text("refused", style="bold red"),
+            "" if passable else answer["reason"],
+            _number(answer.get("length"), 2),
+            _number(answer.get("time"), 0),
+            _number(answer.get("energy"), 1),
+            _number(answer.get("min_tip_over_ratio"), 2),
+            _number(answer.get("max_friction_utilisation"), 2),
+            _number(answer.get("max_torque_saturation"), 2),
+            _number(answer.get("max_wheel_load"), 1),
+        )
+    return table
+
+
+def _number(value: float | None, digits: int) -> str:
+    """Write a number, or a dash where there is none."""
+    return "-" if value is None else f"{value:.{digits}f}"

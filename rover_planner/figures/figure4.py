@@ -1,0 +1,149 @@
+"""Figure 4 of the paper: how the torque of one wheel changes the loads of all three of a side.
+
+The rover stands on level ground and the same torque acts on one wheel of both sides. Something
+has to hold the thrust of that wheel, and the loads depend on what. Two cases are drawn:
+
+- alone: the other motors give nothing, as in the paper's model; the thrust is held where body and
+  rockers meet, as by the inertia of the body of a rover that starts to move;
+- held by all wheels: each wheel takes a third of the thrust back, so that the rover stays. This is
+  the common pull of the product's own balance.
+"""
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.figures.pictures import STYLE, save_figure
+
+AXLES = ("rear", "middle", "front")
+LARGEST_TORQUE = 0.2
+"""Torques are varied between plus and minus this [N m], as in the paper."""
+ALONE, HELD = "other motors off, thrust held at the body", "thrust held by all wheels alike"
+
+_COLOURS = {ALONE: "#0072B2", HELD: "#D55E00"}
+_DASHES = {ALONE: "-", HELD: (0, (4, 2))}
+_HEADROOM = 1.55
+"""Room above the lines, in units of the room below, for what is written there."""
+
+
+def loads_at_rest(rover: Rover) -> np.ndarray:
+    """Return the loads (3,) [N] of rear, middle and front wheel of one side on level ground."""
+    cell = 0.5 * rover.wheel.radius
+    half = 3.0 * max(abs(place[0]) for place in rover.suspension.wheels.values())
+    count = 2 * int(np.ceil(half / cell)) + 1
+    level = Terrain(np.zeros((count, count)), cell, (-0.5 * (count - 1) * cell,) * 2)
+    loads = sweep_path(rover, level, np.zeros((1, 3))).wheel_loads[0]
+    return 0.5 * (loads[:3] + loads[3:])
+
+
+def load_changes(rover: Rover, tractions: np.ndarray) -> np.ndarray:
+    """Return how the loads (3,) [N] of a side on level ground change with tractions on both sides.
+
+    Eqs (13) to (15) of the paper with what the body passes on unchanged; what is left of (12), the
+    net thrust, is held at the rocker pivots. Order: rear, middle, front.
+
+    Args:
+        rover: The rover.
+        tractions: (3,) tractions of the wheels of a side, positive forward [N].
+    """
+    suspension = rover.suspension
+    wheels = np.array([suspension.wheels[name] for name in AXLES])
+    on_bogie = np.array([name != suspension.rocker_wheel for name in AXLES])
+    ground = wheels[:, 2] - rover.wheel.radius
+    rocker, bogie = np.array(suspension.rocker_pivot), np.array(suspension.bogie_pivot)
+    about_rocker = np.sum((ground - rocker[2]) * tractions)
+    about_bogie = np.sum(on_bogie * (ground - bogie[2]) * tractions)
+    equations = np.array(
+        [np.ones(3), wheels[:, 0] - rocker[0], on_bogie * (wheels[:, 0] - bogie[0])]
+    )
+    return np.linalg.solve(equations, [0.0, about_rocker, about_bogie])
+
+
+def loads_under_torque(rover: Rover, axle: int, torque: float, case: str) -> np.ndarray:
+    """Return the loads (3,) [N] of a side with `torque` [N m] on the wheels of one axle.
+
+    Args:
+        rover: The rover.
+        axle: Index into AXLES.
+        torque: Torque on each of the two wheels, positive forward [N m].
+        case: ALONE or HELD.
+    """
+    tractions = np.zeros(3)
+    tractions[axle] = torque / rover.wheel.radius
+    if case == HELD:
+        tractions -= tractions.mean()
+    return loads_at_rest(rover) + load_changes(rover, tractions)
+
+
+def draw_figure4(path: Path, rover: Rover) -> None:
+    """Write Figure 4 of the paper for `rover` as a picture of nine panels.
+
+    Args:
+        path: Picture to write; its suffix says of which kind, such as .png.
+        rover: The rover.
+
+    Raises:
+        PlanningError: The file cannot be written.
+    """
+    torques = np.array([-LARGEST_TORQUE, LARGEST_TORQUE])
+    loads = {
+        (row, case): np.array([loads_under_torque(rover, row, t, case) for t in torques])
+        for row in range(3)
+        for case in (ALONE, HELD)
+    }
+    centre = loads_at_rest(rover)
+    reach = 1.15 * max(np.abs(values - centre).max() for values in loads.values())
+    with matplotlib.rc_context(STYLE | {"axes.titlesize": 11, "axes.titleweight": "bold"}):
+        figure = Figure(figsize=(10.5, 9.0), layout="constrained")
+        FigureCanvasAgg(figure)
+        panels = figure.subplots(3, 3, sharex=True, sharey="col")
+        for row in range(3):
+            for column in range(3):
+                axes = panels[row, column]
+                axes.axhline(centre[column], color="#999999", linewidth=0.8)
+                for case in (ALONE, HELD):
+                    _draw_line(axes, torques, loads[row, case][:, column], case)
+                axes.set_ylim(centre[column] - reach, centre[column] + _HEADROOM * reach)
+                axes.set_xlabel(f"{AXLES[row]} wheel torque [mN·m]")
+                axes.set_ylabel(f"{AXLES[column]} load [N]")
+        for column in range(3):
+            panels[0, column].set_title(f"{AXLES[column].capitalize()} normal force")
+        panels[0, 0].set_xticks([-200, -100, 0, 100, 200])
+        figure.suptitle(
+            f"Over-actuation of {rover.name} on level ground: wheel loads against one torque",
+            fontsize=13,
+            fontweight="bold",
+        )
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
+        save_figure(path, figure)
+
+
+def _draw_line(axes: Axes, torques: np.ndarray, loads: np.ndarray, case: str) -> None:
+    """Draw one line, and say how far it rises per 100 mN m."""
+    axes.plot(
+        1e3 * torques, loads, color=_COLOURS[case], linestyle=_DASHES[case], linewidth=1.8,
+        label=case,
+    )  # fmt: skip
+    slope = 0.1 * np.diff(loads)[0] / np.diff(torques)[0]
+    words = f"{slope:+.2f} N per 100 mN·m".replace("-", "\N{MINUS SIGN}")
+    axes.text(
+        0.03, 0.98 if case == ALONE else 0.90, words, transform=axes.transAxes, va="top",
+        color=_COLOURS[case], fontsize=8.5,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+    )  # fmt: skip
+
+
+def _legend() -> list[Line2D]:
+    lines = [
+        Line2D([], [], color=_COLOURS[case], linestyle=_DASHES[case], linewidth=1.8, label=case)
+        for case in (ALONE, HELD)
+    ]
+    return [*lines, Line2D([], [], color="#999999", linewidth=0.8, label="no torque")]

@@ -1,0 +1,370 @@
+"""Pictures of answers: candidate paths on the hill-shaded terrain, and the wheels along them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from rover_physics.names import WHEELS
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.figures.pictures import STYLE, save_figure
+from rover_planner.planning.path_query import Candidate, PathAnswer
+
+# The palette of Okabe and Ito, which readers with colour-blindness can tell apart.
+PASSABLE = "#0072B2"
+REFUSED = "#D55E00"
+CHOSEN = "#F0E442"
+WHEEL_COLOURS = {"front": "#0072B2", "middle": "#E69F00", "rear": "#CC79A7"}
+SIDE_STYLES = {"right": "-", "left": (0, (3, 1.5))}
+
+# Ground is drawn in warm greys, which leave the colours to the paths.
+_GROUND = LinearSegmentedColormap.from_list("ground", ["#6E6259", "#B5A99C", "#F1EAE0"])
+_COLUMNS = 3
+_UNKNOWN = (0.80, 0.84, 0.90)
+_INK = "#222222"
+
+
+@dataclass(frozen=True)
+class LabelledAnswer:
+    """An answer with the name of its goal."""
+
+    name: str
+    """A short name, written at the goal."""
+    intent: str
+    """What kind of goal it is, for titles."""
+    answer: PathAnswer
+    """The candidates, the best of them and the verdicts."""
+
+
+def draw_answers(
+    path: Path, rover: Rover, terrain: Terrain, answers: Sequence[LabelledAnswer], title: str = ""
+) -> None:
+    """Write a picture of answers to queries on one terrain.
+
+    Above, the terrain, the candidate paths coloured by verdict and the chosen ones; below, wheel
+    loads, friction utilisation, torque saturation and tip-over margin against distance, for up to
+    three chosen paths, or for the refused ones if there is no other.
+
+    Args:
+        path: Picture to write; its suffix says of which kind, such as .png.
+        rover: The rover, for its limits.
+        terrain: The ground.
+        answers: The answers, one or more.
+        title: Heading of the picture.
+
+    Raises:
+        PlanningError: No answers, or the file cannot be written.
+    """
+    if not answers:
+        raise PlanningError("no answers to draw; there must be at least one")
+    passable = [a for a in answers if a.answer.traversable]
+    shown = (passable or list(answers))[:_COLUMNS]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(12.5, 15.5), layout="constrained")
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.05))
+        above, below = (figure.add_subfigure(grid[row]) for row in (0, 1))
+        if title:
+            figure.suptitle(title, fontsize=14, fontweight="bold")
+        _draw_map(above.subplots(), terrain, answers)
+        _draw_panels(below, rover, shown)
+        save_figure(path, figure)
+
+
+def hill_shade(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
+    """Return how bright each cell (ny, nx) is, 0 to 1, the sun in the north-west; NaN stays."""
+    dy, dx = np.gradient(elevation, resolution)
+    azimuth, altitude = np.deg2rad(135.0), np.deg2rad(40.0)
+    sun = np.array(
+        [np.cos(altitude) * np.cos(azimuth), np.cos(altitude) * np.sin(azimuth), np.sin(altitude)]
+    )
+    cosine = (-dx * sun[0] - dy * sun[1] + sun[2]) / np.sqrt(1 + dx**2 + dy**2)
+    # level ground comes out at two thirds, so that both sides of a rock show
+    return np.clip(2 / 3 + 0.9 * (cosine - sun[2]), 0.0, 1.0)
+
+
+def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[LabelledAnswer]) -> None:
+    """Draw the terrain with the candidate paths of all answers."""
+    xmin, xmax, ymin, ymax = terrain.bounds
+    half = 0.5 * terrain.resolution
+    extent = (xmin - half, xmax + half, ymin - half, ymax + half)
+    view = _view(terrain, answers)
+    lowest, highest = _elevation_range(terrain, view)
+    axes.set_facecolor("white")
+    axes.set_axisbelow(False)
+    axes.grid(False)
+    image = axes.imshow(
+        terrain.elevation,
+        extent=extent,
+        origin="lower",
+        cmap=_GROUND,
+        alpha=1.0,
+        vmin=lowest,
+        vmax=highest,
+    )
+    axes.imshow(
+        _shade_layer(terrain), extent=extent, origin="lower", interpolation="bilinear", zorder=1
+    )
+    bar = axes.inset_axes((1.015, 0.12, 0.015, 0.76))
+    axes.figure.colorbar(image, cax=bar, label="elevation [m]")
+    for labelled in answers:
+        _draw_candidates(axes, labelled.answer)
+    for labelled in answers:
+        _draw_goal(axes, labelled)
+    start = answers[0].answer.chosen.poses[0]
+    axes.plot(
+        start[0],
+        start[1],
+        marker=_arrow(start[2]),
+        markersize=17,
+        color="white",
+        markeredgecolor=_INK,
+        zorder=9,
+    )
+    axes.set(xlim=view[:2], ylim=view[2:], xlabel="x [m]", ylabel="y [m]")
+    axes.set_aspect("equal")
+    axes.legend(
+        handles=_map_legend(terrain), loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=6
+    )
+
+
+def _arrow(yaw: float) -> list[tuple[float, float]]:
+    """Return the outline of an arrow head that points along a heading [rad], for a marker."""
+    outline = np.array([[1.0, 0.0], [-0.75, 0.6], [-0.4, 0.0], [-0.75, -0.6], [1.0, 0.0]])
+    turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    return [(float(x), float(y)) for x, y in outline @ turn]
+
+
+def _map_legend(terrain: Terrain) -> list[Line2D]:
+    """Return the handles of the map's legend."""
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=CHOSEN,
+            lw=3,
+            label="chosen path",
+            path_effects=[withStroke(linewidth=5, foreground=_INK)],
+        ),
+        Line2D([], [], color=PASSABLE, lw=1.6, label="traversable candidate"),
+        Line2D([], [], color=REFUSED, lw=1.6, label="refused candidate"),
+        Line2D([], [], color=REFUSED, marker="x", ls="", mew=2, label="where it fails first"),
+        Line2D(
+            [],
+            [],
+            color="white",
+            marker=_arrow(0.5 * np.pi),
+            ls="",
+            markersize=10,
+            markeredgecolor=_INK,
+            label="start",
+        ),
+    ]
+    if not np.isfinite(terrain.elevation).all():
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=_UNKNOWN,
+                marker="s",
+                ls="",
+                markersize=9,
+                markeredgecolor="#888888",
+                label="unknown ground",
+            )
+        )
+    return handles
+
+
+def _shade_layer(terrain: Terrain) -> NDArray[np.float64]:
+    """Return the hill shade as black and white with opacity (ny, nx, 4), unknown cells opaque."""
+    shade = hill_shade(terrain.elevation, terrain.resolution)
+    shade = np.where(np.isfinite(shade), shade, 2 / 3)
+    light = np.where(shade > 2 / 3, 1.0, 0.0)
+    depth = np.abs(shade - 2 / 3)
+    layer = np.repeat(light[:, :, None], 4, axis=2)
+    layer[:, :, 3] = np.clip(np.where(light > 0, 1.8, 1.35) * depth, 0, 0.9)
+    layer[np.isnan(terrain.elevation)] = (*_UNKNOWN, 1.0)
+    return layer
+
+
+def _draw_candidates(axes: Axes, answer: PathAnswer) -> None:
+    """Draw all candidates of an answer, the chosen one last and thick."""
+    for candidate in answer.candidates:
+        passable = candidate.verdict.traversable
+        axes.plot(
+            *candidate.poses[:, :2].T,
+            color=PASSABLE if passable else REFUSED,
+            lw=1.2,
+            alpha=0.95,
+            zorder=3,
+            solid_capstyle="round",
+        )
+    failures = [
+        c.poses[c.verdict.first_failure] for c in answer.candidates if not c.verdict.traversable
+    ]
+    if failures:
+        spots = np.array(failures)
+        axes.plot(
+            spots[:, 0],
+            spots[:, 1],
+            "x",
+            color=REFUSED,
+            mew=2,
+            ms=6,
+            zorder=6,
+            path_effects=[withStroke(linewidth=3.5, foreground="white")],
+        )
+    if answer.traversable:
+        axes.plot(
+            *answer.chosen.poses[:, :2].T,
+            color=CHOSEN,
+            lw=2.4,
+            zorder=5,
+            path_effects=[withStroke(linewidth=4.6, foreground=_INK)],
+        )
+
+
+def _draw_goal(axes: Axes, labelled: LabelledAnswer) -> None:
+    """Mark a goal with its name in the colour of the verdict."""
+    x, y = labelled.answer.chosen.poses[-1, :2]
+    colour = PASSABLE if labelled.answer.traversable else REFUSED
+    axes.plot(x, y, "o", ms=17, color=colour, markeredgecolor="white", mew=1.5, zorder=8)
+    axes.text(
+        x,
+        y,
+        labelled.name,
+        color="white",
+        fontweight="bold",
+        ha="center",
+        va="center_baseline",
+        zorder=10,
+        clip_on=True,
+    )
+
+
+def _view(terrain: Terrain, answers: Sequence[LabelledAnswer]) -> tuple[float, ...]:
+    """Return xmin, xmax, ymin, ymax [m] of what to show: all paths, with a margin."""
+    places = np.concatenate([c.poses[:, :2] for a in answers for c in a.answer.candidates])
+    lower, upper = places.min(axis=0), places.max(axis=0)
+    margin = 0.08 * float(max(upper - lower)) + 0.5
+    lower, upper = lower - margin, upper + margin
+    # a wide view fills the page; the terrain's own edges are shown where paths leave it
+    wanted = 1.55 * (upper[1] - lower[1])
+    lack = max(0.0, wanted - (upper[0] - lower[0]))
+    xmin, xmax, _, _ = terrain.bounds
+    room_left = max(0.0, lower[0] - xmin)
+    room_right = max(0.0, xmax - upper[0])
+    left = min(room_left, max(0.5 * lack, lack - room_right))
+    right = min(room_right, lack - left)
+    return (lower[0] - left, upper[0] + right, lower[1], upper[1])
+
+
+def _elevation_range(
+    terrain: Terrain, view: tuple[float, ...]
+) -> tuple[float | None, float | None]:
+    """Return the range of elevations in view, for the colours."""
+    ny, nx = terrain.elevation.shape
+    x = terrain.origin[0] + terrain.resolution * np.arange(nx)
+    y = terrain.origin[1] + terrain.resolution * np.arange(ny)
+    columns, rows = (x >= view[0]) & (x <= view[1]), (y >= view[2]) & (y <= view[3])
+    seen = terrain.elevation[np.ix_(rows, columns)]
+    seen = seen[np.isfinite(seen)]
+    if not len(seen):
+        return None, None
+    low, high = np.percentile(seen, [0.5, 99.5])
+    return float(low), float(max(high, low + 0.05))
+
+
+def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
+    """Draw a column of panels for each answer shown."""
+    limits = rover.limits
+    rows = (
+        ("wheel load [N]", "wheel_loads", None),
+        ("friction\nutilisation [-]", "friction_utilisation", limits.friction_utilisation),
+        ("torque\nsaturation [-]", "torque_saturation", limits.torque_saturation),
+        ("tip-over margin\n(ratio to flat) [-]", "tip_over_ratio", limits.tip_over_ratio),
+    )
+    panels = figure.subplots(len(rows), len(shown), sharex="col", sharey="row", squeeze=False)
+    for column, labelled in enumerate(shown):
+        candidate = labelled.answer.chosen
+        panels[0, column].set_title(_panel_title(labelled), loc="left")
+        for row, (label, name, limit) in enumerate(rows):
+            axes = panels[row, column]
+            _draw_quantity(axes, candidate, name)
+            if limit is not None:
+                axes.axhline(limit, color=_INK, lw=1.0, ls=":")
+            if column == 0:
+                axes.set_ylabel(label)
+        panels[-1, column].set_xlabel("distance along the path [m]")
+    for row, (_, name, limit) in enumerate(rows):
+        highest = max(_highest(one.answer.chosen, name) for one in shown)
+        if limit is not None:
+            highest = max(limit, min(highest, 2 * max(limit, 1.0)))
+        panels[row, 0].set_ylim(0, 1.08 * max(highest, 1e-3))
+    figure.align_ylabels(panels[:, 0])
+    figure.legend(handles=_wheel_legend(), loc="outside lower center", ncols=4)
+
+
+def _highest(candidate: Candidate, name: str) -> float:
+    """Return the largest finite value of a predicted quantity, 0 where there is none."""
+    values = np.asarray(getattr(candidate.prediction, name))
+    return float(np.max(values, where=np.isfinite(values), initial=0.0))
+
+
+def _panel_title(labelled: LabelledAnswer) -> str:
+    """Return the heading of a column."""
+    chosen = labelled.answer.chosen
+    if labelled.answer.traversable:
+        return f"{labelled.name} ({labelled.intent}): chosen path, {chosen.length:.1f} m"
+    return f"{labelled.name} ({labelled.intent}): refused, {chosen.verdict.code}"
+
+
+def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
+    """Draw one predicted quantity along a path: six wheels, or one value."""
+    values = np.asarray(getattr(candidate.prediction, name))
+    steps = np.hypot(*np.diff(candidate.poses[:, :2], axis=0).T)
+    distance = np.concatenate([[0.0], np.cumsum(steps)])
+    columns = values.reshape(len(values), -1)
+    if np.allclose(columns, columns[:, :1], equal_nan=True):
+        axes.plot(distance, columns[:, 0], color=_INK, lw=1.3)
+    else:
+        for wheel, series in zip(WHEELS, values.T, strict=True):
+            position, side = wheel.split("_")
+            axes.plot(
+                distance, series, color=WHEEL_COLOURS[position], ls=SIDE_STYLES[side], lw=1.0
+            )
+    failure = candidate.verdict.first_failure
+    if failure >= 0:
+        axes.axvline(distance[failure], color=REFUSED, lw=1.2)
+    axes.set_xlim(0, max(distance[-1], 1e-3))
+
+
+def _wheel_legend() -> list[Line2D]:
+    """Return the handles that say which line is which wheel."""
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=WHEEL_COLOURS[position],
+            ls=SIDE_STYLES[side],
+            lw=1.6,
+            label=f"{position} {side}",
+        )
+        for position in ("front", "middle", "rear")
+        for side in ("left", "right")
+    ]
+    handles.append(Line2D([], [], color=_INK, lw=1.3, label="rover, or all wheels alike"))
+    handles.append(Line2D([], [], color=_INK, lw=1.0, ls=":", label="safety limit"))
+    return handles

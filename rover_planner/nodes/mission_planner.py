@@ -1,0 +1,321 @@
+"""The node /mission_planner: asks a traverse_server over ROS 2 for one goal after another.
+
+    mission_planner [--map MAP.npz] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--drive] [--json]
+
+It is what an operator's planner would do, small enough to copy from: publish a map, call
+`~/can_traverse`, and read the verdict, wheel loads and slip that the server publishes with it.
+"""
+
+import argparse
+import json
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry, Path
+from nav_msgs.srv import GetPlan
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64MultiArray
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.paths import stamped_pose
+from msg_adapters.predictions import array_values
+from rover_physics.errors import RoverError
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, topic_qos
+
+SERVER = "/traverse_server"
+"""Name of the server's node; remap its services and topics for another."""
+
+
+class NoAnswerError(Exception):
+    """The server did not answer in time; the text says what was waited for."""
+
+
+class MissionPlanner(Node):
+    """Asks the server, and collects what it publishes about each answer.
+
+    Its callbacks run in an executor's thread; the methods below are for another one and block.
+    """
+
+    def __init__(self, map_frame: str = "map", timeout: float = 60.0, **node_arguments: Any):
+        """Create the client, the map's publisher and the subscriptions to the server's results."""
+        super().__init__("mission_planner", **node_arguments)
+        self._frame = map_frame
+        self._timeout = timeout
+        self._changed = threading.Condition()
+        self._verdicts: dict[tuple[int, int], dict[str, Any]] = {}
+        self._arrays: dict[str, np.ndarray] = {}
+        self._plan = Path()
+        self._place: tuple[float, float] | None = None
+        self._path_publisher = self.create_publisher(Path, "path", topic_qos())
+        self.create_subscription(Odometry, "odometry", self._take_odometry, sensor_qos())
+        self._map_publisher = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        self._client = self.create_client(GetPlan, f"{SERVER}/can_traverse")
+        self.create_subscription(
+            DiagnosticArray, f"{SERVER}/verdict", self._take_verdict, result_qos()
+        )
+        for name in ("wheel_loads", "slip_ratios"):
+            self.create_subscription(
+                Float64MultiArray, f"{SERVER}/{name}", self._taker(name), result_qos()
+            )
+
+    def wait_for_server(self) -> None:
+        """Wait until the server serves and is heard.
+
+        Raises:
+            NoAnswerError: It is not there in time.
+        """
+        verdicts = f"{SERVER}/verdict"
+        self._wait(
+            lambda: self._client.service_is_ready() and self.count_publishers(verdicts) > 0,
+            f"the service {SERVER}/can_traverse",
+        )
+
+    def publish_map(self, terrain: Terrain) -> None:
+        """Publish a terrain for the server and for whoever comes later.
+
+        Raises:
+            NoAnswerError: Nobody subscribes to the map in time.
+        """
+        self._wait(lambda: self._map_publisher.get_subscription_count() > 0, "a map subscriber")
+        stamp = self.get_clock().now().to_msg()
+        self._map_publisher.publish(terrain_to_point_cloud(terrain, self._frame, stamp))
+
+    def ask(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
+        """Ask whether the rover can get from start to goal.
+
+        Args:
+            start: x, y [m] and yaw [rad] in the map frame.
+            goal: The same.
+
+        Returns:
+            The server's verdict, with `plan` [[x, y, z], ...] [m], and `max_wheel_load` [N] and
+            `max_slip_ratio` of the path that was judged, None where there is none.
+
+        Raises:
+            NoAnswerError: The server does not answer in time.
+        """
+        deadline = time.monotonic() + self._timeout
+        while True:
+            answer = self._ask_once(start, goal)
+            # the map is on its way, by another road than the question
+            if answer.get("code") != "no_map" or time.monotonic() > deadline:
+                return answer
+            time.sleep(0.2)
+
+    def _ask_once(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
+        with self._changed:
+            self._arrays.clear()
+        request = GetPlan.Request()
+        request.start = stamped_pose(start, self._frame)
+        request.goal = stamped_pose(goal, self._frame)
+        future = self._client.call_async(request)
+        future.add_done_callback(self._notify)
+        self._wait(future.done, f"the answer of {SERVER}/can_traverse")
+        plan = self._plan = future.result().plan
+        stamp = (plan.header.stamp.sec, plan.header.stamp.nanosec)
+        self._wait(lambda: stamp in self._verdicts, f"the verdict on {SERVER}/verdict")
+        answer = dict(self._verdicts[stamp])
+        positions = [pose.pose.position for pose in plan.poses]
+        answer["plan"] = [[p.x, p.y, p.z] for p in positions]
+        answer["max_wheel_load"] = self._largest("wheel_loads", answer)
+        answer["max_slip_ratio"] = self._largest("slip_ratios", answer)
+        return answer
+
+    def drive(self, within: float = 0.2, timeout: float = 3600.0) -> None:
+        """Send the last plan to the rover, on the topic `path`, and wait until it is there.
+
+        Args:
+            within: Distance from the end that counts as there [m].
+            timeout: Longest wait [s].
+
+        Raises:
+            NoAnswerError: There is no plan, nobody follows it, or the rover is not there in time.
+        """
+        if not self._plan.poses:
+            raise NoAnswerError("there is no plan to drive")
+        self._wait(
+            lambda: self._path_publisher.get_subscription_count() > 0, "a rover on the topic path"
+        )
+        self._path_publisher.publish(self._plan)
+        end = self._plan.poses[-1].pose.position
+        self._wait(
+            lambda: (
+                self._place is not None
+                and np.hypot(self._place[0] - end.x, self._place[1] - end.y) < within
+            ),
+            "the rover to get there",
+            timeout,
+        )
+
+    def _take_odometry(self, odometry: Odometry) -> None:
+        place = odometry.pose.pose.position
+        with self._changed:
+            self._place = (place.x, place.y)
+            self._changed.notify_all()
+
+    def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
+        """Return the largest value of an array that the server publishes with its verdict."""
+        rows = answer.get("waypoints")
+        if not rows:
+            return None
+        self._wait(lambda: len(self._arrays.get(name, ())) == rows, f"{SERVER}/{name}")
+        values = self._arrays[name]
+        return float(np.nanmax(values)) if np.isfinite(values).any() else None
+
+    def _take_verdict(self, message: DiagnosticArray) -> None:
+        stamp = (message.header.stamp.sec, message.header.stamp.nanosec)
+        status = message.status[0]
+        with self._changed:
+            self._verdicts = {stamp: {v.key: _value(v.value) for v in status.values}}
+            self._changed.notify_all()
+
+    def _taker(self, name: str) -> Callable[[Float64MultiArray], None]:
+        def take(message: Float64MultiArray) -> None:
+            with self._changed:
+                self._arrays[name] = array_values(message)
+                self._changed.notify_all()
+
+        return take
+
+    def _notify(self, _future: Any) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def _wait(
+        self, condition: Callable[[], bool], what: str, timeout: float | None = None
+    ) -> None:
+        """Wait until a condition holds.
+
+        Raises:
+            NoAnswerError: It does not in time.
+            ExternalShutdownException: ROS is shut down meanwhile.
+        """
+        longest = timeout or self._timeout
+        deadline = time.monotonic() + longest
+        with self._changed:
+            while not condition():
+                if not self.context.ok():
+                    raise ExternalShutdownException
+                if time.monotonic() > deadline:
+                    raise NoAnswerError(f"waited {longest:.0f} s in vain for {what}")
+                self._changed.wait(0.1)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node; return 0 when every goal got an answer, 1 if not, 2 for bad input."""
+    given = remove_ros_args(sys.argv if arguments is None else ["", *arguments])[1:]
+    options = _parser().parse_args(given)
+    try:
+        terrain = load_terrain(options.map) if options.map else None
+    except RoverError as error:
+        print("mission_planner:", error, file=sys.stderr)
+        return 2
+    rclpy.init(args=arguments)
+    node = MissionPlanner(options.map_frame, options.timeout)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
+    thread.start()
+    try:
+        return _carry_out(node, terrain, options)
+    except NoAnswerError as error:
+        print("mission_planner:", error, file=sys.stderr)
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 130
+    finally:
+        rclpy.try_shutdown()
+        thread.join(2.0)
+        node.destroy_node()
+
+
+def _carry_out(node: MissionPlanner, terrain: Terrain | None, options) -> int:
+    """Publish the map and ask for each goal."""
+    report = _print_json if options.json else _print_text
+    report({"event": "waiting for the server"})
+    node.wait_for_server()
+    if terrain is not None:
+        report({"event": "publishing the map"})
+        node.publish_map(terrain)
+    for number, goal in enumerate(options.goal):
+        report({"event": "asking", "goal": number})
+        asked = time.monotonic()
+        answer = node.ask(options.start, goal)
+        answer["response_time"] = time.monotonic() - asked
+        report({"event": "answer", "goal": number, "answer": answer})
+        if options.drive and answer["traversable"]:
+            report({"event": "driving", "goal": number})
+            node.drive()
+            report({"event": "arrived", "goal": number})
+    return 0
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin()
+    except ExternalShutdownException:
+        return
+
+
+def _print_json(event: dict[str, Any]) -> None:
+    print(json.dumps(event), flush=True)
+
+
+def _print_text(event: dict[str, Any]) -> None:
+    if event["event"] == "answer":
+        answer = event["answer"]
+        word = "yes" if answer["traversable"] else f"no, {answer['reason']}"
+        print(f"goal {event['goal'] + 1}: {word}", flush=True)
+    elif event["event"] != "asking":
+        print(event["event"], flush=True)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="mission_planner", description="Ask a traverse_server for one goal after another."
+    )
+    parser.add_argument("--map", help="elevation map to publish first, .npz")
+    parser.add_argument("--start", type=_pose, required=True, metavar="X,Y,YAW")
+    parser.add_argument("--goal", type=_pose, required=True, action="append", metavar="X,Y,YAW")
+    parser.add_argument(
+        "--drive",
+        action="store_true",
+        help="send the plan to the rover and wait until it is there",
+    )
+    parser.add_argument("--map-frame", default="map")
+    parser.add_argument("--timeout", type=float, default=60.0, help="for each answer [s]")
+    parser.add_argument("--json", action="store_true", help="print a JSON object a line")
+    return parser
+
+
+def _pose(text: str) -> tuple[float, ...]:
+    """Read a pose from the command line."""
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != 3:
+        raise argparse.ArgumentTypeError(f"{text!r} is no pose; give X,Y,YAW in m and rad")
+    return values
+
+
+def _value(text: str) -> Any:
+    """Read a value of a diagnostic status: JSON, or else a plain text."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+if __name__ == "__main__":
+    sys.exit(main())

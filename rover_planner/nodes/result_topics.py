@@ -1,0 +1,166 @@
+"""The results of a traverse server on their topics: one judged path, one stamp for all of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Path
+from numpy.typing import NDArray
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from visualization_msgs.msg import MarkerArray
+
+from msg_adapters.markers import cleared_markers, path_markers
+from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
+from msg_adapters.predictions import (
+    MEASURES,
+    empty_trajectory,
+    joint_trajectory,
+    tip_over_array,
+    waypoint_array,
+)
+from msg_adapters.verdicts import verdict_to_diagnostics
+from rover_physics.names import WHEELS
+from rover_physics.rover.model import Rover
+from rover_planner.planning.judgement import Judgement
+from rover_planner.ros.deferred_work import Afterwards
+from rover_planner.ros.lazy_publisher import KeptTopic
+
+WHEEL_TOPICS = {
+    "wheel_loads": "wheel_loads",
+    "slip_ratios": "slip_ratio",
+    "friction_utilisation": "friction_utilisation",
+    "torque_saturation": "torque_saturation",
+}
+"""Topics of one value per waypoint and wheel, and the field of the prediction each carries."""
+LOOK_OUT = 0.2
+"""Time between two looks for listeners that have come [s]."""
+
+_KINDS = {
+    "plan": Path,
+    **dict.fromkeys([*WHEEL_TOPICS, "tip_over_margin"], Float64MultiArray),
+    "predicted_joints": JointTrajectory,
+    "verdict": DiagnosticArray,
+    "markers": MarkerArray,
+}
+"""Topics in the order of publication, and the message each carries."""
+
+
+class ResultTopics:
+    """Makes the plan of a judgement at once, and publishes the rest when the answer is sent."""
+
+    def __init__(self, node: Node, afterwards: Afterwards, map_frame: str):
+        self._node, self._afterwards, self._frame = node, afterwards, map_frame
+        self._poses = PoseStock()
+        self._points: list[JointTrajectoryPoint] = []
+        self._topics = {name: KeptTopic(node, kind, f"~/{name}") for name, kind in _KINDS.items()}
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(LOOK_OUT, self._serve_late_comers, clock=steady)
+
+    def take(
+        self,
+        judgement: Judgement,
+        rover: Rover,
+        plan_spacing: float,
+        log: Callable[[], None],
+    ) -> Path:
+        """Return the plan of a judgement, and publish all results once the answer is sent.
+
+        Args:
+            judgement: The answer.
+            rover: The rover that was asked about.
+            plan_spacing: Distance between poses of the plan [m]; 0 keeps all waypoints.
+            log: What else to do once the answer is sent, before the results.
+
+        Returns:
+            The plan; its poses are good until the next plan is made.
+        """
+        stamp = self._node.get_clock().now().to_msg()
+        results = _Results(
+            judgement, rover, plan_spacing, self._frame, stamp, self._poses, self._points
+        )
+        publications = [
+            partial(topic.publish, partial(results.message, name))
+            for name, topic in self._topics.items()
+        ]
+        self._afterwards.do(log, *publications)
+        return results.plan()
+
+    def _serve_late_comers(self) -> None:
+        awaited = [topic for topic in self._topics.values() if topic.is_awaited]
+        if awaited:
+            self._afterwards.do(*(topic.catch_up for topic in awaited))
+
+
+@dataclass(frozen=True)
+class _Results:
+    """The messages of one judgement, each made when it is asked for."""
+
+    judgement: Judgement
+    rover: Rover
+    plan_spacing: float
+    frame: str
+    stamp: Time
+    poses: PoseStock
+    points: list[JointTrajectoryPoint]
+
+    def message(self, topic: str) -> object:
+        """Return the message for a topic."""
+        if topic == "plan":
+            return self.plan()
+        if topic == "verdict":
+            return self._verdict()
+        if self.judgement.candidate is None:
+            return self._nothing(topic)
+        return self._prediction(topic)
+
+    def plan(self) -> Path:
+        """Return the path to drive, without poses where there is none."""
+        candidate = self.judgement.candidate
+        if candidate is None or not self.judgement.traversable:
+            return empty_path(self.frame, self.stamp)
+        return settled_path(
+            candidate.prediction, self._rows_to_show(), self.frame, self.stamp, self.poses
+        )
+
+    def _verdict(self) -> DiagnosticArray:
+        verdict = self.judgement.verdict
+        warn = not verdict.get("suspension_agrees", True)
+        return verdict_to_diagnostics(verdict, self.rover.name, self.frame, self.stamp, warn=warn)
+
+    def _nothing(self, topic: str) -> object:
+        """Return the empty message for where no path was judged."""
+        if topic == "predicted_joints":
+            return empty_trajectory(self.frame, self.stamp)
+        if topic == "markers":
+            return cleared_markers(self.frame, self.stamp)
+        if topic == "tip_over_margin":
+            return waypoint_array(np.empty((0, len(MEASURES))), "measure")
+        return waypoint_array(np.empty((0, len(WHEELS))))
+
+    def _prediction(self, topic: str) -> object:
+        """Return what is predicted along a judged path."""
+        candidate = self.judgement.candidate
+        assert candidate is not None
+        prediction = candidate.prediction
+        if topic == "predicted_joints":
+            radius = self.rover.wheel.radius
+            return joint_trajectory(prediction, radius, self.frame, self.stamp, self.points)
+        if topic == "markers":
+            grades = [grade.grade for grade in self.judgement.grades]
+            reasons, rows = candidate.verdict.reasons, self._rows_to_show()
+            return path_markers(prediction, reasons, rows, self.frame, self.stamp, grades)
+        if topic == "tip_over_margin":
+            return tip_over_array(prediction)
+        return waypoint_array(getattr(prediction, WHEEL_TOPICS[topic]))
+
+    def _rows_to_show(self) -> NDArray[np.intp]:
+        """Return waypoints about `plan_spacing` apart, and those where the grade changes."""
+        candidate = self.judgement.candidate
+        assert candidate is not None
+        return decimate(candidate.poses, self.plan_spacing, self.judgement.changes())

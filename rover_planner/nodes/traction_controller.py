@@ -1,0 +1,291 @@
+"""The node /traction_controller: wheel torques shared by a quadratic programme at its rate."""
+
+import gc
+import signal
+import sys
+import time
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import rclpy
+import rclpy.logging
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import Imu, JointState, PointCloud2
+from std_msgs.msg import Float64MultiArray
+
+from msg_adapters.commands import (
+    effort_commands,
+    joint_order,
+    set_values,
+    twist_to_speeds,
+    wheel_values,
+)
+from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.errors import MessageError
+from msg_adapters.frames import check_frame
+from msg_adapters.imu import imu_to_attitude
+from msg_adapters.joints import joint_positions, joint_velocities
+from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.traction_status import traction_diagnostics
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.terrain.grid import Terrain
+from rover_planner.parameters.declare import check_changes, declare_parameters
+from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
+from rover_planner.ros.map_intake import MapIntake, PreparedMap, prepare_map
+from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
+from rover_planner.ros.realtime import take_priority
+from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.traction.statistics import TractionStatistics
+from rover_planner.traction.traction_service import (
+    TractionService,
+    TractionUpdate,
+    settings_from_parameters,
+)
+
+NODE_NAME = "traction_controller"
+JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+DIAGNOSTICS_PERIOD = 1.0
+SWITCH_INTERVAL = 2e-4
+"""How long the thread that makes maps ready may keep the interpreter from an update [s]."""
+ARRIVAL_TIME = Duration(seconds=0.2)
+"""Longest wait for the zeros of a node that ends to arrive."""
+
+
+class TractionController(Node):
+    """Wires a TractionService to ROS: whatever is wrong, the wheels get zero torque in time."""
+
+    def __init__(self, **node_arguments: Any):
+        super().__init__(NODE_NAME, **node_arguments)
+        self._values = declare_parameters(self, TRACTION_CONTROLLER)
+        self._order = joint_order(self._values["joints"])
+        self._service = TractionService(settings_from_parameters(self._values))
+        self._warm_up()
+        self._statistics = TractionStatistics(1.0 / self._values["rate"])
+        self._fault, self._warning = "", ""
+        self._create_publishers()
+        self._maps = MapIntake(self._prepare_map, self._refuse_map)
+        self._create_subscriptions()
+        self.add_on_set_parameters_callback(
+            check_changes(TRACTION_CONTROLLER, self._values, settings_from_parameters)
+        )
+        self.add_post_set_parameters_callback(self._apply_parameters)
+        self._timer = self.create_timer(1.0 / self._values["rate"], self.update)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
+
+    @property
+    def service(self) -> TractionService:
+        """What takes measurements."""
+        return self._service
+
+    @property
+    def statistics(self) -> TractionStatistics:
+        """Times, counts and what came last."""
+        return self._statistics
+
+    def take_priority(self) -> None:
+        """Let this process run before others, if a parameter asks for it; say so if it can't."""
+        refusal = take_priority(self._values["realtime_priority"])
+        if refusal:
+            self.get_logger().warning(refusal)
+
+    def stop(self) -> None:
+        """Send zero torques, wait until they have arrived, and update no more."""
+        self._timer.cancel()
+        self._send(self._commands, self._efforts, np.zeros(len(WHEEL_JOINTS)))
+        self._commands.wait_for_all_acked(ARRIVAL_TIME)
+
+    def destroy_node(self) -> None:
+        """Send zero torques and end."""
+        if self.context.ok():
+            self.stop()
+        self._maps.close()
+        super().destroy_node()
+
+    def _warm_up(self) -> None:
+        """Compile and run everything once, so that the first update is no slower than others."""
+        service = TractionService(settings_from_parameters(self._values))
+        joints = dict.fromkeys(JOINTS, 0.0)
+        service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
+        for now in (0.0, 0.01):
+            service.take_joints(joints, dict.fromkeys(JOINTS, 0.1), now)
+            service.take_attitude(0.0, 0.0, np.zeros(3), now)
+            service.take_command(0.01, 0.0, now)
+            service.take_odometry(np.zeros(4), 0.0, now)
+            service.update(now)
+
+    def _create_publishers(self) -> None:
+        qos = topic_qos()
+        self._commands = self.create_publisher(Float64MultiArray, "~/commands", qos)
+        self._loads = self.create_publisher(Float64MultiArray, "~/wheel_loads", qos)
+        self._used = self.create_publisher(Float64MultiArray, "~/friction_utilisation", qos)
+        self._angles = self.create_publisher(Float64MultiArray, "~/contact_angles", qos)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos)
+        # Messages are filled anew, not made anew: publishing copies them.
+        zeros = np.zeros(len(WHEEL_JOINTS))
+        self._contacts = np.zeros((2, len(WHEEL_JOINTS)))
+        self._efforts, self._of_wheels = effort_commands(zeros, self._order), wheel_values(zeros)
+        self._of_contacts = wheel_values(self._contacts, "angle, deviation")
+
+    def _create_subscriptions(self) -> None:
+        qos = sensor_qos()
+        self.create_subscription(JointState, "joint_states", self._take_joints, qos)
+        self.create_subscription(Imu, "imu", self._take_imu, qos)
+        self.create_subscription(TwistStamped, "cmd_vel", self._take_command, qos)
+        self.create_subscription(Odometry, "odometry", self._take_odometry, qos)
+        profiles = map_subscriptions_qos(self._values["map_durability"])
+        for qos in profiles:
+            events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
+            self.create_subscription(
+                PointCloud2, "elevation_cloud", self._maps.offer, qos, event_callbacks=events,
+                raw=True,
+            )  # fmt: skip
+
+    def _apply_parameters(self, parameters) -> None:
+        changes = {p.name: p.value for p in parameters if p.name in self._values}
+        if changes:
+            self._values.update(changes)
+            self._service.settings = settings_from_parameters(self._values)
+
+    def _take_joints(self, state: JointState) -> None:
+        try:
+            positions = joint_positions(state, SUSPENSION_JOINTS)
+            self._service.take_joints(positions, joint_velocities(state, JOINTS), _now())
+        except MessageError as error:
+            self._service.refuse("joint_states", str(error))
+
+    def _take_imu(self, imu: Imu) -> None:
+        try:
+            attitude = imu_to_attitude(imu)
+            self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, _now())
+        except MessageError as error:
+            self._service.refuse("imu", str(error))
+
+    def _take_command(self, twist: TwistStamped) -> None:
+        try:
+            self._service.take_command(*twist_to_speeds(twist), _now())
+        except MessageError as error:
+            self._service.refuse("cmd_vel", str(error))
+
+    def _take_odometry(self, odometry: Odometry) -> None:
+        try:
+            pose, deviation = odometry_to_pose(odometry, self._values["map_frame"])
+            self._service.take_odometry(pose, deviation, _now())
+        except MessageError as error:
+            self._service.refuse("odometry", str(error))
+            self.get_logger().warning(f"odometry not used: {error}", throttle_duration_sec=5.0)
+
+    def _prepare_map(self, cloud: PointCloud2) -> PreparedMap:
+        """Make a map of a cloud, in the thread of the intake."""
+        check_frame(cloud.header.frame_id, self._values["map_frame"], "elevation_cloud")
+        terrain = terrain_from_point_cloud(
+            cloud, self._values["map_resolution"], self._values["cell_height"]
+        )
+        return prepare_map(self._service.settings.rover, terrain)
+
+    def _refuse_map(self, error: str) -> None:
+        self.get_logger().error(f"elevation_cloud refused, the last map stays: {error}")
+
+    def update(self) -> None:
+        """Estimate, build, solve and publish; the timer asks for it."""
+        start = time.perf_counter()
+        try:
+            prepared = self._maps.take()
+            if prepared is not None:
+                self._service.take_map(prepared)
+            update = self._service.update(_now())
+        except Exception as error:
+            # A fault of this program must not leave the wheels with their last torque.
+            update = self._service.rest(f"internal error: {type(error).__name__}: {error}")
+        self._send(self._commands, self._efforts, update.torques[self._order])
+        if update.answer is not None and update.estimate is not None:
+            estimate, answer = update.estimate, update.answer
+            self._send(self._loads, self._of_wheels, answer.loads)
+            self._send(self._used, self._of_wheels, answer.utilisation)
+            self._contacts[0] = estimate.angles
+            np.sqrt(estimate.covariance.diagonal(), out=self._contacts[1])
+            self._send(self._angles, self._of_contacts, self._contacts)
+        self._statistics.take(update, start, time.perf_counter())
+        self._tell(update)
+
+    def _send(self, publisher, message: Float64MultiArray, values: np.ndarray) -> None:
+        set_values(message, values)
+        publisher.publish(message)
+
+    def _tell(self, update: TractionUpdate) -> None:
+        """Say once what changed."""
+        if update.fault != self._fault:
+            if update.fault and not self._fault:
+                self.get_logger().warning(f"zero torque: {update.fault}")
+            elif not update.fault:
+                self.get_logger().info("driving: all inputs are there")
+            self._fault = update.fault
+            self._publish_diagnostics()
+        if update.warning and update.warning != self._warning:
+            self.get_logger().warning(update.warning)
+            self._warning = update.warning
+
+    def _publish_diagnostics(self) -> None:
+        name, stamp = self._service.settings.rover.name, self.get_clock().now().to_msg()
+        self._diagnostics.publish(
+            traction_diagnostics(self._statistics.describe(), self._fault, name, stamp)
+        )
+
+
+def _now() -> float:
+    """Return the time by which ages are told [s]; it never jumps."""
+    return time.monotonic()
+
+
+class _Stop:
+    """Turns signals into a request: ROS's own handlers end the context before zeros are sent."""
+
+    def __init__(self) -> None:
+        self.wanted = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._ask)
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        self.wanted = True
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
+    stop = _Stop()
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    node = None
+    try:
+        rclpy.logging.get_logger(NODE_NAME).info(
+            "compiling kernels; the first start takes longest"
+        )
+        node = TractionController()
+        node.take_priority()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        gc.collect()
+        gc.freeze()
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        while not stop.wanted:
+            executor.spin_once(timeout_sec=0.1)
+    except BAD_INPUT as error:
+        rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
+        return 2
+    except ExternalShutdownException:
+        return 0
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,278 @@
+"""The node /traverse_server: asks and answers over ROS 2 whether the rover can traverse."""
+
+import gc
+import sys
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path as FilePath
+from typing import Any
+from urllib.parse import unquote, urlparse
+
+import numpy as np
+import rclpy
+import rclpy.logging
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan, LoadMap
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState, PointCloud2
+from std_srvs.srv import Trigger
+
+from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_occupancy_grid
+from msg_adapters.errors import MessageError
+from msg_adapters.frames import check_frame
+from msg_adapters.joints import joint_positions
+from msg_adapters.paths import (
+    path_to_poses,
+    stamped_pose_to_array,
+)
+from msg_adapters.verdicts import verdict_to_json
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.warm_up import warm_up
+from rover_planner.nodes.reach_topics import ReachTopics
+from rover_planner.nodes.result_topics import ResultTopics
+from rover_planner.parameters.declare import check_changes, declare_parameters
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
+from rover_planner.planning.judgement import Judgement, refusal
+from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.ros.deferred_work import Afterwards
+from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
+from rover_planner.ros.refusals import BAD_INPUT, answer_or_refuse
+
+NODE_NAME = "traverse_server"
+
+
+class TraverseServer(Node):
+    """Wires a TraverseService to ROS: what arrives is understood or refused, never fatal."""
+
+    def __init__(self, **node_arguments: Any):
+        super().__init__(NODE_NAME, **node_arguments)
+        self._values = declare_parameters(self, TRAVERSE_SERVER)
+        self._service = TraverseService(settings_from_parameters(self._values))
+        self._map_frame: str = self._values["map_frame"]
+        self._seen_maps: deque[int] = deque(maxlen=8)
+        self._afterwards = Afterwards(self)
+        self._results = ResultTopics(self, self._afterwards, self._map_frame)
+        self._load_first_map()
+        self._create_subscriptions()
+        self.create_service(GetPlan, "~/can_traverse", self._can_traverse)
+        self.create_service(Trigger, "~/check_path", self._check_path)
+        self.create_service(LoadMap, "~/load_map", self._load_map)
+        self._reach = ReachTopics(self, self._service, self._map_frame)
+        self.add_on_set_parameters_callback(
+            check_changes(TRAVERSE_SERVER, self._values, settings_from_parameters)
+        )
+        self.add_post_set_parameters_callback(self._apply_parameters)
+        self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
+
+    @property
+    def service(self) -> TraverseService:
+        """What the node knows."""
+        return self._service
+
+    @property
+    def reach(self) -> ReachTopics:
+        """What the node knows of the arm's tool."""
+        return self._reach
+
+    def _create_subscriptions(self) -> None:
+        profiles = map_subscriptions_qos(self._values["map_durability"])
+        for qos in profiles:
+            # With several profiles a mismatch of one is no news.
+            events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
+            self.create_subscription(
+                PointCloud2, "elevation_cloud", self._take_cloud, qos, event_callbacks=events
+            )
+        self.create_subscription(JointState, "joint_states", self._take_joints, sensor_qos())
+        self.create_subscription(Path, "~/path", self._take_path, topic_qos())
+
+    def _load_first_map(self) -> None:
+        file = self._values["terrain_file"]
+        if not file:
+            return
+        try:
+            self._take_terrain(load_terrain(file), file)
+        except BAD_INPUT as error:
+            self.get_logger().error(f"terrain_file not loaded: {error}")
+
+    def _apply_parameters(self, parameters) -> None:
+        self._values.update(
+            {
+                parameter.name: parameter.value
+                for parameter in parameters
+                if parameter.name in self._values
+            }
+        )
+        self._service.settings = settings_from_parameters(self._values)
+
+    def _take_cloud(self, cloud: PointCloud2, info) -> None:
+        if self._is_second_copy(info):
+            return
+        try:
+            check_frame(cloud.header.frame_id, self._map_frame, "elevation_cloud")
+            terrain = terrain_from_point_cloud(
+                cloud, self._values["map_resolution"], self._values["cell_height"]
+            )
+            self._take_terrain(terrain, "elevation_cloud")
+        except BAD_INPUT as error:
+            there = self._service.terrain is not None
+            kept = "the last good map stays" if there else "there is no map yet"
+            self.get_logger().error(f"elevation_cloud refused, {kept}: {error}")
+
+    def _is_second_copy(self, info) -> bool:
+        """Tell whether the map came through the other subscription already."""
+        stamp = info["source_timestamp"]
+        if not stamp:
+            return False
+        if stamp in self._seen_maps:
+            return True
+        self._seen_maps.append(stamp)
+        return False
+
+    def _take_terrain(self, terrain: Terrain, source: str) -> None:
+        self._service.take_terrain(terrain)
+        taken = self._service.terrain
+        assert taken is not None
+        rows, columns = taken.elevation.shape
+        known = 100.0 * np.isfinite(taken.elevation).mean()
+        self.get_logger().info(
+            f"map from {source}: {columns} x {rows} cells of {taken.resolution:g} m, "
+            f"{known:.1f} % known"
+        )
+
+    def _take_joints(self, state: JointState) -> None:
+        try:
+            self._service.take_joints(joint_positions(state, self._service.joint_names))
+        except MessageError as error:
+            self.get_logger().warning(
+                f"{error}; the angles known before stay", throttle_duration_sec=5.0
+            )
+
+    def _take_path(self, path: Path) -> None:
+        try:
+            self._service.take_path(path_to_poses(path, self._map_frame))
+        except MessageError as error:
+            self._service.refuse_path(str(error))
+            self.get_logger().error(f"~/path refused: {error}")
+
+    def _can_traverse(
+        self,
+        request: GetPlan.Request,
+        response: GetPlan.Response,
+    ) -> GetPlan.Response:
+        def answer() -> Judgement:
+            start = stamped_pose_to_array(request.start, self._map_frame, "start")
+            goal = stamped_pose_to_array(request.goal, self._map_frame, "goal")
+            judgement = self._service.answer(start, goal, request.tolerance)
+            if judgement.traversable:
+                judgement.changes()  # worked out here, where a fault makes a refusal
+            return judgement
+
+        _, response.plan = self._judge("can_traverse", answer)
+        return response
+
+    def _check_path(
+        self,
+        _request: Trigger.Request,
+        response: Trigger.Response,
+    ) -> Trigger.Response:
+        def answer() -> Judgement:
+            judgement = self._service.check_last_path()
+            _ = judgement.verdict  # worked out here, where a fault makes a refusal
+            return judgement
+
+        judgement, _ = self._judge("check_path", answer)
+        response.success = judgement.traversable
+        response.message = verdict_to_json(judgement.verdict)
+        return response
+
+    def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
+        file = _file_of_url(request.map_url)
+        if file is None or not file.is_file():
+            self.get_logger().error(
+                f"load_map: no file {request.map_url!r}; it must be the path or file:// URL of a "
+                "terrain file on this machine"
+            )
+            response.result = LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
+            return response
+        try:
+            terrain = load_terrain(file)
+            self._take_terrain(terrain, str(file))
+        except BAD_INPUT as error:
+            self.get_logger().error(f"load_map: {error}")
+            response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
+            return response
+        response.map = terrain_to_occupancy_grid(
+            terrain, self._map_frame, self.get_clock().now().to_msg()
+        )
+        response.result = LoadMap.Response.RESULT_SUCCESS
+        return response
+
+    def _judge(self, request: str, judge: Callable[[], Judgement]) -> tuple[Judgement, Path]:
+        """Answer a request; whatever is wrong with it makes a refusal. Return the plan too.
+
+        Results and a line in the log follow when the answer has been sent.
+        """
+        judgement = answer_or_refuse(self.get_logger(), request, judge, refusal)
+        rover, spacing = self._service.settings.rover, self._values["plan_spacing"]
+        log = partial(self._log, request, judgement)
+        return judgement, self._results.take(judgement, rover, spacing, log)
+
+    def _log(self, request: str, judgement: Judgement) -> None:
+        text = f"{request}: {judgement.summary()}"
+        if judgement.traversable:
+            self.get_logger().info(text)
+        else:
+            self.get_logger().warning(text)
+
+
+def _file_of_url(url: str) -> FilePath | None:
+    """Return the file that a path or a file:// URL names, None for a URL of another kind."""
+    parts = urlparse(url)
+    if parts.scheme == "file":
+        return FilePath(unquote(parts.path)) if parts.netloc in ("", "localhost") else None
+    return FilePath(url) if "://" not in url else None
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
+    logger = rclpy.logging.get_logger(NODE_NAME)
+    try:
+        logger.info("compiling kernels; the first start takes longest")
+        warm_up()
+        rclpy.init(args=arguments)
+        _run(TraverseServer)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 0
+    except BAD_INPUT as error:
+        logger.fatal(str(error))
+        return 2
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+def _run(make_node: Callable[[], Node]) -> None:
+    """Make a node and spin it until the context ends."""
+    node = None
+    try:
+        executor = SingleThreadedExecutor()
+        node = make_node()
+        executor.add_node(node)
+        gc.collect()
+        gc.freeze()  # what lives as long as the node need not be looked through again and again
+        executor.spin()
+    except Exception as error:
+        # Whoever is told to stop half-way through the start fails on a context that has ended.
+        if rclpy.ok():
+            raise
+        raise ExternalShutdownException from error
+    finally:
+        if node is not None:
+            node.destroy_node()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,216 @@
+"""Candidate paths in the plane between two poses: a direct connection and a fan beside it.
+
+Every candidate is driven forward, leaves the start along its heading and arrives along the goal's
+heading. The direct connection is a cubic Hermite curve, a straight line where both headings point
+along it. The fan adds a cosine bump across the chord to it, whose slope is zero at both ends, so
+both headings stay exact. Curves tighter than the smallest radius are dropped. Where even the
+direct connection is too tight (headings that oppose each other, a goal behind the rover) the arcs
+and lines of Dubins (1957) take over; they connect any two poses with the smallest radius, so there
+is always a candidate.
+"""
+
+import numpy as np
+
+from rover_planner.errors import PlanningError
+from rover_planner.planning.curve_kernels import follow_curve, interpolate, turns_within
+from rover_planner.planning.dubins import dubins_paths
+
+MIN_RADIUS = 0.8
+"""Smallest radius of a candidate [m], unless told: the wheelbase of the LSR-1 preset.
+
+With the radius equal to the wheelbase and steered end wheels, those on the inside turn by about
+40 degrees.
+"""
+
+MAX_WAYPOINTS = 100_000
+"""Longest path worth sweeping [waypoints]; a longer one is a slip in the units of the request."""
+
+_SAME_PLACE = 1e-9
+_LONG_WAY_ROUND = 1.5
+_FINE_SAMPLES = 501
+_FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
+"""Parameters of the fine samples, and half-way between them."""
+_TANGENT_SCALES = (1.0, 1.6, 2.4)
+
+
+def generate_candidates(
+    start,
+    goal,
+    *,
+    count: int = 9,
+    spacing: float = 0.3,
+    waypoint_spacing: float = 0.02,
+    min_radius: float = MIN_RADIUS,
+) -> list[np.ndarray]:
+    """Make candidate paths from start to goal, the direct one first, then outwards to both sides.
+
+    Args:
+        start: x, y [m] and yaw [rad] of the body origin in the map frame.
+        goal: x, y [m] and yaw [rad] of the body origin in the map frame.
+        count: Largest number of candidates.
+        spacing: Lateral distance between neighbouring candidates half-way [m].
+        waypoint_spacing: Largest distance between waypoints along the path [m].
+        min_radius: Radius of the tightest curve the rover may drive [m].
+
+    Returns:
+        One to `count` arrays (n, 3) of x, y [m] and yaw [rad, in -pi to pi], yaw along the
+        tangent. The waypoints of a path are equally far apart along it, at most
+        `waypoint_spacing`; the first is the start and the last the goal. One single pose where
+        start and goal are the same.
+
+    Raises:
+        PlanningError: An argument is NaN or out of range, or the path has more than MAX_WAYPOINTS.
+    """
+    start = _check_pose("start", start)
+    goal = _check_pose("goal", goal)
+    _check_count(count)
+    _check_positive("spacing", spacing)
+    _check_positive("waypoint_spacing", waypoint_spacing)
+    _check_positive("min_radius", min_radius)
+    _check_length(start, goal, waypoint_spacing)
+
+    chord = float(np.hypot(*(goal[:2] - start[:2])))
+    turn = abs(_wrap(goal[2] - start[2]))
+    if chord <= _SAME_PLACE and turn <= _SAME_PLACE:
+        return [goal[None, :].copy()]
+
+    paths = []
+    if chord > _SAME_PLACE:
+        paths = _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius)
+    if not paths:
+        paths = _build_arcs(start, goal, count, waypoint_spacing, min_radius)
+    return [_pin_ends(path, start, goal) for path in paths]
+
+
+def lateral_offsets(count: int, spacing: float) -> list[float]:
+    """List the lateral offsets of a fan [m]: 0, then left and right in turn, ever further."""
+    return [spacing * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(count)]
+
+
+def path_length(poses: np.ndarray) -> float:
+    """Return the length [m] of a path of poses (n, 3), measured along its chords."""
+    return float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
+
+
+def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:
+    """Sample the direct curve and its neighbours; nothing where the direct one is too tight."""
+    for scale in _TANGENT_SCALES:
+        fan = _Fan(start, goal, scale)
+        curves = (_Curve(fan, offset) for offset in lateral_offsets(count, spacing))
+        direct = next(curves)
+        if direct.is_drivable(min_radius):
+            others = [curve for curve in curves if curve.is_drivable(min_radius)]
+            return [curve.sample(waypoint_spacing) for curve in [direct, *others]]
+    return []
+
+
+def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
+    """Sample the Dubins paths that are no long way round."""
+    words = dubins_paths(start, goal, min_radius, waypoint_spacing)
+    paths = [np.column_stack(word) for word in words[:count]]
+    longest = _LONG_WAY_ROUND * path_length(paths[0])
+    return [path for path in paths if path_length(path) <= longest]
+
+
+_FINE_WEIGHTS = np.array(
+    [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
+)
+"""What chord, start and end tangent count for in the slope at the fine samples, (3, n)."""
+_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
+"""First derivative there of a bump of one metre."""
+
+
+class _Fan:
+    """Curves of a parameter in 0 to 1: the Hermite cubic, and beside it with bumps of some metres.
+
+    `scale` times the chord is the length of the end tangents.
+    """
+
+    def __init__(self, start: np.ndarray, goal: np.ndarray, scale: float):
+        self.start, self.chord = start[:2], goal[:2] - start[:2]
+        length = np.hypot(*self.chord)
+        self.left = np.array([-self.chord[1], self.chord[0]]) / length
+        self.m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
+        self.m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
+        along_chord, along_m0, along_m1 = _FINE_WEIGHTS
+        self.fine_slope = along_chord * self.chord[:, None] + along_m0 * self.m0[:, None]
+        self.fine_slope += along_m1 * self.m1[:, None]
+
+
+class _Curve:
+    """One curve of a fan, and how fast it is driven at the fine samples and between them."""
+
+    def __init__(self, fan: _Fan, offset: float):
+        self._fan, self._offset = fan, float(offset)
+        self._slope = fan.fine_slope + _FINE_BUMP * (offset * fan.left)[:, None]
+        self._speed = np.hypot(self._slope[0], self._slope[1])
+
+    def is_drivable(self, min_radius: float) -> bool:
+        """Tell whether the tightest place of the curve is no tighter than `min_radius` [m]."""
+        ends = self._speed[::2]
+        if ends.min() <= 1e-6 * ends.max():
+            return False
+        return bool(turns_within(self._slope, self._speed, float(min_radius)))
+
+    def sample(self, waypoint_spacing: float) -> np.ndarray:
+        """Sample poses (n, 3) equally far apart along the curve."""
+        ends, middles = self._speed[::2], self._speed[1::2]
+        pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
+        driven = np.concatenate([[0.0], np.cumsum(pieces)])
+        steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
+        marks = np.linspace(0.0, driven[-1], steps + 1)
+        t, poses, slope = np.empty(steps + 1), np.empty((steps + 1, 3)), np.empty((2, steps + 1))
+        interpolate(marks, driven, _FINE[::2], 1 / ends, t)
+        fan = self._fan
+        follow_curve(t, fan.start, fan.chord, fan.m0, fan.m1, fan.left, self._offset, poses, slope)
+        poses[:, 2] = np.arctan2(slope[1], slope[0])
+        return poses
+
+
+def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """Put the exact start and goal at the ends of a path, which are right but for rounding."""
+    path[0], path[-1] = start, goal
+    path[:, 2] = _wrap(path[:, 2])
+    return path
+
+
+def _wrap(angle):
+    """Bring an angle [rad] into -pi to pi, leaving those inside as they are."""
+    inside = np.abs(angle) <= np.pi
+    if inside.all():
+        return angle
+    return np.where(inside, angle, np.arctan2(np.sin(angle), np.cos(angle)))
+
+
+def _check_pose(name: str, pose) -> np.ndarray:
+    try:
+        values = np.array(pose, dtype=float)
+    except (TypeError, ValueError):
+        raise PlanningError(f"{name} is {pose!r}; it is three numbers x, y, yaw") from None
+    if values.shape != (3,):
+        raise PlanningError(f"{name} has shape {values.shape}; it is three numbers x, y, yaw")
+    if not np.isfinite(values).all():
+        raise PlanningError(f"{name} is {values.tolist()}; x, y and yaw must be finite")
+    values[2] = _wrap(values[2])
+    return values
+
+
+def _check_count(count) -> None:
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise PlanningError(f"count is {count!r}; it must be a whole number of at least 1")
+
+
+def _check_positive(name: str, value) -> None:
+    number = isinstance(value, int | float | np.integer | np.floating)
+    if not number or not np.isfinite(value) or value <= 0:
+        raise PlanningError(f"{name} is {value!r}; it must be a finite number above 0")
+
+
+def _check_length(start: np.ndarray, goal: np.ndarray, waypoint_spacing: float) -> None:
+    with np.errstate(over="ignore"):
+        chord = float(np.hypot(*(goal[:2] - start[:2])))
+    if not chord / waypoint_spacing < MAX_WAYPOINTS:
+        raise PlanningError(
+            f"the goal is {chord:.4g} m from the start: in steps of {waypoint_spacing} m that is "
+            f"more than {MAX_WAYPOINTS} waypoints"
+        )

@@ -1,0 +1,266 @@
+"""Where a rover could be asked to go on a map: a start, goals on plain ground, and hard goals."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+
+Pose = tuple[float, float, float]
+
+_STARTS = 200
+_RAYS = 72
+_HALF_CONE = np.deg2rad(50.0)
+_WIDE_CONE = np.deg2rad(75.0)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A place to ask for."""
+
+    name: str
+    """A letter for tables and pictures."""
+    intent: str
+    """Why it is asked for: "plain", "steep", "unknown ground" or "off the map"."""
+    pose: Pose
+    """x, y [m] and yaw [rad] of the body origin, map frame."""
+
+
+@dataclass(frozen=True)
+class Mission:
+    """Where the rover stands and where it is asked to go."""
+
+    start: Pose
+    """x, y [m] and yaw [rad] of the body origin, map frame."""
+    goals: tuple[Goal, ...]
+    """The goals, those on plain ground first."""
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What the map looks like to a rover: one value per cell, for a rover centred there."""
+
+    terrain: Terrain
+    slope: NDArray[np.float64]
+    """Mean slope under the rover (ny, nx) [rise over run], NaN where its footprint is unknown."""
+    gentle: NDArray[np.bool_]
+    """Where the footprint (ny, nx) is known and its slope at most half of the tilt limit."""
+    difficulty: NDArray[np.float64]
+    """Slopes and steps (ny, nx) as a share of what the rover is built for, NaN likewise."""
+    reach: float
+    """How far a goal may be [m]."""
+    near: float
+    """How near a goal may be [m]."""
+
+    def cells(self, x, y) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
+        """Return row and column of points, and which of them are on the map."""
+        ny, nx = self.slope.shape
+        column = np.rint((np.asarray(x) - self.terrain.origin[0]) / self.terrain.resolution)
+        row = np.rint((np.asarray(y) - self.terrain.origin[1]) / self.terrain.resolution)
+        inside = (column >= 0) & (column < nx) & (row >= 0) & (row < ny)
+        return (
+            np.clip(row, 0, ny - 1).astype(int),
+            np.clip(column, 0, nx - 1).astype(int),
+            inside,
+        )
+
+    def place(self, row, column) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return x and y [m] of cells."""
+        x = self.terrain.origin[0] + np.asarray(column) * self.terrain.resolution
+        y = self.terrain.origin[1] + np.asarray(row) * self.terrain.resolution
+        return x, y
+
+
+def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: int = 4) -> Mission:
+    """Choose a start and goals from what a map shows; the verdicts are the model's business.
+
+    The start is on gentle known ground with much of the same ahead. Goals on the plain can be
+    reached over such ground as the crow flies, rocks aside. Then come the steepest known ground,
+    unknown ground where the map has any, and a place beyond its edge.
+
+    Args:
+        terrain: The map, with or without unknown cells.
+        rover: The rover; its size and wheels decide what is gentle and how far goals are.
+        seed: Seed of the choice among equally good places.
+        plain_goals: How many goals to choose on the plain; there are fewer if the map is small.
+
+    Raises:
+        PlanningError: Nowhere is all the ground under the rover known.
+    """
+    rng = np.random.default_rng(seed)
+    ground = _survey(terrain, rover)
+    start = _choose_start(ground, rng)
+    found = [("plain", pose) for pose in _choose_plain(ground, start, plain_goals, rng)]
+    for intent, choose in (
+        ("steep", _choose_steep),
+        ("unknown ground", _choose_unknown),
+        ("off the map", _choose_off_map),
+    ):
+        pose = choose(ground, start)
+        if pose is not None:
+            found.append((intent, pose))
+    goals = (Goal(chr(ord("A") + k), intent, pose) for k, (intent, pose) in enumerate(found))
+    return Mission(start, tuple(goals))
+
+
+def footprint_radius(rover: Rover) -> float:
+    """Return how far [m] the wheels reach from the body origin, seen from above."""
+    wheel = rover.wheel
+    return max(
+        float(np.hypot(abs(x) + wheel.radius, abs(y) + 0.5 * wheel.width))
+        for x, y, _ in rover.suspension.wheels.values()
+    )
+
+
+def _survey(terrain: Terrain, rover: Rover) -> _Ground:
+    """Measure slopes and steps under a rover centred on each cell."""
+    known = np.isfinite(terrain.elevation)
+    z = np.where(known, terrain.elevation, 0.0)
+    side = _odd_cells(2 * footprint_radius(rover), terrain.resolution)
+    whole = ndimage.minimum_filter(known, side, mode="constant", cval=False)
+    if not whole.any():
+        raise PlanningError(
+            f"the map has no place where all ground under {rover.name} is known, "
+            f"{side * terrain.resolution:.2f} m square; it is too small or has too many gaps"
+        )
+    gy, gx = np.gradient(z, terrain.resolution)
+    slope = np.hypot(ndimage.uniform_filter(gx, side), ndimage.uniform_filter(gy, side))
+    wheel = _odd_cells(2 * rover.wheel.radius, terrain.resolution)
+    step = ndimage.maximum_filter(z, wheel) - ndimage.minimum_filter(z, wheel)
+    rise = step - slope * wheel * terrain.resolution
+    worst = ndimage.maximum_filter(rise, side)
+    gentle_slope = 0.5 * np.tan(rover.limits.tilt)
+    difficulty = np.maximum(slope / gentle_slope, worst / rover.wheel.radius)
+    wheelbase = 2 * footprint_radius(rover)
+    return _Ground(
+        terrain,
+        np.where(whole, slope, np.nan),
+        whole & (slope <= gentle_slope),
+        np.where(whole, difficulty, np.nan),
+        reach=8 * wheelbase,
+        near=1.5 * wheelbase,
+    )
+
+
+def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
+    """Choose the place and heading on gentle ground with the most of it ahead."""
+    rows, columns = np.nonzero(np.isfinite(ground.difficulty))
+    share = ground.difficulty[rows, columns]
+    gentle = share <= max(0.5, np.quantile(share, 0.1))
+    chosen = rng.permutation(np.nonzero(gentle)[0])[:_STARTS]
+    x, y = ground.place(rows[chosen], columns[chosen])
+    bearings = np.linspace(-np.pi, np.pi, _RAYS, endpoint=False)
+    sight = _sight(ground, x, y, bearings)
+    cone = round(_HALF_CONE / (2 * np.pi / _RAYS))
+    ahead = np.sum([np.roll(sight, k, axis=1) for k in range(-cone, cone + 1)], axis=0)
+    best, ray = np.unravel_index(np.argmax(ahead), ahead.shape)
+    return (float(x[best]), float(y[best]), float(bearings[ray]))
+
+
+def _sight(ground: _Ground, x, y, bearings) -> NDArray[np.float64]:
+    """Return how far [m] the ground is gentle from places (n,) in directions (m,): (n, m)."""
+    step = max(2 * ground.terrain.resolution, ground.reach / 60)
+    distances = np.arange(0.0, ground.reach, step)
+    px = x[:, None, None] + distances * np.cos(bearings)[:, None]
+    py = y[:, None, None] + distances * np.sin(bearings)[:, None]
+    row, column, inside = ground.cells(px, py)
+    clear = inside & ground.gentle[row, column]
+    return step * np.cumprod(clear, axis=2).sum(axis=2)
+
+
+def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
+    """Choose goals in sight of the start, in directions spread over the cone ahead."""
+    bearings = start[2] + np.linspace(-_HALF_CONE, _HALF_CONE, 4 * count + 1)
+    sight = _sight(ground, np.array([start[0]]), np.array([start[1]]), bearings)[0]
+    goals: list[Pose] = []
+    for sector in np.array_split(np.arange(len(bearings)), count):
+        ray = sector[np.argmax(sight[sector])]
+        if sight[ray] < ground.near:
+            continue
+        distance = rng.uniform(0.6, 0.9) * sight[ray]
+        x = start[0] + distance * np.cos(bearings[ray])
+        y = start[1] + distance * np.sin(bearings[ray])
+        goal = _facing(start, *_gentlest_near(ground, x, y))
+        if all(np.hypot(goal[0] - p[0], goal[1] - p[1]) > 0.5 * ground.near for p in goals):
+            goals.append(goal)
+    return goals
+
+
+def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
+    """Return the place with the least difficulty around a point."""
+    row, column, _ = ground.cells(x, y)
+    around = max(1, round(0.06 * ground.reach / ground.terrain.resolution))
+    j, i = max(0, int(row) - around), max(0, int(column) - around)
+    window = ground.difficulty[j : int(row) + around + 1, i : int(column) + around + 1]
+    window = np.where(np.isfinite(window), window, np.inf)
+    best = np.unravel_index(np.argmin(window), window.shape)
+    px, py = ground.place(best[0] + j, best[1] + i)
+    return float(px), float(py)
+
+
+def _choose_steep(ground: _Ground, start: Pose) -> Pose | None:
+    """Choose the steepest known ground, somewhat rather ahead than behind."""
+    distance, turn = _polar(ground, start)
+    score = ground.slope * (1 - turn / (2 * np.pi))
+    score = np.where(distance <= 1.2 * ground.reach, score, -np.inf)
+    return _choose_cell(ground, start, np.where(np.isfinite(score), score, -np.inf))
+
+
+def _choose_unknown(ground: _Ground, start: Pose) -> Pose | None:
+    """Choose the nearest place ahead that is well inside unknown ground."""
+    unknown = np.isnan(ground.terrain.elevation)
+    depth = ndimage.distance_transform_edt(np.pad(unknown, 1))[1:-1, 1:-1]
+    depth *= ground.terrain.resolution
+    distance, turn = _polar(ground, start)
+    score = np.where(depth > 0.1 * ground.near, -distance * (1 + 2 * turn), -np.inf)
+    return _choose_cell(ground, start, score)
+
+
+def _choose_off_map(ground: _Ground, start: Pose) -> Pose | None:
+    """Choose a place beyond the nearest edge of the map ahead."""
+    bearings = start[2] + np.linspace(-_WIDE_CONE, _WIDE_CONE, 61)
+    xmin, xmax, ymin, ymax = ground.terrain.bounds
+    with np.errstate(divide="ignore"):
+        along_x = np.where(np.cos(bearings) > 0, xmax - start[0], start[0] - xmin)
+        along_y = np.where(np.sin(bearings) > 0, ymax - start[1], start[1] - ymin)
+        edge = np.minimum(along_x / abs(np.cos(bearings)), along_y / abs(np.sin(bearings)))
+    nearest = int(np.argmin(edge))
+    distance = max(edge[nearest], 0.5 * ground.near) + 0.5 * ground.near
+    x = start[0] + distance * np.cos(bearings[nearest])
+    y = start[1] + distance * np.sin(bearings[nearest])
+    return _facing(start, float(x), float(y))
+
+
+def _choose_cell(ground: _Ground, start: Pose, score: NDArray[np.float64]) -> Pose | None:
+    """Return the cell of the highest score (ny, nx) not too near, None if all are -inf."""
+    distance, _ = _polar(ground, start)
+    allowed = np.where(distance >= ground.near, score, -np.inf)
+    best = np.unravel_index(np.argmax(allowed), allowed.shape)
+    if not np.isfinite(allowed[best]):
+        return None
+    x, y = ground.place(*best)
+    return _facing(start, float(x), float(y))
+
+
+def _polar(ground: _Ground, start: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return distance [m] and angle off the start's heading [rad] of every cell (ny, nx)."""
+    ny, nx = ground.slope.shape
+    x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
+    dx, dy = x - start[0], y - start[1]
+    return np.hypot(dx, dy), np.abs(np.angle(np.exp(1j * (np.arctan2(dy, dx) - start[2]))))
+
+
+def _facing(start: Pose, x: float, y: float) -> Pose:
+    """Return a pose at x, y whose heading is one that a gentle curve from the start ends with."""
+    bearing = np.arctan2(y - start[1], x - start[0])
+    turn = float(np.angle(np.exp(1j * (bearing - start[2]))))
+    return (x, y, float(bearing + (0.5 * turn if abs(turn) < _WIDE_CONE else 0.0)))
+
+
+def _odd_cells(width: float, resolution: float) -> int:
+    """Return the odd number of cells nearest above a width [m]."""
+    return 2 * int(np.ceil(0.5 * width / resolution)) + 1

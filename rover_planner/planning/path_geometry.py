@@ -1,0 +1,66 @@
+"""Geometry around a path: waypoints put between its poses, and rings of goals around its end."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_planner.errors import PlanningError
+from rover_planner.planning.candidates import MAX_WAYPOINTS
+
+_RING_STEP = 0.1
+_MAX_RINGS = 4
+_RING_GOALS = 8
+
+
+def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """Put waypoints between the poses (n, 3) of a path until none are further apart.
+
+    The given poses stay. Between them x and y run along the straight line and the heading turns
+    evenly the shorter way; the turn on the spot of poses at one place stays one step.
+
+    Args:
+        poses: x, y [m], yaw [rad].
+        spacing: Largest distance between waypoints [m].
+
+    Raises:
+        PlanningError: The path would have more than MAX_WAYPOINTS.
+    """
+    steps = np.diff(poses, axis=0)
+    steps[:, 2] = np.arctan2(np.sin(steps[:, 2]), np.cos(steps[:, 2]))
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    pieces = np.maximum(1.0, np.ceil(lengths / spacing - 1e-9))
+    if pieces.sum() >= MAX_WAYPOINTS:
+        raise PlanningError(
+            f"path is {lengths.sum():.4g} m long, which at {spacing:g} m are more than "
+            f"{MAX_WAYPOINTS} waypoints; ask for a shorter one"
+        )
+    counts = pieces.astype(np.intp)
+    segment = np.repeat(np.arange(len(steps)), counts)
+    within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
+    dense = poses[segment] + steps[segment] * (within / counts[segment])[:, None]
+    return np.vstack([dense, poses[-1:]])
+
+
+def rings_within(
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    tolerance: float,
+) -> Iterator[list[NDArray[np.float64]]]:
+    """Yield rings of goals of increasing distance, on each ring those towards the start first."""
+    if tolerance <= 0.0:
+        return
+    rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / _RING_STEP)))
+    towards_start = math.atan2(start[1] - goal[1], start[0] - goal[0])
+    turns = sorted(
+        (2.0 * math.pi * k / _RING_GOALS for k in range(_RING_GOALS)),
+        key=lambda turn: -math.cos(turn),
+    )
+    for ring in range(1, rings + 1):
+        # A hair within the tolerance, so that rounding does not carry a goal out of it.
+        distance = tolerance * ring / rings * (1.0 - 1e-6)
+        angles = [towards_start + turn for turn in turns]
+        yield [
+            goal + distance * np.array([math.cos(angle), math.sin(angle), 0.0]) for angle in angles
+        ]

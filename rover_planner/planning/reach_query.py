@@ -1,0 +1,88 @@
+"""The question to the rover at rest, without ROS: where its tool is to go and what acts on it."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.errors import ModelError
+from rover_physics.traversability.reach import judge_reach
+from rover_planner.planning.traverse_service import TraverseService
+
+
+class ReachQuery:
+    """The last target and wrench of the tool, and the question whether the rover can do that."""
+
+    def __init__(self) -> None:
+        self._target: NDArray[np.float64] | None = None
+        self._target_refusal = "no target was received yet; publish one on ~/tool_target"
+        self._force: NDArray[np.float64] | None = None
+        self._moment: NDArray[np.float64] | None = None
+        self._wrench_refusal = ""
+
+    @property
+    def target(self) -> NDArray[np.float64] | None:
+        """Point (3,) [m] of the map for the tip, None if there is none or it was refused."""
+        return self._target
+
+    @property
+    def force(self) -> NDArray[np.float64] | None:
+        """Force (3,) [N] on the tip, map frame, None if there is none."""
+        return self._force
+
+    def take_target(self, point: NDArray[np.float64]) -> None:
+        """Keep a point (3,) [m] of the map for the tip of the arm."""
+        self._target = point
+
+    def refuse_target(self, reason: str) -> None:
+        """Forget the target: whoever asks next means the one that could not be understood."""
+        self._target = None
+        self._target_refusal = f"the last target was refused: {reason}"
+
+    def take_wrench(self, force: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
+        """Keep force (3,) [N] and moment (3,) [N m] on the tip, map frame."""
+        self._force, self._moment, self._wrench_refusal = force, moment, ""
+
+    def refuse_wrench(self, reason: str) -> None:
+        """Forget the wrench; without one that can be understood nothing is answered."""
+        self._force = self._moment = None
+        self._wrench_refusal = f"the last wrench was refused: {reason}"
+
+    def ask(self, service: TraverseService) -> dict[str, Any]:
+        """Judge the rover standing at the last pose of the last path with its tool at the target.
+
+        Raises:
+            RoverError: The rover has no arm, or the model refuses an option.
+        """
+        want = service.refuse_for_want()
+        if want is not None:
+            return refuse_reach(want.code, want.reason)
+        if self._target is None:
+            return refuse_reach("no_target", self._target_refusal)
+        if self._wrench_refusal:
+            return refuse_reach("no_wrench", self._wrench_refusal)
+        settings = service.settings
+        arm = settings.rover.manipulator
+        if arm is None:
+            raise ModelError(f"rover {settings.rover.name!r} has no manipulator to reach with")
+        missing = [name for name in arm.joints if name not in service.joints]
+        if 0 < len(missing) < len(arm.joints):
+            text = f"joint_states has never had {', '.join(missing)}, but other joints of the arm"
+            return refuse_reach("missing_joints", f"{text}; it must have all of them, or none")
+        assert service.path is not None
+        assert service.terrain is not None
+        return judge_reach(
+            settings.rover,
+            service.terrain,
+            service.path[-1],
+            self._target,
+            tool_force=self._force,
+            tool_moment=self._moment,
+            policy=settings.query.policy,
+            **settings.query.ground_and_load(),
+        ).to_dict()
+
+
+def refuse_reach(code: str, reason: str) -> dict[str, Any]:
+    """Return the answer to a question that could not be judged."""
+    return {"possible": False, "reachable": False, "code": code, "reason": reason}

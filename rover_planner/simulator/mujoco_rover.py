@@ -1,0 +1,338 @@
+"""A rover on rigid ground in MuJoCo, moved by wheel torques: a plant for controllers.
+
+It needs the package mujoco (extra `bench`) and shares nothing with the model of `rover_physics`
+but the rover's numbers: rigid bodies, hinges, a differential that couples the rockers, cylindrical
+wheels on a height field, and dry friction.
+"""
+
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.names import SIDES, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
+from rover_physics.rover.model import Part, Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+
+Floats = NDArray[np.float64]
+TIMESTEP = 0.004
+"""Of the simulation [s]."""
+FALL = 0.02
+"""Height above the ground from which the rover is let down [m]."""
+SERVO_SHARE = 0.5
+"""Share of an error of speed that a servo takes away in one step of the simulation."""
+SERVO_RATE = 5.0
+"""Rate at which a servo adds up its error [1/s]."""
+MOTOR_INERTIA = 1.0
+"""Inertia of a geared motor at the wheel, in wheel radii squared times a sixth of the mass."""
+LEAST_LOAD = 1e-3
+"""Load, in weights, from which a wheel counts as on the ground."""
+
+_MODEL = """
+<mujoco model={name}>
+  <option timestep="{timestep}" gravity="0 0 -{gravity}" integrator="implicitfast" cone="elliptic"
+    impratio="20" iterations="50" tolerance="1e-10"/>
+  <default>
+    <geom friction="{friction} 0 0" condim="3" solref="{contact_time} 1"
+      solimp="0.97 0.995 0.0005"/>
+  </default>
+  <asset>
+    <hfield name="ground" nrow="{rows}" ncol="{columns}" size="{half_x} {half_y} {height} 0.5"/>
+  </asset>
+  <worldbody>
+    <geom name="ground" type="hfield" hfield="ground" pos="{middle_x} {middle_y} {lowest}"/>
+    <body name="body">
+      <freejoint/>
+      {body}
+      {sides}
+    </body>
+  </worldbody>
+  <equality>
+    <joint joint1="rocker_right" joint2="rocker_left" polycoef="0 -1 0 0 0"
+      solref="{contact_time} 1" solimp="0.99 0.999 0.0005"/>
+  </equality>
+  <actuator>
+    {motors}
+  </actuator>
+</mujoco>
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class WheelContacts:
+    """What acts on the wheels at one moment."""
+
+    loads: Floats
+    """(6,) sums of normal forces [N]."""
+    shears: Floats
+    """(6,) sums of the sizes of the tangential forces [N]."""
+    slip_speeds: Floats
+    """(6,) speeds of the treads over the ground [m/s], weighted by load; zero without contact."""
+
+
+class RoverPlant:
+    """One rover on one terrain."""
+
+    def __init__(
+        self,
+        rover: Rover,
+        terrain: Terrain,
+        pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        friction: float | None = None,
+        timestep: float = TIMESTEP,
+    ):
+        """Let a rover down on the ground and wait until it rests.
+
+        Args:
+            rover: The rover.
+            terrain: The ground; all of it known. A friction layer is not used.
+            pose: x, y [m] and yaw [rad] of the body's origin.
+            friction: Coefficient between wheels and ground instead of the rover's own.
+            timestep: Of the simulation [s].
+
+        Raises:
+            PlanningError: Unknown cells, or a pose beyond the terrain.
+        """
+        if not np.isfinite(terrain.elevation).all():
+            raise PlanningError("terrain has unknown cells; a plant needs all of them known")
+        self.rover, self.terrain = rover, terrain
+        self.friction = rover.friction if friction is None else friction
+        self._model = mujoco.MjModel.from_xml_string(
+            _write_model(rover, terrain, self.friction, timestep)
+        )
+        elevation = _thin_out(terrain.elevation)
+        span = np.ptp(elevation)
+        heights = (elevation - elevation.min()) / (span if span > 0.0 else 1.0)
+        self._model.hfield_data[:] = heights.ravel()
+        self._data = mujoco.MjData(self._model)
+        joints = [*SUSPENSION_JOINTS, *WHEEL_JOINTS]
+        numbers = [self._model.joint(name).id for name in joints]
+        self._positions = self._model.jnt_qposadr[numbers]
+        self._velocities = self._model.jnt_dofadr[numbers]
+        geoms = {self._model.geom(name).id: k for k, name in enumerate(WHEELS)}
+        self._wheel_of = np.full(self._model.ngeom, -1)
+        for geom, wheel in geoms.items():
+            self._wheel_of[geom] = wheel
+        self._inertia = float(self._model.dof_M0[self._velocities[-1]])
+        self._integral = np.zeros(6)
+        self._bodies = np.array([self._model.body(name).id for name in WHEELS])
+        self._let_down(pose)
+
+    def _let_down(self, pose: tuple[float, float, float]) -> None:
+        x, y, yaw = pose
+        highest = self._height_above_ground(x, y, yaw)
+        if not np.isfinite(highest):
+            raise PlanningError(f"a rover at {pose} stands beyond the terrain")
+        self._data.qpos[:7] = x, y, highest + FALL, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)
+        mujoco.mj_forward(self._model, self._data)
+        for _ in range(150):
+            self.servo(np.zeros(6), 0.02)
+        self._data.time = 0.0
+
+    def _height_above_ground(self, x: float, y: float, yaw: float) -> float:
+        """Return the least z of a level rover at which no wheel is in the ground [m]."""
+        radius, width = self.rover.wheel.radius, self.rover.wheel.width
+        ahead, across = np.meshgrid(
+            np.linspace(-radius, radius, 21), np.linspace(-0.5 * width, 0.5 * width, 9)
+        )
+        c, s = np.cos(yaw), np.sin(yaw)
+        highest = []
+        for px, py, pz in self.rover.suspension.wheels.values():
+            for side in (-1.0, 1.0):
+                wx, wy = px + ahead, side * py + across
+                ground = self.terrain.elevation_at(x + c * wx - s * wy, y + s * wx + c * wy)
+                highest.append(np.max(ground + np.sqrt(radius**2 - ahead**2) - pz))
+        return float(np.max(highest))
+
+    def step(self, torques: Floats, duration: float) -> None:
+        """Let torques (6,) [N m] in wheel order act for a time [s]; the motors limit them."""
+        for _ in range(max(round(duration / self._model.opt.timestep), 1)):
+            self._data.ctrl[:] = self._limit(torques)
+            mujoco.mj_step(self._model, self._data)
+
+    def _limit(self, torques: Floats) -> Floats:
+        """Return what the motors can give: nothing that drives a wheel beyond its speed."""
+        wheel, rates = self.rover.wheel, self.wheel_rates
+        most = np.clip((wheel.max_speed - np.abs(rates)) / (0.2 * wheel.max_speed), 0.0, 1.0)
+        most = np.where(rates * torques > 0.0, most, 1.0) * wheel.max_torque
+        return np.clip(torques, -most, most)
+
+    def servo(self, rates: Floats, duration: float) -> Floats:
+        """Let speed servos drive the wheels at rates (6,) [rad/s] for a time [s].
+
+        Each is a controller of its own, run at every step of the simulation: proportional, with
+        an integral that a limited torque stops.
+
+        Returns:
+            Torques (6,) at the end [N m].
+        """
+        step = self._model.opt.timestep
+        gain = SERVO_SHARE * self._inertia / step
+        for _ in range(max(round(duration / step), 1)):
+            error = rates - self.wheel_rates
+            wanted = gain * error + self._integral
+            torques = self._limit(wanted)
+            self._integral += np.where(wanted == torques, SERVO_RATE * gain * step * error, 0.0)
+            self._data.ctrl[:] = torques
+            mujoco.mj_step(self._model, self._data)
+        return torques
+
+    @property
+    def time(self) -> float:
+        """Time since the rover came to rest [s]."""
+        return float(self._data.time)
+
+    @property
+    def pose(self) -> Floats:
+        """Return x, y, z [m] and yaw [rad] (4,) of the body's origin."""
+        w, x, y, z = self._data.qpos[3:7]
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return np.array([*self._data.qpos[:3], yaw])
+
+    @property
+    def orientation(self) -> Floats:
+        """Quaternion (4,) x, y, z, w of the body in the map frame."""
+        return self._data.qpos[[4, 5, 6, 3]].copy()
+
+    @property
+    def attitude(self) -> tuple[float, float]:
+        """Roll and pitch [rad], R = Rz(yaw) Ry(pitch) Rx(roll)."""
+        w, x, y, z = self._data.qpos[3:7]
+        roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        return float(roll), float(np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)))
+
+    @property
+    def body_rates(self) -> Floats:
+        """Angular velocity (3,) in the body frame [rad/s]."""
+        return self._data.qvel[3:6].copy()
+
+    @property
+    def joint_positions(self) -> dict[str, float]:
+        """Angles [rad] of suspension and wheels by joint name."""
+        values = self._data.qpos[self._positions].tolist()
+        return dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), values, strict=True))
+
+    @property
+    def joint_velocities(self) -> dict[str, float]:
+        """Rates [rad/s] of the same."""
+        values = self._data.qvel[self._velocities].tolist()
+        return dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), values, strict=True))
+
+    @property
+    def wheel_rates(self) -> Floats:
+        """Rates (6,) of the wheel joints in wheel order [rad/s]."""
+        return self._data.qvel[self._velocities[len(SUSPENSION_JOINTS) :]].copy()
+
+    @property
+    def tilt(self) -> float:
+        """Angle between body z and the vertical [rad]."""
+        w, x, y, z = self._data.qpos[3:7]
+        return float(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+
+    def measure_contacts(self) -> WheelContacts:
+        """Measure forces and slip of all wheels."""
+        model, data = self._model, self._data
+        loads, shears, slips = np.zeros(6), np.zeros(6), np.zeros(6)
+        force, velocity = np.zeros(6), np.zeros(6)
+        for k, contact in enumerate(data.contact[: data.ncon]):
+            wheel = max(self._wheel_of[contact.geom1], self._wheel_of[contact.geom2])
+            if wheel < 0:
+                continue
+            mujoco.mj_contactForce(model, data, k, force)
+            body = self._bodies[wheel]
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body, velocity, 0)
+            arm = contact.pos - data.xpos[body]
+            tread = velocity[3:] + np.cross(velocity[:3], arm)
+            normal = contact.frame[:3]
+            sliding = np.linalg.norm(tread - normal * (normal @ tread))
+            loads[wheel] += force[0]
+            shears[wheel] += np.hypot(force[1], force[2])
+            slips[wheel] += force[0] * sliding
+        held = loads > LEAST_LOAD * self.rover.weight
+        slip_speeds = np.where(held, slips / np.where(held, loads, 1.0), 0.0)
+        return WheelContacts(loads, shears, slip_speeds)
+
+
+def _write_model(rover: Rover, terrain: Terrain, friction: float, timestep: float) -> str:
+    """Return the MJCF text of a rover on a terrain."""
+    half = 0.5 * terrain.resolution * (np.array(terrain.elevation.shape[::-1]) - 1)
+    rows, columns = _thin_out(terrain.elevation).shape
+    middle = np.array(terrain.origin) + half
+    span = float(np.ptp(terrain.elevation))
+    motors = "\n".join(
+        f'<motor name="{joint}" joint="{joint}" ctrllimited="false"/>' for joint in WHEEL_JOINTS
+    )
+    return _MODEL.format(
+        name=quoteattr(rover.name), timestep=timestep,
+        contact_time=2.5 * timestep, gravity=rover.gravity, friction=friction,
+        rows=rows, columns=columns, half_x=half[0], half_y=half[1],
+        height=span if span > 0.0 else 1.0, middle_x=middle[0], middle_y=middle[1],
+        lowest=float(terrain.elevation.min()), body=_write_inertia(rover.masses.body, 1.0),
+        sides="\n".join(_write_side(rover, side) for side in SIDES), motors=motors,
+    )  # fmt: skip
+
+
+def _thin_out(elevation: Floats) -> Floats:
+    """Leave out rows that the others interpolate: ground that is even along y collides sooner."""
+    for factor in (20, 10, 5, 4, 2):
+        if (len(elevation) - 1) % factor:
+            continue
+        kept = elevation[::factor]
+        shares = (np.arange(len(elevation)) % factor / factor)[:, None]
+        below = np.repeat(kept, factor, axis=0)[: len(elevation)]
+        above = np.repeat(np.vstack([kept[1:], kept[-1:]]), factor, axis=0)[: len(elevation)]
+        if np.allclose(below + shares * (above - below), elevation, rtol=0.0, atol=1e-9):
+            return kept
+    return elevation
+
+
+def _write_side(rover: Rover, side: str) -> str:
+    """Return the MJCF text of the rocker of a side with all that hangs on it."""
+    suspension, mirror = rover.suspension, -1.0 if side == "right" else 1.0
+    wheels = {
+        name: _write_wheel(rover, f"{name}_{side}", place, mirror)
+        for name, place in suspension.wheels.items()
+    }
+    rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
+    hung = "\n".join(wheels[name] for name in suspension.bogie_wheels)
+    # Places are those of flat ground in the body frame, so every body starts at the origin.
+    return f"""
+      <body name="rocker_{side}">
+        <joint name="rocker_{side}" type="hinge" axis="0 1 0" pos={_point(rocker, mirror)}
+          damping="0.01"/>
+        {_write_inertia(rover.masses.rocker, mirror)}
+        {wheels[suspension.rocker_wheel]}
+        <body name="bogie_{side}">
+          <joint name="bogie_{side}" type="hinge" axis="0 1 0" pos={_point(bogie, mirror)}
+            damping="0.01"/>
+          {_write_inertia(rover.masses.bogie, mirror)}
+          {hung}
+        </body>
+      </body>"""
+
+
+def _write_wheel(rover: Rover, name: str, place: tuple[float, ...], mirror: float) -> str:
+    wheel = rover.wheel
+    inertia = MOTOR_INERTIA * rover.total_mass / 6.0 * wheel.radius**2
+    return f"""
+          <body name="{name}" pos={_point(place, mirror)}>
+            <joint name="{name}_wheel" type="hinge" axis="0 1 0" armature="{inertia}"/>
+            <geom name="{name}" type="cylinder" size="{wheel.radius} {0.5 * wheel.width}"
+              euler="90 0 0" mass="{wheel.mass}"/>
+          </body>"""
+
+
+def _write_inertia(part: Part, mirror: float) -> str:
+    """Return the inertia of a part: that of a ball a tenth of a metre in radius."""
+    moment = 0.4 * max(part.mass, 1e-3) * 0.1**2
+    return (
+        f'<inertial pos={_point(part.com, mirror)} mass="{max(part.mass, 1e-3)}" '
+        f'diaginertia="{moment} {moment} {moment}"/>'
+    )
+
+
+def _point(place: tuple[float, ...], mirror: float) -> str:
+    return f'"{place[0]} {mirror * place[1]} {place[2]}"'

@@ -1,0 +1,1 @@
+"""The traction controller without ROS: measurements in, torques out."""

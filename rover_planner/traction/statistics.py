@@ -1,0 +1,73 @@
+"""Times and counts of a traction controller, for diagnostics and measurements."""
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from rover_planner.traction.traction_service import TractionUpdate
+
+REMEMBERED = 6000
+"""Updates that times are told of."""
+
+
+class TractionStatistics:
+    """What the updates were like."""
+
+    def __init__(self, period: float):
+        """Start to count; `period` [s] is that of the updates."""
+        self._period = period
+        self._last_start: float | None = None
+        self._times: deque[float] = deque(maxlen=REMEMBERED)
+        self.missed = 0
+        """Cycles that were passed over because an update came late."""
+        self.fallbacks = 0
+        """Updates with equal torques because OSQP did not solve."""
+        self.updates = 0
+        """Updates in all."""
+        self.last: TractionUpdate | None = None
+        """The last update."""
+
+    @property
+    def times(self) -> np.ndarray:
+        """How long the last updates took, publishing included [s]."""
+        return np.array(self._times)
+
+    def take(self, update: TractionUpdate, start: float, end: float) -> None:
+        """Count an update that lasted from start to end [s]."""
+        if self._last_start is not None:
+            self.missed += max(round((start - self._last_start) / self._period) - 1, 0)
+        self._last_start = start
+        self._times.append(end - start)
+        self.updates += 1
+        self.fallbacks += update.answer is not None and update.answer.fallback
+        self.last = update
+
+    def describe(self) -> dict[str, Any]:
+        """Return what there is to say by name, times in ms."""
+        words: dict[str, Any] = {
+            "updates": self.updates,
+            "missed_cycles": self.missed,
+            "fallbacks": self.fallbacks,
+        }
+        if self._times:
+            times = 1e3 * self.times
+            words["update_time_median_ms"] = round(float(np.median(times)), 3)
+            words["update_time_p99_ms"] = round(float(np.percentile(times, 99)), 3)
+        update = self.last
+        if update is None or update.answer is None or update.estimate is None:
+            return words
+        answer = update.answer
+        return words | {
+            "solve_time_ms": round(1e3 * update.duration, 3),
+            "iterations": answer.iterations,
+            "programmes": answer.programmes,
+            "status": answer.status,
+            "fallback": answer.fallback,
+            "contact_source": update.estimate.source,
+            "peak_friction_utilisation": round(float(answer.utilisation.max()), 4),
+            "friction_slack": round(answer.friction_slack, 4),
+            "load_slack_N": round(answer.load_slack, 3),
+            "torque_slack_Nm": round(answer.torque_slack, 4),
+            "warning": update.warning,
+        }

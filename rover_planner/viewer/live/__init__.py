@@ -1,0 +1,1 @@
+"""A live rover: its topics, kept for the page."""

@@ -1,0 +1,1 @@
+"""The pages: one that plans, one that follows a live rover."""

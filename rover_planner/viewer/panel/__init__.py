@@ -1,0 +1,1 @@
+"""The panel beside the scene: tabs, buttons, board and plots."""

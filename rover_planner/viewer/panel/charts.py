@@ -1,0 +1,150 @@
+"""Plots of loads, utilisation and margin against distance, with a cursor that moves along."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.names import WHEELS
+from rover_physics.rover.model import Rover
+from rover_planner.viewer.scene.colours import REFUSED, SIDE_DASHES, css
+from rover_planner.viewer.scene.colours import WHEELS as WHEEL_COLOURS
+
+Floats = NDArray[np.float64]
+MOST_POINTS = 160
+"""Points of a curve that are sent to the page."""
+HEIGHT = 146
+"""Height of a plot [px]; three of them fit on a laptop's screen."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What one plot shows."""
+
+    title: str
+    """Its title, with the unit."""
+    per_wheel: bool
+    """Whether it has a curve for each wheel."""
+    highest: float = np.inf
+    """Where curves are cut off: a wheel that lifts needs infinite friction."""
+
+
+CHARTS = {
+    "wheel_loads": Chart("Wheel loads [N]", True),
+    "friction_utilisation": Chart("Friction utilisation, 1 = slips", True, 1.5),
+    "tip_over_ratio": Chart("Stability margin, 0 = tips over", False),
+}
+"""The plots by the field of `Frame` that they show."""
+
+
+class Charts:
+    """Three plots in a panel of the page."""
+
+    def __init__(self, gui: Any):
+        """Add empty plots to the container that is open."""
+        self.plots = {name: _add_plot(gui, chart) for name, chart in CHARTS.items()}
+        gui.add_html(_legend())
+        self.curves: dict[str, tuple[Floats, Floats]] = {}
+        """Distances and values of the curves that are shown, by the names of CHARTS."""
+        self._limits: dict[str, float] = {}
+
+    def take(self, rover: Rover, distance: Floats, values: Mapping[str, Floats]) -> None:
+        """Take other curves.
+
+        Args:
+            rover: The rover, for its limits.
+            distance: (n,) way since the start [m], ascending.
+            values: (n, 6) or (n,) for each name of CHARTS.
+        """
+        limits = rover.limits
+        self._limits = {
+            "friction_utilisation": limits.friction_utilisation,
+            "tip_over_ratio": limits.tip_over_ratio,
+        }
+        self.curves = {}
+        if len(distance) < 2:
+            return
+        rows = np.unique(np.linspace(0, len(distance) - 1, MOST_POINTS).astype(int))
+        for name, chart in CHARTS.items():
+            curves = values[name][rows].reshape(len(rows), -1)
+            self.curves[name] = distance[rows], np.minimum(curves, chart.highest)
+
+    def show(self, distance: float) -> None:
+        """Move the cursor to a distance [m]."""
+        for name, (x, values) in self.curves.items():
+            self.plots[name].data = with_cursor(x, values, distance, self._limits.get(name))
+
+
+def _add_plot(gui: Any, chart: Chart) -> Any:
+    from viser import uplot
+
+    series = [uplot.Series(label="distance [m]")]
+    if chart.per_wheel:
+        series += [
+            _line(name.replace("_", " "), colour, 1.5, SIDE_DASHES[name.endswith("left")])
+            for name, colour in zip(WHEELS, WHEEL_COLOURS, strict=True)
+        ]
+    else:
+        series.append(_line("margin", WHEEL_COLOURS[0], 2.0))
+    if chart is not CHARTS["wheel_loads"]:
+        series.append(_line("limit", css(REFUSED), 1.0, (2.0, 4.0)))
+    series.append(_line("now", "#555555", 2.0))
+    return gui.add_uplot(
+        tuple(np.zeros(2) for _ in series),
+        tuple(series),
+        title=chart.title,
+        height=HEIGHT,
+        legend=uplot.Legend(show=False),
+        scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
+    )
+
+
+def _line(label: str, colour: str, width: float, dash: tuple[float, ...] = ()) -> Any:
+    from viser import uplot
+
+    points = uplot.Series_Points(show=False)
+    line = uplot.Series(label=label, stroke=colour, width=width, points=points)
+    if dash:
+        line["dash"] = dash
+    return line
+
+
+def _legend() -> str:
+    keys = "".join(
+        f'<span style="color:{colour}">&#9632;</span> {name}&ensp;'
+        for name, colour in zip(("rear", "middle", "front"), WHEEL_COLOURS, strict=False)
+    )
+    return (
+        f'<div id="plots-legend" style="font-size:11px;padding:0 8px">{keys}'
+        "solid: right, dashed: left; across: distance [m]</div>"
+    )
+
+
+def with_cursor(
+    x: Floats, values: Floats, distance: float, limit: float | None
+) -> tuple[Floats, ...]:
+    """Return columns for a plot: x, curves, limit and an upright line at a distance.
+
+    The line is a curve of its own: along the lower edge, and at the distance up and down again.
+    The page cannot plot what is not a number, so there is no gap in it.
+
+    Args:
+        x: (n,) distances [m], ascending.
+        values: (n, k) curves.
+        distance: Where the line is [m].
+        limit: A level line, None for none.
+    """
+    at = int(np.searchsorted(x, distance))
+    columns = [np.insert(x, at, [distance] * 3)]
+    low, high = float(values.min()), float(values.max())
+    for k in range(values.shape[1]):
+        here = float(np.interp(distance, x, values[:, k]))
+        columns.append(np.insert(values[:, k], at, [here] * 3))
+    if limit is not None:
+        columns.append(np.full(len(x) + 3, limit))
+        low, high = min(low, limit), max(high, limit)
+    line = np.full(len(x) + 3, low)
+    line[at + 1] = high
+    return (*columns, line)

@@ -1,0 +1,190 @@
+"""The terrain as a mesh with a picture of a layer on it, and where a click on it is."""
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.viewer.scene.colours import ramp
+from rover_planner.viewer.state.layers import LAYERS, SLOPE, predict_layer, slope_of, span_of
+
+Floats = NDArray[np.float64]
+MOST_CELLS = 250
+"""Cells along a side beyond which only every second, third, ... is drawn."""
+MOST_SCORED = 100
+"""The same for places where the model is asked."""
+MOST_PIXELS = 1200
+"""Pixels along a side of the picture."""
+LIGHT = (-0.6, 0.5, 1.0)
+"""Where light comes from on the picture."""
+RELIEF = 1.3
+"""How strong light and shadow are; 1 is that of a matt surface."""
+LINE_SHADE = 0.82
+"""How dark the lines are that are drawn every metre."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground as it is drawn, and what its colours stand for."""
+
+    mesh: trimesh.Trimesh
+    """The surface with its picture."""
+    low: float
+    """Value of the first colour."""
+    high: float
+    """Value of the last colour."""
+    unit: str
+    """Unit of both."""
+
+
+def draw_ground(
+    rover: Rover,
+    terrain: Terrain,
+    layer_name: str,
+    heading: float = 0.0,
+    arguments: Mapping[str, Any] | None = None,
+) -> Ground:
+    """Return the ground in the colours of a layer; unknown cells are left out.
+
+    Args:
+        rover: The rover, for layers that are predicted.
+        terrain: The ground.
+        layer_name: One of LAYERS.
+        heading: Of the rover, where layers are predicted [rad].
+        arguments: Further arguments of `sweep_path` for those.
+
+    Raises:
+        RoverError: The model refuses an argument.
+    """
+    layer = LAYERS[layer_name]
+    x, y, heights = _thin_out(terrain, MOST_CELLS)
+    if layer.score is not None:
+        coarse_x, coarse_y, _ = _thin_out(terrain, MOST_SCORED)
+        at = (coarse_x, coarse_y)
+        values = predict_layer(layer, rover, terrain, heading, at, arguments or {})
+        low, high = span_of(layer, rover, values)
+        colours = _stretch(ramp(values, low, high), at, (x, y))
+    else:
+        values = slope_of(x, y, heights) if layer_name == SLOPE else heights
+        low, high = span_of(layer, rover, values)
+        colours = ramp(values, low, high)
+    shaded = _shade(colours, x, y, heights)
+    return Ground(_mesh(x, y, heights, _picture(shaded, x, y)), low, high, layer.unit)
+
+
+def _thin_out(terrain: Terrain, most: int) -> tuple[Floats, Floats, Floats]:
+    """Return x (nx,), y (ny,) and heights (ny, nx) [m] of at most so many cells a side."""
+    stride = -(-max(terrain.elevation.shape) // most)
+    heights = terrain.elevation[::stride, ::stride]
+    ny, nx = heights.shape
+    step = stride * terrain.resolution
+    x, y = terrain.origin
+    return x + step * np.arange(nx), y + step * np.arange(ny), heights
+
+
+def _stretch(
+    colours: NDArray[np.uint8], given: tuple[Floats, Floats], wanted: tuple[Floats, Floats]
+) -> NDArray[np.uint8]:
+    """Return colours (ny, nx, 3) at other places, those of the nearest place given."""
+    columns, rows = (
+        np.clip(np.rint((at - was[0]) / (was[1] - was[0])).astype(int), 0, len(was) - 1)
+        for at, was in zip(wanted, given, strict=True)
+    )
+    return colours[rows][:, columns]
+
+
+def _shade(colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats) -> NDArray[np.uint8]:
+    """Return colours as if lit from LIGHT: drawn into the picture, it costs the page nothing."""
+    if min(heights.shape) < 2:
+        return colours
+    along_y, along_x = np.gradient(np.nan_to_num(heights), y, x)
+    normal = np.stack([-along_x, -along_y, np.ones_like(along_x)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    light = np.array(LIGHT) / np.linalg.norm(LIGHT)
+    lit = np.clip(normal @ light, 0.0, None) / light[2]
+    factor = np.clip(1.0 + RELIEF * (lit - 1.0), 0.3, 1.25)
+    return np.clip(colours * factor[..., None], 0, 255).astype(np.uint8)
+
+
+def _picture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
+    """Return a finer picture with thin lines every metre, for the sense of scale."""
+    factor = max(1, min(8, MOST_PIXELS // max(colours.shape[:2])))
+    fine = ndimage.zoom(colours, (factor, factor, 1), order=1, mode="nearest", grid_mode=True)
+    for axis, places in enumerate((y, x)):
+        step = places[1] - places[0]
+        pixels = places[0] + step * ((np.arange(fine.shape[axis]) + 0.5) / factor - 0.5)
+        lines = np.flatnonzero(np.diff(np.floor(pixels)))
+        index = (lines, slice(None)) if axis == 0 else (slice(None), lines)
+        fine[index] = (LINE_SHADE * fine[index]).astype(np.uint8)
+    return np.asarray(fine, np.uint8)
+
+
+def _mesh(x: Floats, y: Floats, heights: Floats, picture: NDArray[np.uint8]) -> trimesh.Trimesh:
+    from PIL import Image
+
+    gx, gy = np.meshgrid(x, y)
+    vertices = np.column_stack([gx.ravel(), gy.ravel(), np.nan_to_num(heights).ravel()])
+    ny, nx = heights.shape
+    u, v = np.meshgrid((np.arange(nx) + 0.5) / nx, (np.arange(ny) + 0.5) / ny)
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=Image.fromarray(picture[::-1]), metallicFactor=0.0, roughnessFactor=1.0
+    )
+    visual = trimesh.visual.TextureVisuals(
+        uv=np.column_stack([u.ravel(), v.ravel()]), material=material
+    )
+    return trimesh.Trimesh(vertices, _faces(np.isfinite(heights)), visual=visual, process=False)
+
+
+def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
+    """Return a mesh as a binary glTF file whose picture is shown as it is, without lights.
+
+    A matt surface over the whole screen takes most of the time of a page that is drawn without a
+    graphics card. glTF has the extension KHR_materials_unlit for it, which trimesh does not write.
+    """
+    glb: Any = mesh.export(file_type="glb")
+    length = struct.unpack_from("<I", glb, 12)[0]
+    content = json.loads(glb[20 : 20 + length])
+    for material in content["materials"]:
+        material["extensions"] = {"KHR_materials_unlit": {}}
+    content["extensionsUsed"] = ["KHR_materials_unlit"]
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    chunk = struct.pack("<I4s", len(text), b"JSON") + text + glb[20 + length :]
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
+
+
+def _faces(known: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the triangles (m, 3) between cells that are known."""
+    index = np.arange(known.size).reshape(known.shape)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+    whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, 1:] & known[1:, :-1]
+    lower = np.column_stack([a[whole], b[whole], c[whole]])
+    return np.concatenate([lower, np.column_stack([a[whole], c[whole], d[whole]])])
+
+
+def hit_ground(terrain: Terrain, origin: Floats, direction: Floats) -> Floats | None:
+    """Return where a ray first meets known ground, x and y (2,) [m]; None if it does not.
+
+    Args:
+        terrain: The ground.
+        origin: (3,) start of the ray [m].
+        direction: (3,) its direction.
+    """
+    direction = direction / np.linalg.norm(direction)
+    ny, nx = terrain.elevation.shape
+    reach = np.linalg.norm(origin[:2] - np.asarray(terrain.origin))
+    heights = np.abs(terrain.elevation[np.isfinite(terrain.elevation)]).max()
+    reach += terrain.resolution * np.hypot(nx, ny) + abs(origin[2]) + heights
+    along = np.arange(0.0, reach, 0.5 * terrain.resolution)
+    points = origin + along[:, None] * direction
+    ground = terrain.elevation_at(points[:, 0], points[:, 1])
+    below = np.flatnonzero(points[:, 2] <= ground)
+    return np.asarray(points[below[0], :2]) if below.size else None

@@ -1,0 +1,111 @@
+"""What the ground can be coloured by: its shape, and what the model predicts over each cell."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.prediction.map_sweep import PoseScores, score_poses
+from rover_physics.rover.model import Rover
+
+Floats = NDArray[np.float64]
+STEEP = 35.0
+"""Slope from which on the ground has the last colour [deg]."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One layer: its unit, where its numbers come from and the range of its colours."""
+
+    unit: str
+    """Unit for the scale, empty for none."""
+    score: Callable[[Rover, PoseScores], Floats] | None = None
+    """Values from scores of the rover over the cells; None for layers of the ground alone."""
+    span: Callable[[Rover], tuple[float, float]] | None = None
+    """Values of the first and last colour; None: the smallest and largest there are."""
+
+
+def _share(field: str) -> Layer:
+    def values(_rover: Rover, scores: PoseScores) -> Floats:
+        return np.asarray(getattr(scores, field), dtype=float)
+
+    return Layer("", values, lambda _rover: (0.0, 1.0))
+
+
+HEIGHT, SLOPE = "height", "slope"
+LAYERS: Mapping[str, Layer] = {
+    HEIGHT: Layer("m"),
+    SLOPE: Layer("deg", span=lambda _rover: (0.0, STEEP)),
+    "passable or not": Layer(
+        "",
+        lambda rover, scores: np.where(scores.status == 0, scores.within_limits(rover), np.nan),
+        lambda _rover: (0.0, 1.0),
+    ),
+    "friction utilisation": _share("friction_utilisation"),
+    "torque saturation": _share("torque_saturation"),
+    "stability margin": _share("tip_over_ratio"),
+    "smallest wheel load": Layer(
+        "N",
+        lambda _rover, scores: np.asarray(scores.least_load, dtype=float),
+        lambda rover: (0.0, rover.weight / 6.0),
+    ),
+    "tilt": Layer(
+        "deg",
+        lambda _rover, scores: np.degrees(scores.tilt),
+        lambda rover: (0.0, float(np.degrees(rover.limits.tilt))),
+    ),
+    "belly clearance": Layer(
+        "cm",
+        lambda _rover, scores: 100.0 * np.asarray(scores.belly_clearance, dtype=float),
+        lambda rover: (0.0, 100.0 * (rover.belly.z - _foot(rover))),
+    ),
+}
+"""The layers by name."""
+
+
+def _foot(rover: Rover) -> float:
+    """Return the height of the ground under the wheels on flat ground, body frame [m]."""
+    return rover.suspension.wheels["rear"][2] - rover.wheel.radius
+
+
+def slope_of(x: Floats, y: Floats, heights: Floats) -> Floats:
+    """Return the slope angle at each cell [deg]."""
+    along_y, along_x = np.gradient(heights, y, x)
+    return np.asarray(np.degrees(np.arctan(np.hypot(along_x, along_y))))
+
+
+def predict_layer(
+    layer: Layer,
+    rover: Rover,
+    terrain: Any,
+    heading: float,
+    at: tuple[Floats, Floats],
+    arguments: Mapping[str, Any],
+) -> Floats:
+    """Return a predicted layer (ny, nx) with the rover over each place at a heading [rad].
+
+    Args:
+        layer: A layer with a score.
+        rover: The rover.
+        terrain: The ground.
+        heading: Of the body [rad].
+        at: x (nx,) and y (ny,) of the places [m].
+        arguments: Further arguments of `sweep_path`.
+
+    Raises:
+        RoverError: The model refuses an argument.
+    """
+    assert layer.score is not None
+    x, y = np.meshgrid(*at)
+    poses = np.stack([x, y, np.full_like(x, heading)], axis=-1)
+    return np.asarray(layer.score(rover, score_poses(rover, terrain, poses, **arguments)))
+
+
+def span_of(layer: Layer, rover: Rover, values: Floats) -> tuple[float, float]:
+    """Return the values that the first and the last colour stand for."""
+    known = values[np.isfinite(values)]
+    if layer.span is not None:
+        return layer.span(rover)
+    return (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)

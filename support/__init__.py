@@ -1,0 +1,1 @@
+"""What tests and benchmarks share: grounds, reference cases, ROS for tests, a browser."""

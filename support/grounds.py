@@ -1,0 +1,33 @@
+"""Grounds for tests: heights as functions of x and y [m], and terrains made of them."""
+
+import numpy as np
+
+from rover_physics.terrain.grid import Terrain
+
+
+def make_terrain(height, resolution=0.05, half=4.0) -> Terrain:
+    """Return a terrain of float32 heights height(x, y) on a square around the origin."""
+    axis = np.arange(round(2 * half / resolution) + 1) * resolution - half
+    x, y = np.meshgrid(axis, axis)
+    elevation = np.broadcast_to(height(x, y), x.shape).astype(np.float32)
+    return Terrain(elevation, resolution, (-half, -half))
+
+
+def waves(x, y):
+    """Return gentle waves, passable everywhere."""
+    return 0.04 * np.sin(1.3 * x) + 0.03 * np.sin(1.7 * y + 0.4)
+
+
+def rocky(x, y):
+    """Return waves with a low rock to the left of the straight way from -x to +x."""
+    return waves(x, y) + 0.08 * np.exp(-((x - 0.2) ** 2 + (y - 0.35) ** 2) / 0.05)
+
+
+def wall_at(place):
+    """Return waves with a wall of 1 m along y, at x = place."""
+    return lambda x, y: waves(x, y) + np.where(x > place, 1.0, 0.0)
+
+
+def gap(x, y):
+    """Return waves with a band of unknown ground along y."""
+    return np.where((x > 0.5) & (x < 1.0), np.nan, waves(x, y))

@@ -1,0 +1,157 @@
+"""A client of the traverse server as tests need it: sends, asks, and keeps what it hears."""
+
+from collections.abc import Callable
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan, LoadMap
+from rcl_interfaces.msg import Log, Parameter
+from rcl_interfaces.srv import SetParameters
+from rclpy.node import Node
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.paths import poses_path, stamped_pose
+from rover_planner.ros.qos import map_qos, result_qos, topic_qos
+from support.ros_fixtures import RosRun, call, wait_until
+
+SERVER = "/traverse_server"
+START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)
+"""Poses to ask for a plan between, x, y [m] and yaw [rad]."""
+
+RESULTS = {
+    "plan": Path,
+    "predicted_joints": JointTrajectory,
+    "wheel_loads": Float64MultiArray,
+    "slip_ratios": Float64MultiArray,
+    "friction_utilisation": Float64MultiArray,
+    "torque_saturation": Float64MultiArray,
+    "tip_over_margin": Float64MultiArray,
+    "verdict": DiagnosticArray,
+    "markers": MarkerArray,
+}
+"""Topics of the server's results and their types."""
+
+
+class PlannerClient(Node):
+    """Everything on the other side of the traverse server's contract."""
+
+    def __init__(self, ros: RosRun):
+        super().__init__("test_planner", context=ros.context)
+        self.heard: dict[str, list] = {topic: [] for topic in RESULTS}
+        self.logs: list[str] = []
+        self._heard_last: Callable[[], bool] = lambda: True
+        for topic, kind in RESULTS.items():
+            self.create_subscription(
+                kind, f"{SERVER}/{topic}", self.heard[topic].append, result_qos()
+            )
+        self.create_subscription(Log, "/rosout", lambda log: self.logs.append(log.msg), 100)
+        self._plan = self.create_client(GetPlan, f"{SERVER}/can_traverse")
+        self._check = self.create_client(Trigger, f"{SERVER}/check_path")
+        self._map = self.create_client(LoadMap, f"{SERVER}/load_map")
+        self._parameters = self.create_client(SetParameters, f"{SERVER}/set_parameters")
+        self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        self._path = self.create_publisher(Path, f"{SERVER}/path", topic_qos())
+        self._joints = self.create_publisher(JointState, "joint_states", topic_qos())
+
+    def send_cloud(self, cloud: PointCloud2) -> None:
+        """Publish a cloud as it is."""
+        self._send(self._cloud, cloud)
+
+    def send_terrain(self, terrain) -> None:
+        """Publish a terrain and wait until the server has it."""
+        self.logs.clear()
+        self.send_cloud(terrain_to_point_cloud(terrain, "map"))
+        self.wait_for_log("map from elevation_cloud")
+
+    def send_path(self, path: Path) -> None:
+        """Publish a path."""
+        self._send(self._path, path)
+
+    def send_joints(self, names, positions) -> None:
+        """Publish joint positions."""
+        self._send(self._joints, JointState(name=list(names), position=list(positions)))
+
+    def can_traverse(self, start, goal, tolerance=0.0, frame="map") -> Path:
+        """Ask for a plan between two poses (3,)."""
+        return self.plan(stamped_pose(start, frame), stamped_pose(goal, frame), tolerance)
+
+    def plan(self, start, goal, tolerance=0.0) -> Path:
+        """Ask for a plan between two PoseStamped."""
+        request = GetPlan.Request(start=start, goal=goal, tolerance=float(tolerance))
+        plan = call(self._plan, request).plan
+        markers = self.heard["markers"]
+        self._heard_last = lambda: (
+            bool(markers) and markers[-1].markers[0].header.stamp == plan.header.stamp
+        )
+        return plan
+
+    def check_path(self) -> Trigger.Response:
+        """Ask about the last path."""
+        markers = self.heard["markers"]
+        before = len(markers)
+        self._heard_last = lambda: len(markers) > before
+        return call(self._check, Trigger.Request())
+
+    def check_poses(self, server, poses) -> Trigger.Response:
+        """Publish a path of poses (n, 3), wait until the server has it, ask about it."""
+        self.send_path(poses_path(poses, "map"))
+        wait_until(
+            lambda: (
+                server.service.path is not None
+                and np.array_equal(server.service.path[:, :2], np.asarray(poses)[:, :2])
+            ),
+            "the path to arrive",
+        )
+        return self.check_path()
+
+    def load_map(self, url: str) -> LoadMap.Response:
+        """Ask to load a terrain file."""
+        return call(self._map, LoadMap.Request(map_url=str(url)))
+
+    def set_parameter(self, name: str, value) -> tuple[bool, str]:
+        """Set a parameter; return whether it was accepted, and the reason if not."""
+        parameter = Parameter(name=name)
+        kind = {bool: 1, int: 2, float: 3, str: 4}[type(value)]
+        parameter.value.type = kind
+        field = ("bool_value", "integer_value", "double_value", "string_value")[kind - 1]
+        setattr(parameter.value, field, value)
+        result = call(self._parameters, SetParameters.Request(parameters=[parameter])).results[0]
+        return result.successful, result.reason
+
+    def next_results(self, ask) -> tuple:
+        """Call `ask` and return its answer with the results published for it.
+
+        Results follow an answer, so those of the question before are awaited first; the markers
+        are the last of them.
+        """
+        wait_until(self._heard_last, "the results of the question before")
+        for messages in self.heard.values():
+            messages.clear()
+        answer = ask()
+        wait_until(lambda: all(self.heard.values()), "all results")
+        return answer, {topic: messages[-1] for topic, messages in self.heard.items()}
+
+    def wait_for_log(self, text: str) -> None:
+        """Wait for a log line of the server with a text in it."""
+        wait_until(lambda: any(text in line for line in self.logs), f"a log line with {text!r}")
+
+    def _send(self, publisher, message) -> None:
+        wait_until(lambda: publisher.get_subscription_count() > 0, publisher.topic_name)
+        publisher.publish(message)
+
+
+def verdict_of(results: dict) -> dict[str, str]:
+    """Return the keys and values of the verdict among the results."""
+    return {entry.key: entry.value for entry in results["verdict"].status[0].values}
+
+
+def ask(client: PlannerClient, start=START, goal=GOAL, **arguments):
+    """Ask for a plan; return it with its verdict and results."""
+    plan, results = client.next_results(lambda: client.can_traverse(start, goal, **arguments))
+    return plan, verdict_of(results), results

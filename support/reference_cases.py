@@ -1,0 +1,79 @@
+"""The settled cases of test/data, made with MuJoCo: see test/data/README.md."""
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+
+DATA = Path(__file__).resolve().parents[1] / "test" / "data"
+FILES = ("settled_a.npz", "settled_b.npz")
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceGround:
+    """A ground and the n poses at which the rover lsr1 settled on it."""
+
+    label: str
+    """File and ground, such as settled_a/rocks."""
+    terrain: Terrain
+    """The ground."""
+    poses: np.ndarray
+    """(n, 3) x, y [m] and yaw [rad] of the body origin."""
+    wheel_centres: np.ndarray
+    """(n, 6, 3) [m]."""
+    forces: np.ndarray
+    """(n, 6, 3) force of the ground on each wheel [N], map frame."""
+    attitude: np.ndarray
+    """(n, 2) roll and pitch [rad]."""
+    joints: np.ndarray
+    """(n, 4) rocker right and left, bogie right and left [rad]."""
+
+
+@lru_cache(maxsize=1)
+def reference_grounds() -> tuple[ReferenceGround, ...]:
+    """Return all grounds of both files, with their cases."""
+    grounds = []
+    for file in FILES:
+        with np.load(DATA / file) as entries:
+            meta = json.loads(str(entries["meta"]))
+            names = sorted({row["terrain"] for row in meta["rows"]})
+            for name in names:
+                rows = [row for row in meta["rows"] if row["terrain"] == name]
+                terrain = Terrain(entries[f"terrain_{name}"], meta["res"], tuple(meta["origin"]))
+                grounds.append(_read_cases(f"{file[:-4]}/{name}", terrain, rows))
+    return tuple(grounds)
+
+
+def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGround:
+    def column(*keys: str) -> np.ndarray:
+        return np.array([[row[key] for key in keys] for row in rows])
+
+    return ReferenceGround(
+        label=label,
+        terrain=terrain,
+        poses=column("x", "y", "yaw"),
+        wheel_centres=np.array([row["centre"] for row in rows]),
+        forces=np.array([row["force"] for row in rows]),
+        attitude=column("roll", "pitch"),
+        joints=column("rocker_r", "rocker_l", "bogie_r", "bogie_l"),
+    )
+
+
+@lru_cache(maxsize=1)
+def reference_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
+    """Return what the model says at each reference case under equal torques."""
+    rover = load_rover("lsr1")
+    grounds = reference_grounds()
+    return tuple((case, sweep_path(rover, case.terrain, case.poses)) for case in grounds)
+
+
+def reference_ground(label: str) -> ReferenceGround:
+    """Return the ground of a label such as settled_a/rocks."""
+    return next(case for case in reference_grounds() if case.label == label)

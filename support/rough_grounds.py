@@ -1,0 +1,104 @@
+"""Rough grounds from a seed, planes, and the symmetries that move a ground with its poses."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rover_physics.terrain.grid import Terrain
+
+RESOLUTION = 0.04
+
+
+def plane(slope_x: float, slope_y: float, height: float = 0.0, half: float = 1.2) -> Terrain:
+    """Return the plane z = slope_x x + slope_y y + height around the origin."""
+    x, y = _grid(half)
+    return Terrain(slope_x * x + slope_y * y + height, RESOLUTION, (x[0, 0], y[0, 0]))
+
+
+def smooth(seed: int, half: float = 1.6) -> Terrain:
+    """Return the sum of a few long waves, up to 0.1 m high."""
+    rng = np.random.default_rng(seed)
+    x, y = _grid(half)
+    z = np.zeros_like(x)
+    for _ in range(4):
+        kx, ky, phase = rng.uniform(-2.5, 2.5), rng.uniform(-2.5, 2.5), rng.uniform(0.0, 6.3)
+        z += rng.uniform(0.0, 0.025) * np.sin(kx * x + ky * y + phase)
+    return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
+
+
+def fractal(seed: int, half: float = 3.0, roughness: float = 0.06) -> Terrain:
+    """Return relief with a power-law spectrum and an RMS height of `roughness` [m]."""
+    rng = np.random.default_rng(seed)
+    x, y = _grid(half)
+    rows, columns = x.shape
+    wave = np.hypot(np.fft.fftfreq(rows)[:, None], np.fft.rfftfreq(columns)[None, :])
+    wave[0, 0] = np.inf
+    z = np.fft.irfft2(np.fft.rfft2(rng.standard_normal(x.shape)) * wave**-1.7, s=x.shape)
+    return Terrain(z * (roughness / z.std()), RESOLUTION, (x[0, 0], y[0, 0]))
+
+
+def rocky(seed: int, half: float = 3.0, count: int = 120) -> Terrain:
+    """Return gentle relief strewn with spherical caps of 5 to 20 cm radius."""
+    rng = np.random.default_rng(seed)
+    x, y = _grid(half)
+    z = fractal(seed + 1000, half, 0.03).elevation.copy()
+    for _ in range(count):
+        cx, cy, radius = *rng.uniform(-half, half, 2), rng.uniform(0.05, 0.20)
+        cap = np.sqrt(np.clip(radius**2 - (x - cx) ** 2 - (y - cy) ** 2, 0.0, None))
+        z += 0.6 * cap
+    return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
+
+
+def bouldered(seed: int, half: float = 3.0, count: int = 150, highest: float = 0.1) -> Terrain:
+    """Return gentle relief strewn with half-ellipsoids from 2 cm to `highest` [m] high.
+
+    They are at most twice as wide, from middle to rim, as high: their rims stand upright.
+    """
+    rng = np.random.default_rng(seed)
+    x, y = _grid(half)
+    relief = fractal(seed + 500, half, 0.03).elevation
+    z = relief.copy()
+    for _ in range(count):
+        (cx, cy), height = rng.uniform(-half, half, 2), rng.uniform(0.02, highest)
+        width = height * rng.uniform(1.0, 2.0)
+        inside = np.clip(1.0 - ((x - cx) ** 2 + (y - cy) ** 2) / width**2, 0.0, None)
+        z = np.maximum(z, relief + height * np.sqrt(inside))
+    return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
+
+
+def random_poses(seed: int, count: int, half: float) -> np.ndarray:
+    """Return poses (count, 3) within `half` [m] of the origin, all headings."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(-half, half, (count, 2))
+    return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
+
+
+def quarter_turn(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
+    """Return ground and poses turned together by 90 degrees about the map's z: x -> y, y -> -x."""
+    xmin, xmax, ymin, ymax = terrain.bounds
+    turned = replace(
+        terrain,
+        elevation=np.ascontiguousarray(terrain.elevation.T[:, ::-1]),
+        origin=(-ymax, xmin),
+    )
+    return turned, np.column_stack([-poses[:, 1], poses[:, 0], poses[:, 2] + 0.5 * np.pi])
+
+
+def mirrored(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
+    """Return ground and poses mirrored: y -> -y."""
+    ymax = terrain.bounds[3]
+    friction = None if terrain.friction is None else terrain.friction[::-1].copy()
+    flipped = replace(
+        terrain,
+        elevation=terrain.elevation[::-1].copy(),
+        origin=(terrain.origin[0], -ymax),
+        friction=friction,
+    )
+    return flipped, poses * [1.0, -1.0, -1.0]
+
+
+def _grid(half: float) -> tuple[np.ndarray, np.ndarray]:
+    count = round(half / RESOLUTION)
+    axis = np.arange(-count, count + 1) * RESOLUTION
+    x, y = np.meshgrid(axis, axis)
+    return x, y

@@ -1,0 +1,242 @@
+"""An independent rover for the tests: where its parts are and what balances it, in plain numpy.
+
+Nothing here is shared with the kernels; it is written from the conventions
+(docs/conventions.md) and the equations of the paper.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.rover.model import Part, Rover
+from rover_physics.terrain.grid import Terrain
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One settled rover, map frame, right side first."""
+
+    attitude: np.ndarray
+    """(3, 3) body to map."""
+    origin: np.ndarray
+    """(3,) body origin [m]."""
+    wheels: np.ndarray
+    """(6, 3) wheel centres from the suspension angles [m]."""
+    rocker_pivots: np.ndarray
+    """(2, 3) [m]."""
+    bogie_pivots: np.ndarray
+    """(2, 3) [m]."""
+    on_bogie: np.ndarray
+    """(6,) bool."""
+    masses: list
+    """All parts: (mass [kg], place [m], side 0, 1 or None, whether on the bogie)."""
+
+
+def attitude_of(prediction: PathPrediction, i: int) -> np.ndarray:
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll) of waypoint i."""
+    angles = [prediction.poses[i, 2], prediction.pitch[i], prediction.roll[i]]
+    return Rotation.from_euler("ZYX", angles).as_matrix()
+
+
+def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
+    """Return where the parts of waypoint i are, from pose and suspension angles alone."""
+    R, origin = attitude_of(prediction, i), prediction.position[i]
+    suspension, masses = rover.suspension, rover.masses
+    wheels, on_bogie, rocker_pivots, bogie_pivots = [], [], [], []
+    parts = [(masses.body.mass, R @ np.array(masses.body.com) + origin, None, False)]
+    for side, mirror in enumerate((np.array([1, -1, 1.0]), np.ones(3))):
+        angle = prediction.rocker_angle[i, side]
+        rocker_turn = Rotation.from_rotvec([0.0, angle, 0.0])
+        bogie_turn = Rotation.from_rotvec([0.0, angle + prediction.bogie_angle[i, side], 0.0])
+        rocker_pivot = mirror * suspension.rocker_pivot
+        bogie_arm = mirror * suspension.bogie_pivot - rocker_pivot
+        bogie_pivot = rocker_pivot + rocker_turn.apply(bogie_arm)
+
+        def on_rocker(point, pivot=rocker_pivot, turn=rocker_turn, mirror=mirror):
+            return pivot + turn.apply(mirror * point - pivot)
+
+        def on_the_bogie(point, arm=bogie_arm, pivot=bogie_pivot, turn=bogie_turn, mirror=mirror,
+                         foot=rocker_pivot):  # fmt: skip
+            return pivot + turn.apply(mirror * point - foot - arm)
+
+        for name in ("rear", "middle", "front"):
+            carried = name != suspension.rocker_wheel
+            local = (on_the_bogie if carried else on_rocker)(np.array(suspension.wheels[name]))
+            wheels.append(R @ local + origin)
+            on_bogie.append(carried)
+            parts.append((rover.wheel.mass, wheels[-1], side, carried))
+        rocker_com = R @ on_rocker(np.array(masses.rocker.com)) + origin
+        bogie_com = R @ on_the_bogie(np.array(masses.bogie.com)) + origin
+        parts.append((masses.rocker.mass, rocker_com, side, False))
+        parts.append((masses.bogie.mass, bogie_com, side, True))
+        rocker_pivots.append(R @ rocker_pivot + origin)
+        bogie_pivots.append(R @ bogie_pivot + origin)
+    return Placed(
+        R, origin, np.array(wheels), np.array(rocker_pivots), np.array(bogie_pivots),
+        np.array(on_bogie), parts,
+    )  # fmt: skip
+
+
+def contact_frames(prediction: PathPrediction, i: int) -> np.ndarray:
+    """Return n, t, a of each wheel (6, 3, 3) from attitude and contact angle: t = a x n."""
+    a = attitude_of(prediction, i)[:, 1]
+    ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP))
+    upward = np.cross(ahead, a)
+    angle = prediction.contact_angle[i][:, None]
+    n = np.cos(angle) * upward - np.sin(angle) * ahead
+    return np.stack([n, np.cross(a, n), np.broadcast_to(a, n.shape)], axis=1)
+
+
+def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
+    """Return the nine sums that balance sets to zero, in units of the weight.
+
+    Three forces and three moments about the body origin of the whole rover, the moment about each
+    bogie pivot (eq 15), and the difference of the moments about the rocker pivots (eq 14 for both
+    sides). Moments are divided by weight and wheelbase.
+
+    Args:
+        rover: The rover.
+        placed: Where its parts are.
+        acting: (force [N], place [m], side, whether on the bogie) of all that acts.
+    """
+    axis = placed.attitude[:, 1]
+
+    def moment(pivot, choose):
+        about = (np.cross(p - pivot, f) for f, p, side, bogie in acting if choose(side, bogie))
+        return sum(about, start=np.zeros(3))
+
+    total_force = sum((force for force, *_ in acting), start=np.zeros(3))
+    total_moment = moment(placed.origin, lambda side, bogie: True)
+    about_bogies = [
+        axis @ moment(placed.bogie_pivots[k], lambda side, bogie, k=k: bogie and side == k)
+        for k in range(2)
+    ]
+    about_rockers = [
+        axis @ moment(placed.rocker_pivots[k], lambda side, bogie, k=k: side == k)
+        for k in range(2)
+    ]
+    wheels = rover.suspension.wheels
+    base = wheels["front"][0] - wheels["rear"][0]
+    moments = [*total_moment, *about_bogies, about_rockers[0] - about_rockers[1]]
+    return np.array([*total_force, *(np.array(moments) / base)]) / rover.weight
+
+
+def _on_wheels(prediction: PathPrediction, i: int, placed: Placed, forces: np.ndarray) -> list:
+    points = prediction.contact_points[i]
+    return [(forces[k], points[k], k // 3, placed.on_bogie[k]) for k in range(6)]
+
+
+def _weights(rover: Rover, placed: Placed) -> list:
+    g = rover.gravity * UP
+    return [(-mass * g, point, side, bogie) for mass, point, side, bogie in placed.masses]
+
+
+def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
+    """Return what is left of the nine balance equations of waypoint i; see `balance_sums`."""
+    placed = place_rover(rover, prediction, i)
+    shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
+    forces = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(prediction, i))
+    acting = _on_wheels(prediction, i, placed, forces) + _weights(rover, placed)
+    return balance_sums(rover, placed, acting)
+
+
+def balance_matrix(
+    rover: Rover, prediction: PathPrediction, i: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return A (9, 14), b (9,) and the wheels' places along the body (6,) [m] of waypoint i.
+
+    A @ (N, T, s0, s1) = b is its balance, all forces in units of the weight, S = s0 + s1 along.
+    """
+    placed, frames = place_rover(rover, prediction, i), contact_frames(prediction, i)
+    along = (placed.wheels - placed.origin) @ placed.attitude[:, 0]
+    columns = []
+    for kind in range(2):
+        for wheel in range(6):
+            forces = np.zeros((6, 3))
+            forces[wheel] = rover.weight * frames[wheel, kind]
+            columns.append(forces)
+    columns.append(rover.weight * frames[:, 2])
+    columns.append(rover.weight * along[:, None] * frames[:, 2])
+    sums = [
+        balance_sums(rover, placed, _on_wheels(prediction, i, placed, forces))
+        for forces in columns
+    ]
+    return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed)), along
+
+
+def wheel_gaps(
+    rover: Rover,
+    terrain: Terrain,
+    prediction: PathPrediction,
+    i: int,
+    laterals: np.ndarray,
+    angles: int = 1001,
+) -> np.ndarray:
+    """Return the smallest vertical gap (6,) [m] between each wheel's lower half and the ground.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        prediction: What the model says.
+        i: The waypoint.
+        laterals: Where across the wheel to look, from its middle plane [m].
+        angles: How many points to look at along each half circle, twice: the second time between
+            the neighbours of the nearest.
+    """
+    coarse = np.linspace(-0.5 * np.pi, 0.5 * np.pi, angles)
+    shape = (6, len(laterals), angles)
+    gaps = _gaps_at(rover, terrain, prediction, i, laterals, np.broadcast_to(coarse, shape))
+    step = coarse[1] - coarse[0]
+    nearest = coarse[gaps.argmin(axis=2)]
+    fine = np.clip(nearest[..., None] + np.linspace(-step, step, angles), coarse[0], coarse[-1])
+    return _gaps_at(rover, terrain, prediction, i, laterals, fine).min(axis=(1, 2))
+
+
+def _gaps_at(rover, terrain, prediction, i, laterals, angle) -> np.ndarray:
+    """Return the gaps at contact angles (6, laterals, k)."""
+    axis = attitude_of(prediction, i)[:, 1]
+    ahead = np.cross(axis, UP) / np.linalg.norm(np.cross(axis, UP))
+    upward = np.cross(ahead, axis)
+    points = (
+        prediction.wheel_centres[i][:, None, None, :]
+        + np.asarray(laterals)[None, :, None, None] * axis
+        + rover.wheel.radius * np.sin(angle)[..., None] * ahead
+        - rover.wheel.radius * np.cos(angle)[..., None] * upward
+    )
+    return points[..., 2] - terrain.elevation_at(points[..., 0], points[..., 1])
+
+
+def turned_round(rover: Rover) -> Rover:
+    """Return the same machine with front and rear exchanged: what was ahead is behind."""
+
+    def flip(point):
+        return (-point[0], point[1], point[2])
+
+    suspension, masses, belly = rover.suspension, rover.masses, rover.belly
+    other = {"rear": "front", "front": "rear", "middle": "middle"}
+    low, high = suspension.rocker_limits, suspension.bogie_limits
+    return replace(
+        rover,
+        name=f"{rover.name}_turned_round",
+        manipulator=None,
+        suspension=replace(
+            suspension,
+            rocker_pivot=flip(suspension.rocker_pivot),
+            bogie_pivot=flip(suspension.bogie_pivot),
+            rocker_wheel=other[suspension.rocker_wheel],
+            wheels={other[name]: flip(place) for name, place in suspension.wheels.items()},
+            rocker_limits=(-low[1], -low[0]),
+            bogie_limits=(-high[1], -high[0]),
+        ),
+        masses=replace(
+            masses,
+            body=Part(masses.body.mass, flip(masses.body.com)),
+            rocker=Part(masses.rocker.mass, flip(masses.rocker.com)),
+            bogie=Part(masses.bogie.mass, flip(masses.bogie.com)),
+        ),
+        belly=replace(belly, x=(-belly.x[1], -belly.x[0])),
+    )

@@ -1,0 +1,67 @@
+"""Measured states of settled rovers, and the motion between them, made from predictions."""
+
+import numpy as np
+
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traction.balance import MeasuredState
+from rover_physics.traction.contact_ekf import Motion
+from support.rough_grounds import fractal, random_poses, rocky
+from support.rover_geometry import attitude_of
+
+
+def state_of(prediction: PathPrediction, i: int) -> MeasuredState:
+    """Return what would be measured at waypoint i."""
+    arms = prediction.contact_points[i] - prediction.wheel_centres[i]
+    return MeasuredState(
+        prediction.roll[i],
+        prediction.pitch[i],
+        prediction.rocker_angle[i, 0],
+        prediction.bogie_angle[i],
+        prediction.contact_angle[i],
+        arms @ attitude_of(prediction, i)[:, 1],
+    )
+
+
+def rough_states(rover: Rover, count: int):
+    """Yield (prediction, waypoint) of `count` random settled poses on rough ground."""
+    left = count
+    for seed in range(100):
+        ground = (rocky if seed % 2 else fractal)(seed)
+        prediction = sweep_path(rover, ground, random_poses(seed, 260, 1.8))
+        for i in np.flatnonzero(prediction.settled):
+            if not left:
+                return
+            left -= 1
+            yield prediction, int(i)
+
+
+def drive_states(rover: Rover, ground: Terrain, speed: float = 0.03, start: float = -1.2):
+    """Return prediction, motions and duration of a step [s] of a slow drive along +x."""
+    x = np.linspace(start, -start, 1201)
+    prediction = sweep_path(rover, ground, np.column_stack([x, 0.0 * x, 0.0 * x]))
+    duration = (x[1] - x[0]) / speed
+
+    def rate(values):
+        return np.gradient(values, duration, axis=0)
+
+    roll, pitch = prediction.roll, prediction.pitch
+    turning = np.column_stack(
+        [rate(roll), rate(pitch) * np.cos(roll), -rate(pitch) * np.sin(roll)]
+    )
+    rocker, bogie = rate(prediction.rocker_angle), rate(prediction.bogie_angle)
+    speeds = np.linalg.norm(rate(prediction.wheel_centres), axis=2)
+    names = ("rear", "middle", "front")
+    hung = np.array([name != rover.suspension.rocker_wheel for name in names] * 2)
+    sides = np.repeat([0, 1], 3)
+    links = turning[:, [1]] + rocker[:, sides] + bogie[:, sides] * hung
+    motions = [
+        Motion(
+            roll[i], pitch[i], prediction.rocker_angle[i, 0], prediction.bogie_angle[i],
+            rocker[i, 0], bogie[i], speeds[i] / rover.wheel.radius - links[i], turning[i],
+        )
+        for i in range(len(x))
+    ]  # fmt: skip
+    return prediction, motions, duration

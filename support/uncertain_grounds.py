@@ -1,0 +1,134 @@
+"""Maps with errors drawn at random, and how often a sweep over them leaves its bounds."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from support.rough_grounds import RESOLUTION, fractal, plane, rocky
+
+ROUNDING = 1e-6
+"""Amount by which a value may be outside of its bounds, in its own unit."""
+
+
+def step(height: float) -> Terrain:
+    """Return level ground with a step up of `height` [m] at x = 0.3."""
+    flat = plane(0.0, 0.0, half=3.0)
+    x = flat.origin[0] + RESOLUTION * np.arange(flat.elevation.shape[1])
+    return replace(flat, elevation=flat.elevation + height * (x > 0.3))
+
+
+def uncertain_grounds(rover: Rover) -> dict[str, Terrain]:
+    """Return grounds to be perturbed, by name."""
+    return {
+        "level": plane(0.0, 0.0, half=3.0),
+        "slope": plane(0.25, 0.1, half=3.0),
+        "rocks": rocky(3),
+        "relief": fractal(2),
+        "step": step(0.5 * rover.wheel.radius),
+    }
+
+
+def with_std(terrain: Terrain, std: float) -> Terrain:
+    """Return the terrain with the same standard deviation [m] everywhere."""
+    return replace(terrain, elevation_std=np.full(terrain.elevation.shape, std))
+
+
+def path_across(seed: int, count: int = 24) -> np.ndarray:
+    """Return a straight path (count, 3) of 2 m through the middle of a ground."""
+    rng = np.random.default_rng(seed)
+    heading, aside = rng.uniform(-0.5, 0.5), rng.uniform(-0.6, 0.6)
+    along = np.linspace(-1.0, 1.0, count)
+    x, y = along * np.cos(heading), aside + along * np.sin(heading)
+    return np.column_stack([x, y, np.full(count, heading)])
+
+
+def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterator[Terrain]:
+    """Yield maps whose heights err by their standard deviations.
+
+    Args:
+        terrain: The map, with a layer `elevation_std`.
+        length: Distance [m] at which the errors' correlation has fallen to 1/e; 0: each cell
+            errs on its own.
+        count: Number of maps.
+        seed: Of the generator.
+    """
+    rng = np.random.default_rng(seed)
+    shape, width = terrain.elevation.shape, length / terrain.resolution / 2.0
+    impulse = np.zeros(shape)
+    impulse[shape[0] // 2, shape[1] // 2] = 1.0
+    scale = 1.0 / np.sqrt((_smooth(impulse, width) ** 2).sum())
+    for _ in range(count):
+        error = scale * _smooth(rng.standard_normal(shape), width)
+        yield replace(terrain, elevation=terrain.elevation + terrain.elevation_std * error)
+
+
+def _smooth(values: np.ndarray, width: float) -> np.ndarray:
+    return gaussian_filter(values, width, mode="wrap") if width > 0.0 else values
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a path fared on maps drawn at random."""
+
+    waypoints: int
+    """Number of waypoints with bounds, counted for each map."""
+    outside: dict[str, int]
+    """How many of these had a value outside of its bounds, by value; "any" for any value or no
+    pose at all, "no pose" for the latter."""
+    unbounded: int
+    """Number of waypoints of the path that settle but have no bounds."""
+    widths: dict[str, float]
+    """Median width of the bounds over the range of the values that were drawn, by value."""
+
+
+def draw_path(
+    rover: Rover,
+    terrain: Terrain,
+    poses: np.ndarray,
+    length: float,
+    count: int,
+    seed: int,
+    policy: str = "equal",
+    sigmas: float = 3.0,
+) -> Outcome:
+    """Sweep a path over maps drawn at random and hold it against its bounds."""
+    prediction = sweep_path(rover, terrain, poses, policy=policy)
+    bounds = bound_path(rover, terrain, prediction, sigmas, policy=policy)
+    rows = bounds.bounded
+    limits = {name: getattr(bounds, name)[rows] for name in BOUNDED_VALUES}
+    drawn: dict[str, list[np.ndarray]] = {name: [] for name in BOUNDED_VALUES}
+    outside = dict.fromkeys((*BOUNDED_VALUES, "no pose", "any"), 0)
+    for sample in draw_maps(terrain, length, count, seed):
+        swept = sweep_path(rover, sample, poses, policy=policy)
+        beyond = ~swept.settled[rows]
+        outside["no pose"] += int(beyond.sum())
+        for name, limit in limits.items():
+            value = getattr(swept, name)[rows]
+            left = (value < limit[..., 0] - ROUNDING) | (value > limit[..., 1] + ROUNDING)
+            left = left.reshape(len(left), -1).any(axis=1)
+            outside[name] += int(left.sum())
+            beyond |= left
+            drawn[name].append(value)
+        outside["any"] += int(beyond.sum())
+    return Outcome(
+        waypoints=int(rows.sum()) * count,
+        outside=outside,
+        unbounded=int((prediction.settled & ~rows).sum()),
+        widths={name: _relative_width(limits[name], drawn[name]) for name in BOUNDED_VALUES},
+    )
+
+
+def _relative_width(limits: np.ndarray, drawn: list[np.ndarray]) -> float:
+    """Return the median of width over range where both are finite and something varies."""
+    values = np.array(drawn)
+    with np.errstate(invalid="ignore"):
+        spread = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
+        width = limits[..., 1] - limits[..., 0]
+        known = np.isfinite(width) & np.isfinite(spread) & (spread > 0.0)
+    return float(np.median(width[known] / spread[known])) if known.any() else float("nan")

@@ -1,0 +1,20 @@
+"""Paths and sessions that tests of the page share."""
+
+import numpy as np
+
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.viewer.state.session import ViewSession
+from support.grounds import make_terrain
+
+LSR1 = load_rover("lsr1")
+
+
+def straight(length: float = 2.0, spacing: float = 0.02) -> np.ndarray:
+    """Return poses straight ahead along x, from x = -1 m."""
+    x = np.arange(-1.0, length - 1.0 + 1e-9, spacing)
+    return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
+
+
+def session_on(height, start=(-2.0, 0.0, 0.0), goal=(1.0, 0.0, 0.0)) -> ViewSession:
+    """Return a session of the LSR-1 on a ground of given heights."""
+    return ViewSession(LSR1, make_terrain(height), start, goal)

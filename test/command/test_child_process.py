@@ -1,0 +1,120 @@
+"""Child processes end with their parent, however it ends, and take their own children along."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rover_planner.demo.child_process import ChildProcess, stopping_children
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+STUBBORN = """
+import signal, subprocess, sys, time
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+inner = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+print(inner.pid, flush=True)
+time.sleep(600)
+"""
+POLITE = """
+import time
+print("ready", flush=True)
+time.sleep(600)
+"""
+PARENT = """
+import os, sys, time
+from pathlib import Path
+from rover_planner.demo.child_process import ChildProcess, stopping_children
+with stopping_children() as children:
+    child = ChildProcess("polite", (), os.environ, Path(sys.argv[1]) / "log")
+    children.append(child)
+    next(child.lines(lambda: None))
+    print(child._process.pid, flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.fixture
+def environment(tmp_path):
+    (tmp_path / "stubborn.py").write_text(STUBBORN)
+    (tmp_path / "polite.py").write_text(POLITE)
+    (tmp_path / "failing.py").write_text("raise SystemExit('no luck today')")
+    return os.environ | {"PYTHONPATH": f"{REPOSITORY}{os.pathsep}{tmp_path}"}
+
+
+def exists(pid):
+    """Tell whether a process is there and is more than an entry to be collected."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def wait_until_gone(pid, seconds=10.0):
+    deadline = time.monotonic() + seconds
+    while exists(pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return not exists(pid)
+
+
+def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
+    tmp_path, environment, monkeypatch
+):
+    monkeypatch.setattr("rover_planner.demo.child_process.GRACE", 0.3)
+    with stopping_children() as children:
+        child = ChildProcess("stubborn", (), environment, tmp_path / "log")
+        children.append(child)
+        inner = int(next(child.lines(lambda: None)))
+        assert exists(inner)
+        assert child.running
+    assert not child.running
+    assert child.exit_code == -signal.SIGKILL
+    assert wait_until_gone(inner)
+
+
+def test_a_failure_in_the_block_stops_the_children(tmp_path, environment):
+    with pytest.raises(ZeroDivisionError), stopping_children() as children:
+        child = ChildProcess("polite", (), environment, tmp_path / "log")
+        children.append(child)
+        next(child.lines(lambda: None))
+        raise ZeroDivisionError
+    assert child.exit_code == -signal.SIGTERM
+
+
+def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environment):
+    child = ChildProcess("failing", (), environment, tmp_path / "log")
+    assert list(child.lines(lambda: None)) == []
+    while child.running:
+        time.sleep(0.02)
+    assert child.exit_code == 1
+    assert child.last_words() == "no luck today"
+    child.stop()
+    child.stop()
+
+
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [
+        (signal.SIGINT, -signal.SIGINT),
+        (signal.SIGTERM, 128 + signal.SIGTERM),
+        (signal.SIGHUP, 128 + signal.SIGHUP),
+        (signal.SIGKILL, -signal.SIGKILL),
+    ],
+)
+def test_no_child_outlives_a_parent_that_is_signalled(tmp_path, environment, number, code):
+    with subprocess.Popen(
+        [sys.executable, "-c", PARENT, str(tmp_path)],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as parent:
+        child = int(parent.stdout.readline())
+        assert exists(child)
+        parent.send_signal(number)
+        assert parent.wait(20) == code
+    assert wait_until_gone(child)

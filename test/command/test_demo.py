@@ -1,0 +1,170 @@
+"""The demo shows real answers over DDS, writes its picture and leaves nothing running."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.cli import main
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.worlds.mars_terrain import make_mars_terrain
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+pytest.importorskip("matplotlib", reason="needs matplotlib")
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+TOKEN = "ROVER_PLANNER_TEST_RUN"
+
+
+@pytest.fixture
+def map_file(tmp_path):
+    """A small terrain of gentle ground with a corner that was never seen."""
+    made = make_mars_terrain(4, 9.0, 0.1, rock_cover=0.005, crater_density=0.0)
+    elevation = made.elevation.copy()
+    elevation[60:, 60:] = np.nan
+    path = tmp_path / "map.npz"
+    save_terrain(path, Terrain(elevation, made.resolution, made.origin))
+    return path
+
+
+class Demo:
+    """The demo as a process whose descendants are known by a token in their environment."""
+
+    def __init__(self, folder, *words):
+        self.token = f"{TOKEN}={uuid.uuid4()}"
+        name, value = self.token.split("=")
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "rover_planner", "demo", *map(str, words)],
+            cwd=REPOSITORY,
+            env=os.environ | {name: value, "PYTHONPATH": str(REPOSITORY)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def finish(self):
+        """Wait for the end; return exit code, stdout and stderr."""
+        out, err = self.process.communicate(timeout=300)
+        return self.process.returncode, out, err
+
+    def running(self, module=""):
+        """List the processes of this demo that run a module, or all of them."""
+        found = []
+        for folder in Path("/proc").glob("[0-9]*"):
+            try:
+                environment = (folder / "environ").read_bytes().decode(errors="replace")
+                command = (folder / "cmdline").read_bytes().decode(errors="replace")
+            except OSError:
+                continue
+            if self.token in environment.split("\0") and module in command:
+                found.append(int(folder.name))
+        return found
+
+    def wait_for(self, module):
+        """Wait until a process of the demo runs a module; return its number."""
+        deadline = time.monotonic() + 240
+        while time.monotonic() < deadline:
+            found = self.running(module)
+            if found:
+                return found[0]
+            assert self.process.poll() is None, self.process.communicate()
+            time.sleep(0.05)
+        raise AssertionError(f"{module} was never started")
+
+
+def assert_nothing_left(demo):
+    deadline = time.monotonic() + 10
+    while demo.running() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert demo.running() == []
+
+
+def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
+    picture = tmp_path / "made" / "demo.png"
+    demo = Demo(tmp_path, "--map", map_file, "--out", picture)
+    code, out, err = demo.finish()
+    assert (code, err) == (0, "")
+    assert "compile" in out
+    assert "publish the map" in out
+    rows = [line for line in out.splitlines() if line.startswith("│")]
+    plain = [row for row in rows if " plain " in row]
+    assert any("traversable" in row for row in plain)
+    assert "refused" in next(row for row in rows if " off the map " in row)
+    assert "refused" in next(row for row in rows if " unknown ground " in row)
+    assert "[m]" in out
+    goals = sum("traversable" in row or "refused" in row for row in rows)
+    assert f"{goals} of {goals} verdicts" in out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert picture.stat().st_size > 50_000
+    assert_nothing_left(demo)
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 128 + signal.SIGTERM)]
+)
+def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file, number, code):
+    demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
+    demo.wait_for("rover_planner.nodes.mission_planner")
+    demo.process.send_signal(number)
+    returned, _, err = demo.finish()
+    assert returned == code
+    assert "Traceback" not in err
+    assert_nothing_left(demo)
+
+
+def test_ctrl_c_to_the_whole_group_during_compilation_ends_everything(tmp_path, map_file):
+    demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
+    demo.wait_for("rover_physics.prediction.sweep")
+    os.killpg(demo.process.pid, signal.SIGINT)
+    returned, _, err = demo.finish()
+    assert returned == 130
+    assert "Traceback" not in err
+    assert_nothing_left(demo)
+
+
+def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
+    demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
+    os.kill(demo.wait_for("rover_planner.nodes.traverse_server"), signal.SIGKILL)
+    code, _, err = demo.finish()
+    assert code == 1
+    assert err.count("\n") == 1
+    assert "traverse_server" in err
+    assert_nothing_left(demo)
+
+
+def test_the_picture_is_of_the_same_candidates_as_the_server_judges():
+    from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
+    from rover_planner.planning.traverse_service import settings_from_parameters
+
+    defaults = {spec.name: spec.default for spec in TRAVERSE_SERVER}
+    assert settings_from_parameters(defaults).query == PathQueryOptions()
+
+
+@pytest.mark.parametrize("content", [None, b"no map"])
+def test_a_bad_map_is_refused_with_one_line(tmp_path, capfd, content):
+    path = tmp_path / "bad.npz"
+    if content is not None:
+        path.write_bytes(content)
+    code = main(["demo", "--map", str(path), "--out", str(tmp_path / "demo.png")])
+    err = capfd.readouterr().err
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "bad.npz" in err
+
+
+@pytest.mark.parametrize("out", ["picture.txt", "map.npz/demo.png"])
+def test_a_picture_that_cannot_be_written_is_refused_with_one_line(tmp_path, map_file, capfd, out):
+    code = main(["demo", "--map", str(map_file), "--out", str(tmp_path / out)])
+    err = capfd.readouterr().err
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "picture" in err

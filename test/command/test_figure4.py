@@ -1,0 +1,126 @@
+"""Figure 4 of the paper: loads against one torque, by the paper's equations and the model's."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib", reason="needs matplotlib")
+
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.cli import main
+from rover_planner.figures.figure4 import (
+    ALONE,
+    HELD,
+    draw_figure4,
+    load_changes,
+    loads_at_rest,
+    loads_under_torque,
+)
+from support.rough_grounds import plane
+from support.rover_geometry import balance_matrix, turned_round
+
+LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
+PNG = b"\x89PNG"
+
+
+def rovers():
+    return [LSR1, M2020, turned_round(LSR1), turned_round(M2020)]
+
+
+def test_the_loads_at_rest_carry_the_weight():
+    for rover in rovers():
+        assert 2.0 * loads_at_rest(rover).sum() == pytest.approx(rover.weight, rel=1e-9)
+
+
+@pytest.mark.parametrize("rover", rovers(), ids=lambda rover: rover.name)
+@pytest.mark.parametrize("axle", [0, 1, 2])
+def test_loads_held_by_all_wheels_are_those_of_the_full_balance(rover, axle):
+    prediction = sweep_path(rover, plane(0.0, 0.0, half=4.0), [[0.0, 0.0, 0.0]])
+    A, b, _ = balance_matrix(rover, prediction, 0)
+    tractions = np.zeros(3)
+    tractions[axle] = 0.2 / rover.wheel.radius
+    tractions -= tractions.mean()
+    pulls = np.tile(tractions, 2) / rover.weight
+    loads = np.linalg.lstsq(A[:, [*range(6), 12, 13]], b - A[:, 6:12] @ pulls, rcond=None)[0]
+    expected = rover.weight * loads[:6].reshape(2, 3)
+    assert expected[0] == pytest.approx(expected[1], rel=1e-9)
+    assert loads_under_torque(rover, axle, 0.2, HELD) == pytest.approx(expected[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("case", [ALONE, HELD])
+@pytest.mark.parametrize("axle", [0, 1, 2])
+def test_a_torque_moves_load_between_wheels_and_adds_none(axle, case):
+    for rover in rovers():
+        rest = loads_at_rest(rover)
+        there, back = (
+            loads_under_torque(rover, axle, torque, case) - rest for torque in (0.2, -0.2)
+        )
+        assert there.sum() == pytest.approx(0.0, abs=1e-9 * rover.weight)
+        assert there == pytest.approx(-back, abs=1e-9 * rover.weight)
+        assert np.abs(there).max() > 0.0
+
+
+@pytest.mark.parametrize("case", [ALONE, HELD])
+def test_a_wheel_that_is_driven_forward_presses_harder_at_rear_and_middle(case):
+    rest = loads_at_rest(LSR1)
+    assert loads_under_torque(LSR1, 0, 0.2, case)[0] > rest[0]
+    assert loads_under_torque(LSR1, 1, 0.2, case)[1] > rest[1]
+    assert loads_under_torque(LSR1, 2, 0.2, case)[2] < rest[2]
+
+
+def test_torque_differences_between_axles_change_loads_as_given():
+    changes = load_changes(LSR1, np.array([-2.0, 2.0, 0.0]))
+    assert changes == pytest.approx([-0.733, 1.467, -0.733], abs=5e-4)
+    assert load_changes(LSR1, np.array([0.0, -2.0, 2.0])) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_alone_the_thrust_turns_the_rover_about_its_rocker_pivots():
+    wheels, height = LSR1.suspension.wheels, 0.3
+    for axle in range(3):
+        changes = load_changes(LSR1, np.eye(3)[axle])
+        arms = [wheels[name][0] for name in ("rear", "middle", "front")]
+        assert changes @ arms == pytest.approx(-height, rel=1e-9)
+
+
+def test_the_command_draws_a_picture_of_nine_panels(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    drawn = []
+    save = Figure.savefig
+    monkeypatch.setattr(
+        Figure, "savefig", lambda self, *a, **k: (drawn.append(self), save(self, *a, **k))
+    )
+    out = tmp_path / "loads.png"
+    assert main(["figure4", str(out)]) == 0
+    assert out.read_bytes().startswith(PNG)
+    panels = drawn[0].axes
+    assert len(panels) == 9
+    assert {axes.get_xlabel() for axes in panels} == {
+        f"{name} wheel torque [mN·m]" for name in ("rear", "middle", "front")
+    }
+    for axes in panels:
+        for line in axes.get_lines():
+            low, high = axes.get_ylim()
+            assert (low <= line.get_ydata()).all() and (line.get_ydata() <= high).all()
+        assert axes.get_lines()[1].get_xdata() == pytest.approx([-200.0, 200.0])
+
+
+def test_the_picture_is_drawn_for_any_rover(tmp_path):
+    for rover in rovers():
+        draw_figure4(tmp_path / f"{rover.name}.png", rover)
+        assert (tmp_path / f"{rover.name}.png").read_bytes().startswith(PNG)
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["figure4", "no/such/folder/a.png"], "no/such/folder"),
+        (["figure4", "a.picture"], "picture"),
+        (["figure4", "a.png", "--rover", "tractor"], "tractor"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_one_line(words, names, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    lines = [line for line in capfd.readouterr().err.splitlines() if "rover_planner:" in line]
+    assert len(lines) == 1 and names in lines[0]

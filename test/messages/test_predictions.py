@@ -1,0 +1,166 @@
+"""Predictions become flat labelled arrays, a trajectory by joint name, and markers."""
+
+import array
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from std_msgs.msg import Float64MultiArray
+from visualization_msgs.msg import Marker
+
+from msg_adapters.errors import MessageError
+from msg_adapters.markers import IMPASSABLE, PASSABLE, path_markers
+from msg_adapters.paths import PoseStock, quaternions, settled_path
+from msg_adapters.predictions import (
+    JOINTS,
+    MEASURES,
+    array_values,
+    joint_trajectory,
+    tip_over_array,
+    waypoint_array,
+)
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+
+STAMP = Time(sec=12, nanosec=34)
+
+
+@pytest.fixture(scope="module")
+def rover():
+    return load_rover("lsr1")
+
+
+@pytest.fixture(scope="module")
+def prediction(rover):
+    """Return 60 waypoints over waves, the last ten of them off the map."""
+    axis = np.arange(101) * 0.05 - 2.5
+    x, y = np.meshgrid(axis, axis)
+    terrain = Terrain(0.05 * np.sin(2.0 * x) + 0.04 * np.sin(1.5 * y), 0.05, (-2.5, -2.5))
+    poses = np.zeros((60, 3))
+    poses[:, 0] = -1.0 + 0.05 * np.arange(60)
+    poses[50:, 0] += 3.0
+    poses[:, 2] = 0.1
+    predicted = sweep_path(rover, terrain, poses)
+    assert predicted.settled[:50].all() and not predicted.settled[50:].any()
+    return predicted
+
+
+def test_an_array_has_labelled_dimensions_and_its_values():
+    values = np.arange(12.0).reshape(2, 6)
+    message = waypoint_array(values)
+    assert [(dim.label, dim.size, dim.stride) for dim in message.layout.dim] == [
+        ("waypoint", 2, 12),
+        ("wheel", 6, 6),
+    ]
+    assert isinstance(message.data, array.array) and message.data.typecode == "d"
+    np.testing.assert_array_equal(array_values(message), values)
+
+
+def test_an_array_keeps_its_values_whatever_their_layout():
+    values = np.asfortranarray(np.arange(12).reshape(2, 6))
+    np.testing.assert_array_equal(array_values(waypoint_array(values)), values)
+    assert array_values(waypoint_array(np.empty((0, 6)))).shape == (0, 6)
+
+
+def test_an_array_whose_length_disagrees_is_refused():
+    message = waypoint_array(np.zeros((2, 6)))
+    message.data = message.data[:-1]
+    with pytest.raises(MessageError, match=r"dimensions \[2, 6\] and 11 values"):
+        array_values(message)
+    with pytest.raises(MessageError, match=r"dimensions \[\] and 0 values"):
+        array_values(Float64MultiArray())
+
+
+def test_tip_over_margins_are_the_measures_by_column(prediction):
+    message = tip_over_array(prediction)
+    assert [dim.label for dim in message.layout.dim] == ["waypoint", "measure"]
+    for column, measure in enumerate(MEASURES):
+        np.testing.assert_array_equal(
+            array_values(message)[:, column], getattr(prediction, measure)
+        )
+
+
+def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
+    prediction,
+    rover,
+):
+    message = joint_trajectory(prediction, rover.wheel.radius, "map", STAMP)
+    assert message.header.frame_id == "map" and message.header.stamp == STAMP
+    assert tuple(message.joint_names) == JOINTS == SUSPENSION_JOINTS + WHEEL_JOINTS
+    assert len(message.points) == 50
+    for i in (0, 20, 49):
+        point = message.points[i]
+        np.testing.assert_array_equal(
+            point.positions[:4], [*prediction.rocker_angle[i], *prediction.bogie_angle[i]]
+        )
+        np.testing.assert_array_equal(point.effort[:4], 0.0)
+        np.testing.assert_array_equal(point.effort[4:], prediction.torque[i])
+        seconds = point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
+        assert seconds == pytest.approx(prediction.time[i], abs=1e-8)
+
+
+def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(prediction, rover):
+    stock = []
+    for unsettled in (49, 10, 50):
+        cut = np.arange(len(prediction.settled)) < unsettled
+        part = replace(prediction, settled=prediction.settled & cut)
+        radius = rover.wheel.radius
+        trajectory = joint_trajectory(part, radius, "map", STAMP, stock)
+        assert len(trajectory.points) == unsettled
+        assert trajectory == joint_trajectory(part, radius, "map", STAMP)
+
+
+def test_wheels_roll_forwards_by_the_way_they_go(prediction, rover):
+    message = joint_trajectory(prediction, rover.wheel.radius, "map", STAMP)
+    rolled = np.array([point.positions[4:] for point in message.points])
+    assert (np.diff(rolled, axis=0) > 0.0).all()
+    flat = 0.05 * 49 / rover.wheel.radius
+    assert np.all((rolled[-1] > 0.97 * flat) & (rolled[-1] < 1.05 * flat))
+
+
+def test_a_path_of_poses_filled_anew_is_the_same_as_one_of_new_poses(prediction):
+    stock = PoseStock()
+    for rows in ([0, 10, 49], [5], range(50), [49, 48]):
+        path = settled_path(prediction, rows, "map", STAMP, stock)
+        assert path == settled_path(prediction, rows, "map", STAMP)
+
+
+def test_a_settled_path_has_height_and_full_orientation(prediction):
+    path = settled_path(prediction, [0, 10, 49], "map", STAMP)
+    for pose, i in zip(path.poses, (0, 10, 49), strict=True):
+        place = pose.pose.position
+        np.testing.assert_array_equal((place.x, place.y, place.z), prediction.position[i])
+        turn = pose.pose.orientation
+        np.testing.assert_array_equal(
+            (turn.x, turn.y, turn.z, turn.w),
+            quaternions(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]),
+        )
+        assert abs(turn.x) > 1e-3 and abs(turn.y) > 1e-3
+        assert pose.header == path.header and path.header.stamp == STAMP
+
+
+def test_markers_colour_the_path_and_show_where_it_fails(prediction):
+    reasons = [""] * 50 + ["off the map"] * 10
+    markers = path_markers(prediction, reasons, np.arange(0, 60, 7), "map", STAMP).markers
+    by_namespace = {marker.ns: marker for marker in markers}
+    assert markers[0].action == Marker.DELETEALL
+    line = by_namespace["path"]
+    assert len(line.points) == len(line.colors) == 10
+    assert line.colors == [PASSABLE] * 8 + [IMPASSABLE] * 2
+    assert line.points[-1].z == prediction.position[49, 2]
+    assert by_namespace["reason"].text == "off the map"
+    assert by_namespace["failing_pose"].pose.position.x == prediction.poses[50, 0]
+    contacts = by_namespace["contact_points"].points
+    assert len(contacts) == 8 * 6
+    np.testing.assert_array_equal(
+        [[p.x, p.y, p.z] for p in contacts[:6]], prediction.contact_points[0]
+    )
+    assert all(marker.header.stamp == STAMP for marker in markers)
+
+
+def test_markers_of_a_passable_path_show_no_failure(prediction):
+    markers = path_markers(prediction, [""] * 60, np.arange(50), "map", STAMP).markers
+    assert [marker.ns for marker in markers[1:]] == ["path", "contact_points"]

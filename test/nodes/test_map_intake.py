@@ -1,0 +1,53 @@
+"""Maps taken as bytes: each once, the latest when asked, refused without harm."""
+
+from builtin_interfaces.msg import Time
+from rclpy.serialization import serialize_message
+
+from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
+from rover_physics.errors import ModelError
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.ros.map_intake import MapIntake, prepare_map
+from support.ros_fixtures import wait_until
+from support.rough_grounds import plane
+
+LSR1 = load_rover("lsr1")
+
+
+def cloud_of(half):
+    return serialize_message(terrain_to_point_cloud(plane(0.0, 0.0, half=half), "map", Time()))
+
+
+def test_a_map_is_made_ready_once_and_given_once():
+    made = []
+
+    def prepare(cloud):
+        made.append(prepare_map(LSR1, terrain_from_point_cloud(cloud)))
+        return made[-1]
+
+    intake = MapIntake(prepare, made.append)
+    intake.offer(cloud_of(1.0))
+    prepared = wait_until(intake.take, "a map")
+    assert prepared.rover is LSR1 and intake.take() is None
+    intake.offer(cloud_of(1.0))
+    intake.offer(cloud_of(2.0))
+    other = wait_until(intake.take, "the next map")
+    assert other.terrain.elevation.shape > prepared.terrain.elevation.shape
+    intake.close()
+    assert len(made) == 2
+
+
+def test_a_map_that_cannot_be_used_is_told_and_the_next_is_taken():
+    told = []
+
+    def prepare(cloud):
+        if cloud.width < 60:
+            raise ModelError("too small")
+        return prepare_map(LSR1, terrain_from_point_cloud(cloud))
+
+    intake = MapIntake(prepare, told.append)
+    intake.offer(cloud_of(0.5))
+    wait_until(lambda: told, "the refusal")
+    assert told == ["too small"] and intake.take() is None
+    intake.offer(cloud_of(3.0))
+    assert wait_until(intake.take, "a map") is not None
+    intake.close()

@@ -1,0 +1,32 @@
+"""Precedence over other programs: taken by all threads, or refused with what would be right."""
+
+import subprocess
+import sys
+
+from rover_planner.ros.realtime import take_priority
+
+ASK = """
+import os, threading
+from rover_planner.ros.realtime import take_priority
+end = threading.Event()
+threading.Thread(target=end.wait, daemon=True).start()
+print(take_priority(3))
+names = os.listdir("/proc/self/task")
+print({os.sched_getscheduler(int(name)) == os.SCHED_FIFO for name in names})
+"""
+
+
+def test_all_threads_take_it_or_the_reason_is_told():
+    run = subprocess.run(
+        [sys.executable, "-c", ASK], capture_output=True, text=True, timeout=60, check=True
+    )
+    reason, policies = run.stdout.splitlines()
+    assert policies == "{True}" if reason == "" else "CAP_SYS_NICE" in reason
+
+
+def test_zero_asks_for_nothing():
+    assert take_priority(0) == ""
+
+
+def test_what_no_system_grants_is_told():
+    assert "realtime_priority 1000" in take_priority(1000)

@@ -1,0 +1,87 @@
+"""The traverse server as a process of its own: it starts, answers and ends cleanly."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from rover_physics.terrain.grid import Terrain, save_terrain
+from support.planner_client import PlannerClient
+from support.ros_fixtures import RosRun, domain_id
+
+
+@pytest.fixture
+def start_process():
+    processes = []
+
+    def start(*parameters):
+        arguments = [word for text in parameters for word in ("-p", text)]
+        module = "rover_planner.nodes.traverse_server"
+        process = subprocess.Popen(
+            [sys.executable, "-m", module, "--ros-args", *arguments],
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "PYTHONUNBUFFERED": "1"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def read_until(process, text):
+    """Return the output up to a line with a text in it."""
+    lines = []
+    for line in process.stdout:
+        lines.append(line)
+        if text in line:
+            return lines
+    raise AssertionError(f"ended without {text!r}: {''.join(lines)}")
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_it_says_what_it_does_and_ends_cleanly(start_process, how):
+    process = start_process()
+    lines = read_until(process, "ready for rover lsr1")
+    assert "compiling kernels" in "".join(lines)
+    process.send_signal(how)
+    rest, _ = process.communicate(timeout=20.0)
+    assert process.returncode == 0 and "Traceback" not in rest
+
+
+def test_another_process_gets_an_answer(start_process, tmp_path):
+    save_terrain(tmp_path / "flat.npz", Terrain(np.zeros((101, 101)), 0.05, (-2.5, -2.5)))
+    run = RosRun()
+    try:
+        client = run.spin(PlannerClient(run))
+        process = start_process(f"terrain_file:={tmp_path / 'flat.npz'}")
+        read_until(process, "ready for rover lsr1")
+        plan, results = client.next_results(
+            lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+        )
+        assert len(plan.poses) == 21 and len(results["plan"].poses) == 21
+    finally:
+        run.close()
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        ("friction:=.nan", "friction"),
+        ("rover:=lsr9", "lsr9"),
+        ("policy:=fair", "fair"),
+        ("candidate_count:=9.5", "candidate_count"),
+    ],
+)
+def test_a_wrong_parameter_ends_it_with_one_line(start_process, parameter, text):
+    process = start_process(parameter)
+    output, _ = process.communicate(timeout=180.0)
+    assert process.returncode == 2 and "Traceback" not in output
+    assert text in output.strip().splitlines()[-1]

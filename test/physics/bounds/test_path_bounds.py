@@ -1,0 +1,296 @@
+"""Bounds on uncertain maps hold the prediction and what maps drawn at random give."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
+from rover_physics.bounds.pose import BOUNDED, OFF_MAP_NEAR, ON_EDGE, UNKNOWN_NEAR
+from rover_physics.errors import ModelError, TerrainError
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.traversability.bounded_verdict import judge_bounds
+from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.verdict import judge
+from support.rough_grounds import fractal, plane, rocky
+from support.uncertain_grounds import (
+    draw_path,
+    path_across,
+    step,
+    uncertain_grounds,
+    with_std,
+)
+
+SLOPE = plane(0.2, 0.1, half=3.0)
+LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
+PATH = path_across(4)
+
+
+def bounds_on(rover, terrain, poses=PATH, sigmas=3.0, **arguments):
+    prediction = sweep_path(rover, terrain, poses, **arguments)
+    return prediction, bound_path(rover, terrain, prediction, sigmas, **arguments)
+
+
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
+@pytest.mark.parametrize("ground", ["level", "slope", "rocks", "relief", "step"])
+def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground):
+    """Errors of each cell on its own, over a wheel and over the rover; both policies."""
+    terrain = uncertain_grounds(rover)[ground]
+    waypoints = outside = unbounded = 0
+    cases = [(0.0, 0.001), (0.0, 0.005), (rover.wheel.radius, 0.003), (0.8, 0.005)]
+    for seed, (length, std) in enumerate(cases):
+        for policy in ("equal", "optimal"):
+            outcome = draw_path(
+                rover, with_std(terrain, std), path_across(seed), length, 8, seed, policy
+            )
+            waypoints += outcome.waypoints
+            outside += outcome.outside["any"]
+            unbounded += outcome.unbounded
+    assert waypoints > 1500
+    assert unbounded <= 0.03 * len(PATH) * 8
+    assert outside <= 1e-3 * waypoints
+
+
+@pytest.mark.parametrize("length", [0.0, 0.1, 0.8])
+def test_bounds_are_of_the_size_of_what_happens(length):
+    """Not infinitely wide: that would be conservative, too."""
+    outcome = draw_path(LSR1, with_std(fractal(2), 0.003), PATH, length, 40, 1)
+    widest = {0.0: 8.0, 0.1: 8.0, 0.8: 40.0}[length]
+    for name in ("roll", "pitch", "friction_utilisation", "torque_saturation"):
+        assert 1.0 < outcome.widths[name] < widest, name
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+@pytest.mark.parametrize("terrain", [rocky(3), fractal(2), step(0.05)], ids=str)
+def test_bounds_hold_the_prediction(terrain, policy):
+    prediction, bounds = bounds_on(LSR1, with_std(terrain, 0.002), policy=policy)
+    assert bounds.bounded.sum() >= len(PATH) - 1
+    for name in BOUNDED_VALUES:
+        value, limits = getattr(prediction, name), getattr(bounds, name)
+        assert limits.shape == (*value.shape, 2)
+        rows = bounds.bounded
+        assert np.all(limits[rows, ..., 0] <= value[rows]), name
+        assert np.all(limits[rows, ..., 1] >= value[rows]), name
+
+
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
+@pytest.mark.parametrize("terrain", [SLOPE, fractal(2)], ids=["slope", "relief"])
+def test_certain_heights_have_bounds_of_no_width(rover, terrain):
+    prediction, bounds = bounds_on(rover, with_std(terrain, 0.0))
+    assert bounds.bounded.all()
+    for name in set(BOUNDED_VALUES) - {"friction_utilisation", "torque_saturation"}:
+        width = np.ptp(getattr(bounds, name), axis=-1)
+        scale = rover.weight if name == "wheel_loads" else 1.0
+        assert width.max() < 1e-6 * scale, name
+    for name in ("friction_utilisation", "torque_saturation"):
+        highest = getattr(bounds, name)[..., 1]
+        np.testing.assert_allclose(highest, getattr(prediction, name), atol=1e-6)
+
+
+def test_more_sigmas_mean_wider_bounds():
+    terrain = with_std(fractal(2), 0.002)
+    narrow = bounds_on(LSR1, terrain, sigmas=1.0)[1]
+    wide = bounds_on(LSR1, terrain, sigmas=3.0)[1]
+    assert narrow.bounded.all()
+    assert wide.bounded.all()
+    for name in BOUNDED_VALUES:
+        inner, outer = getattr(narrow, name), getattr(wide, name)
+        slack = 1e-6 + 0.01 * np.ptp(outer, axis=-1)
+        assert np.all(outer[..., 0] <= inner[..., 0] + slack), name
+        assert np.all(outer[..., 1] >= inner[..., 1] - slack), name
+
+
+def test_a_uniform_shift_of_wheels_gives_the_height_of_geometry():
+    """On level ground roll is extreme with one side high and the other low."""
+    bounds = bounds_on(LSR1, with_std(plane(0.0, 0.0, half=3.0), 0.002))[1]
+    track = 2.0 * LSR1.suspension.wheels["rear"][1]
+    np.testing.assert_allclose(bounds.roll[:, 1], np.arcsin(0.012 / track), rtol=0.01)
+    np.testing.assert_allclose(bounds.roll[:, 0], -bounds.roll[:, 1], rtol=0.01)
+    np.testing.assert_allclose(bounds.tilt[:, 0], 0.0, atol=1e-9)
+    assert np.all(bounds.tilt[:, 1] > bounds.roll[:, 1])
+
+
+def test_only_errors_under_the_rover_matter():
+    std = np.zeros(fractal(2).elevation.shape)
+    std[:40] = 0.01
+    terrain = replace(fractal(2), elevation_std=std)
+    far = bounds_on(LSR1, terrain, np.array([[0.0, 1.5, 0.0]]))[1]
+    near = bounds_on(LSR1, terrain, np.array([[0.0, -1.8, 0.0]]))[1]
+    assert np.ptp(far.roll) < 1e-9
+    assert np.ptp(near.roll) > 0.02
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    std=st.floats(0.0, 0.02),
+    sigmas=st.floats(0.1, 4.0),
+    rough=st.booleans(),
+    policy=st.sampled_from(["equal", "optimal"]),
+)
+def test_the_verdict_is_never_less_cautious(seed, std, sigmas, rough, policy):
+    ground = rocky(seed % 5) if rough else fractal(seed % 5, roughness=0.1)
+    poses = path_across(seed, 10)
+    nominal = judge_path(LSR1, ground, poses, policy=policy)[1]
+    uncertain = with_std(ground, std)
+    prediction, cautious = judge_path(LSR1, uncertain, poses, sigmas=sigmas, policy=policy)
+    assert prediction.bounds is not None
+    for i, (code, reason) in enumerate(zip(nominal.codes, nominal.reasons, strict=True)):
+        if code:
+            assert (cautious.codes[i], cautious.reasons[i]) == (code, reason)
+    if not nominal.traversable:
+        assert not cautious.traversable
+        assert cautious.first_failure <= nominal.first_failure
+    assert cautious.traversable == (cautious.first_failure < 0) == (not any(cautious.codes))
+    assert cautious.map_sigmas == sigmas
+    if prediction.bounds.bounded.any():
+        assert cautious.tilt_bound >= nominal.max_tilt - 1e-9 or not all(prediction.bounds.bounded)
+
+
+def test_a_limit_that_may_be_broken_is_refused_and_says_so():
+    terrain = with_std(plane(0.0, 0.0, half=3.0), 0.004)
+    slippery = judge_path(LSR1, terrain, PATH, friction=0.3)[1]
+    assert not slippery.traversable
+    assert slippery.code == "friction"
+    assert "slips: friction utilisation" in slippery.reason
+    assert slippery.reason.endswith("limit 1.00, at worst within 3 sigma of the map")
+    assert slippery.friction_utilisation_bound > 1.0 > slippery.max_friction_utilisation
+    assert judge_path(LSR1, terrain, PATH, friction=0.3, sigmas=0.5)[1].traversable
+
+
+@pytest.mark.parametrize(
+    ("limits", "code"),
+    [
+        ({"tilt": 0.03}, "tilt"),
+        ({"belly_clearance": 0.22}, "belly"),
+        ({"tip_over_ratio": 0.97}, "tip_over"),
+        ({"torque_saturation": 0.05}, "torque"),
+    ],
+)
+def test_each_limit_is_held_against_its_bound(limits, code):
+    rover = replace(LSR1, limits=replace(LSR1.limits, **limits))
+    ground = plane(0.0, 0.0, half=3.0)
+    assert judge_path(rover, ground, PATH)[1].traversable
+    verdict = judge_path(rover, with_std(ground, 0.004), PATH)[1]
+    assert verdict.code == code
+    assert set(verdict.codes) == {code}
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_suspension_angles_are_held_against_both_of_their_limits(end):
+    limits = (-0.02, 0.9) if end == 0 else (-0.9, 0.02)
+    rover = replace(LSR1, suspension=replace(LSR1.suspension, bogie_limits=limits))
+    verdict = judge_path(rover, with_std(plane(0.0, 0.0, half=3.0), 0.004), PATH)[1]
+    assert verdict.code == "suspension"
+    assert ("-0.02" if end == 0 else "0.02") in verdict.reason
+
+
+def test_a_verdict_keeps_reasons_that_hold_without_doubt():
+    ground = with_std(plane(0.0, 0.9, half=3.0), 0.001)
+    nominal = judge_path(LSR1, ground, PATH, sigmas=None)[1]
+    cautious = judge_path(LSR1, ground, PATH)[1]
+    assert not nominal.traversable
+    assert cautious.reason == nominal.reason
+    assert "sigma" not in cautious.reason
+
+
+def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
+    """Just before its front wheels climb, noise decides on which level they stand."""
+    ground = with_std(step(1.6 * M2020.wheel.radius), 0.006)
+    x = np.arange(-1.2, 0.0, 0.02)
+    poses = np.column_stack([x, 0.0 * x + 0.05, 0.0 * x + 0.03])
+    prediction, bounds = bounds_on(M2020, ground, poses)
+    edges = bounds.status == ON_EDGE
+    assert 0 < edges.sum() < 0.2 * len(x)
+    assert np.all(np.isnan(bounds.roll[edges]))
+    verdict = judge_bounds(M2020, prediction, bounds, judge(M2020, prediction))
+    reasons = {verdict.reasons[i] for i in np.flatnonzero(edges) if "edge" in verdict.reasons[i]}
+    assert reasons == {"a wheel may climb or fall off an edge within 3 sigma of the map"}
+
+
+@pytest.mark.parametrize(
+    ("last", "status", "code"),
+    [(49, UNKNOWN_NEAR, "unknown_ground"), (60, OFF_MAP_NEAR, "off_map")],
+)
+def test_unknown_ground_and_the_end_of_the_map_within_reach_are_told_apart(last, status, code):
+    """A wheel that stands just clear of them may be turned over them by errors of 5 cm."""
+    ground = plane(0.0, 0.0, half=1.2)
+    elevation = ground.elevation.copy()
+    elevation[:, last + 1 :] = np.nan
+    ground = replace(ground, elevation=elevation, elevation_std=np.full(elevation.shape, 0.015))
+    edge = ground.origin[0] + ground.resolution * last
+    poses = np.array([[edge - 0.501, 0.0, 0.0], [edge - 0.7, 0.0, 0.0]])
+    prediction, bounds = bounds_on(LSR1, ground, poses)
+    assert prediction.settled.all()
+    assert bounds.status.tolist() == [status, BOUNDED]
+    verdict = judge_path(LSR1, ground, poses)[1]
+    assert verdict.codes[0] == code
+    assert verdict.reasons[0].endswith("within 3 sigma of the map")
+
+
+def test_a_map_without_the_layer_or_sigmas_has_no_bounds():
+    certain, uncertain = fractal(2), with_std(fractal(2), 0.01)
+    assert judge_path(LSR1, certain, PATH)[0].bounds is None
+    for sigmas in (None, 0.0):
+        prediction, verdict = judge_path(LSR1, uncertain, PATH, sigmas=sigmas)
+        assert prediction.bounds is None
+        assert verdict.map_sigmas == 0.0
+        assert np.isnan(verdict.tilt_bound)
+
+
+@pytest.mark.parametrize("sigmas", [-1.0, float("nan"), float("inf")])
+def test_impossible_sigmas_are_refused(sigmas):
+    with pytest.raises(ModelError, match=f"sigmas is {sigmas}"):
+        judge_path(LSR1, fractal(2), PATH, sigmas=sigmas)
+
+
+@pytest.mark.parametrize(
+    ("std", "word"),
+    [
+        (np.full((3, 4), 0.01), "shape"),
+        (np.full((5, 5), -0.01), "at least 0"),
+        (np.full((5, 5), np.nan), "where the height is known"),
+        (np.full((5, 5), np.inf), "finite"),
+    ],
+)
+def test_wrong_layers_are_refused(std, word):
+    with pytest.raises(TerrainError, match="elevation_std.*" + word):
+        Terrain(np.zeros((5, 5)), 0.1, elevation_std=std)
+
+
+def test_the_layer_goes_through_a_file(tmp_path):
+    terrain = with_std(fractal(2), 0.003)
+    save_terrain(tmp_path / "map.npz", terrain)
+    again = load_terrain(tmp_path / "map.npz")
+    first, second = (bounds_on(LSR1, ground)[1] for ground in (terrain, again))
+    np.testing.assert_array_equal(first.friction_utilisation, second.friction_utilisation)
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_soil_and_its_sinkage_are_bounded(policy):
+    terrain = with_std(fractal(2, roughness=0.03), 0.001)
+    prediction, bounds = bounds_on(LSR1, terrain, soil="dry_sand", policy=policy)
+    assert bounds.bounded.all()
+    assert np.all(bounds.sinkage[..., 1] > prediction.sinkage)
+    assert np.all(bounds.friction_utilisation[..., 1] > prediction.friction_utilisation)
+    outcome_limit = bounds.torque_saturation[..., 1]
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        error = 0.001 * rng.standard_normal(terrain.elevation.shape)
+        sample = replace(terrain, elevation=terrain.elevation + error)
+        swept = sweep_path(LSR1, sample, PATH, soil="dry_sand", policy=policy)
+        assert np.all(swept.friction_utilisation <= bounds.friction_utilisation[..., 1])
+        assert np.all(swept.torque_saturation <= outcome_limit)
+
+
+def test_the_worst_friction_within_reach_counts():
+    terrain = with_std(plane(0.2, 0.0, half=3.0), 0.003)
+    patchy = np.full(terrain.elevation.shape, 0.8)
+    patchy[:, ::2] = 0.4
+    sure = bounds_on(LSR1, terrain)[1].friction_utilisation[..., 1]
+    mixed = bounds_on(LSR1, replace(terrain, friction=patchy))[1].friction_utilisation[..., 1]
+    np.testing.assert_allclose(mixed, 2.0 * sure, rtol=1e-6)

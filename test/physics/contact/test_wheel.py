@@ -1,0 +1,216 @@
+"""Contact: a wheel's gap is the smallest over its lower half, and it touches where that is."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from rover_physics.contact.contact_record import (
+    EXACT,
+    FULL,
+    OFF_MAP,
+    QUICK,
+    TOUCHING,
+    UNKNOWN_GROUND,
+    new_touch,
+)
+from rover_physics.contact.wheel import find_contact, find_touch
+from rover_physics.contact.wheel_samples import sample_wheel
+from rover_physics.numerics.records import new_record
+from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.ground import pack_ground
+from support.rough_grounds import RESOLUTION, fractal, plane, rocky, smooth
+
+LSR1 = load_rover("lsr1")
+RADIUS, WIDTH = LSR1.wheel.radius, LSR1.wheel.width
+LINKAGE = pack_linkage(LSR1, 5.0, np.array([0.0, 0.0, 0.05]))
+few = settings(max_examples=30, deadline=None)
+
+
+class WheelOn:
+    """The first wheel of a rover, put with its centre somewhere over a ground."""
+
+    def __init__(self, ground: Terrain, centre, scope, roll=0.0, pitch=0.0, yaw=0.0):
+        self.samples = sample_wheel(LSR1, ground.resolution)
+        self.placement, self.touch = new_record(PLACEMENT), new_touch()
+        q = np.array([0.0, roll, pitch, 0.0, 0.0, 0.0])
+        place(LINKAGE, 0.0, 0.0, yaw, q, self.placement)
+        self.placement.centres[0] = centre
+        self.ground = pack_ground(ground)
+        record = self.ground.records[0]
+        for step in (QUICK, scope):
+            self.status = find_touch(record, self.samples, self.placement, 0, step, self.touch)
+
+    @property
+    def gap(self) -> float:
+        return self.touch.gap[0]
+
+    @property
+    def angle(self) -> float:
+        return np.arctan2(self.touch.sine[0], self.touch.cosine[0])
+
+    def share(self) -> "WheelOn":
+        """Let the circles that are nearly as near share the load."""
+        find_contact(self.samples, self.placement, 0, self.touch)
+        return self
+
+
+def circles(samples) -> np.ndarray:
+    """Return where the circles of a wheel are across its width [m]."""
+    return samples.laterals[: samples.circles]
+
+
+def dense_gap(ground, centre, roll, pitch, yaw, laterals) -> float:
+    """Return the smallest gap over many points of the lower half of the wheel."""
+    axis = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()[:, 1]
+    ahead = np.cross(axis, [0.0, 0.0, 1.0])
+    ahead /= np.linalg.norm(ahead)
+    upward = np.cross(ahead, axis)
+    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 4001)[:, None, None]
+    rim = RADIUS * (np.sin(angle) * ahead - np.cos(angle) * upward)
+    points = np.asarray(centre) + rim + np.asarray(laterals)[None, :, None] * axis
+    return (points[..., 2] - ground.elevation_at(points[..., 0], points[..., 1])).min()
+
+
+@pytest.mark.parametrize("scope", [FULL, EXACT])
+@pytest.mark.parametrize("height", [0.05, 0.10, 0.30])
+def test_over_level_ground_the_gap_is_the_height_less_the_radius(scope, height):
+    wheel = WheelOn(plane(0.0, 0.0, height=0.4), [0.013, -0.007, 0.4 + height], scope)
+    assert wheel.status == TOUCHING
+    assert wheel.gap == pytest.approx(height - RADIUS, abs=1e-12)
+    assert wheel.angle == pytest.approx(0.0, abs=1e-6)
+
+
+def test_on_level_ground_an_upright_wheel_touches_in_its_middle():
+    wheel = WheelOn(plane(0.0, 0.0), [0.013, -0.007, RADIUS], FULL, yaw=0.6).share()
+    assert wheel.touch.point[0] == pytest.approx([0.013, -0.007, 0.0], abs=1e-9)
+
+
+@few
+@given(st.floats(-0.8, 0.8), st.floats(-np.pi, np.pi))
+def test_on_a_plane_the_contact_angle_is_the_slope_along_the_heading(slope, yaw):
+    along = np.arctan(slope * np.cos(yaw))
+    cross = np.arctan(slope * np.sin(yaw) * np.cos(along))
+    attitude = Rotation.from_euler("ZYX", [yaw, -along, -cross])
+    normal = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
+    assert attitude.apply([0.0, 0.0, 1.0]) == pytest.approx(normal)
+    wheel = WheelOn(plane(slope, 0.0), normal * RADIUS, FULL, -cross, -along, yaw).share()
+    assert wheel.gap == pytest.approx(0.0, abs=1e-8)
+    assert wheel.touch.point[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    below = attitude.as_matrix()[:, 1]
+    ahead = np.cross(below, [0.0, 0.0, 1.0])
+    assert np.sin(wheel.angle) == pytest.approx(-normal @ ahead / np.linalg.norm(ahead), abs=1e-6)
+
+
+@pytest.mark.parametrize(("slope", "sign"), [(0.3, 1.0), (-0.3, -1.0)])
+def test_contact_angles_are_positive_uphill(slope, sign):
+    wheel = WheelOn(plane(slope, 0.0), [0.0, 0.0, 0.2], FULL)
+    assert wheel.angle == pytest.approx(sign * np.arctan(0.3), abs=1e-5)
+
+
+@pytest.mark.parametrize(("roll", "side"), [(0.2, -1.0), (-0.2, 1.0)])
+def test_a_leaning_wheel_stands_on_its_lower_edge(roll, side):
+    wheel = WheelOn(plane(0.0, 0.0), [0.0, 0.0, 0.2], FULL, roll=roll).share()
+    lowest = RADIUS * np.cos(roll) + 0.5 * WIDTH * np.sin(abs(roll))
+    assert wheel.gap == pytest.approx(0.2 - lowest, abs=1e-9)
+    across = RADIUS * np.sin(roll) + side * 0.5 * WIDTH * np.cos(roll)
+    assert wheel.touch.point[0, 1] == pytest.approx(across, abs=1e-9)
+
+
+def block(height: float) -> Terrain:
+    """Return level ground with a block of `height` [m] from x = 0 on."""
+    x = (np.arange(241) - 120) * 0.005
+    profile = np.where(x >= 0.0, height, 0.0)
+    return Terrain(np.broadcast_to(profile, (61, 241)), 0.005, (x[0], -0.15))
+
+
+@pytest.mark.parametrize("distance", [0.02, 0.05, 0.08])
+def test_before_an_edge_the_wheel_rests_on_the_edge(distance):
+    wheel = WheelOn(block(0.06), [-distance, 0.0, 0.3], FULL)
+    above = 0.06 + np.sqrt(RADIUS**2 - distance**2)
+    assert wheel.gap == pytest.approx(0.3 - above, abs=2e-4)
+    assert wheel.angle == pytest.approx(np.arcsin(distance / RADIUS), abs=5e-3)
+
+
+def test_behind_an_edge_the_contact_is_behind_the_axle():
+    wheel = WheelOn(block(0.06), [-0.05, 0.0, 0.3], FULL, yaw=np.pi)
+    assert wheel.angle == pytest.approx(-np.arcsin(0.5), abs=5e-3)
+
+
+def test_out_of_reach_of_an_edge_the_wheel_stands_on_the_ground():
+    wheel = WheelOn(block(0.06), [-0.12, 0.0, RADIUS], FULL)
+    assert wheel.gap == pytest.approx(0.0, abs=1e-12)
+    assert wheel.angle == pytest.approx(0.0, abs=1e-6)
+
+
+@few
+@given(
+    st.sampled_from([smooth, fractal, rocky]),
+    st.integers(0, 30),
+    st.floats(-0.4, 0.4),
+    st.floats(-0.4, 0.4),
+    st.floats(-np.pi, np.pi),
+)
+def test_the_exact_gap_is_the_smallest_on_the_circles_looked_at(make, seed, roll, pitch, yaw):
+    ground = make(seed)
+    x, y = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
+    centre = [x, y, float(ground.elevation_at(x, y)) + RADIUS]
+    exact = WheelOn(ground, centre, EXACT, roll, pitch, yaw)
+    full = WheelOn(ground, centre, FULL, roll, pitch, yaw)
+    dense = dense_gap(ground, centre, roll, pitch, yaw, circles(exact.samples))
+    assert exact.gap == pytest.approx(dense, abs=2e-4)
+    assert exact.gap <= full.gap + 2e-6
+    assert full.gap == pytest.approx(dense, abs=1.5e-3)
+
+
+@few
+@given(st.integers(0, 30), st.floats(-0.4, 0.4), st.floats(-np.pi, np.pi))
+def test_the_touching_point_is_on_the_rim_and_in_the_gap_to_a_tenth_of_a_millimetre(
+    seed, roll, yaw
+):
+    ground = fractal(seed)
+    wheel = WheelOn(ground, [0.1, 0.2, 0.5], FULL, roll, 0.0, yaw)
+    point, axis = wheel.touch.point[0], wheel.placement.R[:, 1]
+    arm = point - [0.1, 0.2, 0.5]
+    assert np.linalg.norm(arm - (arm @ axis) * axis) == pytest.approx(RADIUS, abs=1e-12)
+    assert abs(arm @ axis) <= 0.5 * WIDTH + 1e-12
+    height = float(ground.elevation_at(point[0], point[1]))
+    assert point[2] - height == pytest.approx(wheel.gap, abs=1e-4)
+
+
+@few
+@given(st.integers(0, 30), st.floats(-1e-3, 1e-3))
+def test_the_normal_says_how_the_gap_changes_sideways(seed, step):
+    ground = smooth(seed)
+    here = WheelOn(ground, [0.1, 0.2, 0.3], FULL)
+    there = WheelOn(ground, [0.1 + step, 0.2, 0.3], FULL)
+    assert there.gap - here.gap == pytest.approx(here.touch.normal[0, 0] * step, abs=5e-6)
+
+
+@pytest.mark.parametrize("scope", [FULL, EXACT])
+def test_unknown_ground_and_the_map_edge_are_told_apart(scope):
+    ground = plane(0.0, 0.0)
+    heights = ground.elevation.copy()
+    heights[:, heights.shape[1] // 2 + 10] = np.nan
+    holed = Terrain(heights, ground.resolution, ground.origin)
+    edge = ground.bounds[1]
+    assert WheelOn(holed, [0.0, 0.0, 0.1], scope).status == TOUCHING
+    assert WheelOn(holed, [10 * RESOLUTION - 0.12, 0.0, 0.1], scope).status == UNKNOWN_GROUND
+    assert WheelOn(holed, [10 * RESOLUTION, 0.0, 0.1], scope).status == UNKNOWN_GROUND
+    assert WheelOn(ground, [edge - 0.09, 0.0, 0.1], scope).status == OFF_MAP
+    assert np.isnan(WheelOn(ground, [edge + 5.0, 0.0, 0.1], scope).gap)
+
+
+@pytest.mark.parametrize("resolution", [0.005, 0.02, 0.05, 0.2])
+def test_samples_span_the_wheel_and_are_as_dense_as_the_cells_or_enough(resolution):
+    samples = sample_wheel(LSR1, resolution)
+    angles = np.arctan2(samples.sines, samples.cosines)[: samples.rows]
+    laterals = circles(samples)
+    assert angles[[0, -1]] == pytest.approx([-0.5 * np.pi, 0.5 * np.pi])
+    assert laterals[[0, -1]] == pytest.approx([-0.5 * WIDTH, 0.5 * WIDTH])
+    assert laterals.size >= 3
+    assert laterals[laterals.size // 2] == 0.0
+    assert RADIUS * np.diff(angles).max() <= max(resolution, 0.01)

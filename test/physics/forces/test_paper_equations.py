@@ -1,0 +1,323 @@
+"""Equations (1) to (15) of the paper hold on settled poses and the forces found there.
+
+The paper: Hacot, Dubowsky and Bidaud, "Analysis and Simulation of a Rocker-Bogie Exploration
+Rover". Misprints are mended as docs/physics.md lists them. Each equation is tested twice: in 3-D,
+to rounding error, on rough ground with all weights; and as the paper has it, for small roll and
+weightless links, with the error that its own simplifications explain.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Part, Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from support.grounds import make_terrain
+from support.reference_cases import reference_predictions
+from support.rough_grounds import fractal, random_poses, rocky, smooth
+from support.rover_geometry import (
+    UP,
+    attitude_of,
+    contact_frames,
+    place_rover,
+    turned_round,
+    wheel_gaps,
+)
+
+LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
+ROUNDING = 1e-9
+POLICIES = ("equal", "optimal")
+
+
+# Where they are tested
+
+
+def waves_and_side_slope(roll: float) -> Terrain:
+    """Return waves along x on a slope along y: it rolls the rover everywhere by about `roll`."""
+    return make_terrain(lambda x, y: 0.06 * np.sin(2.0 * x) + np.tan(roll) * y, 0.02, 2.0)
+
+
+ALONG_WAVES = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros(41), np.zeros(41)])
+
+
+@lru_cache(maxsize=4)
+def on_rough_ground(policy: str) -> list[tuple[PathPrediction, int]]:
+    predictions = [
+        sweep_path(LSR1, make(11), random_poses(2, 30, 0.5), policy=policy)
+        for make in (smooth, fractal, rocky)
+    ]
+    return [(p, i) for p in predictions for i in np.flatnonzero(p.settled)]
+
+
+def weightless_links(rover: Rover) -> Rover:
+    """Return `rover` with all its mass in the body, at the origin between the rocker pivots."""
+    tiny = 1e-12
+    masses = rover.masses
+    body = Part(rover.total_mass, (0.0, 0.0, 0.0))
+    links = {name: replace(getattr(masses, name), mass=tiny) for name in ("rocker", "bogie")}
+    return replace(
+        rover,
+        wheel=replace(rover.wheel, mass=tiny),
+        masses=replace(masses, body=body, **links),
+        manipulator=None,
+    )
+
+
+# Kinematics: eqs (1) to (7)
+
+
+class Links(NamedTuple):
+    """The paper's lengths and angles of a rover with the bogie ahead, see docs/physics.md."""
+
+    l1: float
+    l2: float
+    l3: float
+    l4: float
+    alpha: float
+    beta: float
+    gamma: float
+    middle: float
+    """Elevation of the middle wheel from the bogie pivot on flat ground [rad]."""
+    w: float
+
+
+def links_of(rover: Rover) -> Links:
+    def link(start, end):
+        along, up = end[0] - start[0], end[2] - start[2]
+        return np.hypot(along, up), np.arctan2(up, along)
+
+    suspension = rover.suspension
+    l1, rear = link(suspension.rocker_pivot, suspension.wheels["rear"])
+    l2, bogie = link(suspension.rocker_pivot, suspension.bogie_pivot)
+    l3, middle = link(suspension.bogie_pivot, suspension.wheels["middle"])
+    l4, front = link(suspension.bogie_pivot, suspension.wheels["front"])
+    w = 2.0 * suspension.rocker_pivot[1]
+    return Links(l1, l2, l3, l4, bogie - rear, front - middle, rear, middle, w)
+
+
+def closure(rover: Rover, prediction: PathPrediction, i: int, small_roll: bool) -> dict:
+    """Return what is left of eqs (1) and (3) to (7), by their numbers [rad, m].
+
+    Exact: the paper's roll is the camber of the wheels, positive when the right side is high, and
+    its link angles are elevations in the plane of the wheels. Small roll: roll and pitch are those
+    of the body instead.
+    """
+    k = links_of(rover)
+    R = attitude_of(prediction, i)
+    nose_up, roll = np.arctan2(R[2, 0], R[2, 2]), -np.arcsin(R[2, 1])
+    if small_roll:
+        nose_up, roll = -prediction.pitch[i], -prediction.roll[i]
+    rockers = nose_up - prediction.rocker_angle[i]
+    theta1, theta3 = k.gamma + rockers
+    theta2, theta4 = k.middle + rockers - prediction.bogie_angle[i]
+    z1r, z2r, z3r, z1l, z2l, z3l = prediction.wheel_centres[i, :, 2]
+    c, s = np.cos(roll), np.sin
+    across = k.w * s(roll)
+    to_pivot = k.l3 * s(theta2) + k.l2 * s(theta1 + k.alpha)
+    to_left_bogie = to_pivot - k.l2 * s(theta3 + k.alpha)
+    return {
+        1: (theta1 + theta3) / 2.0 - k.gamma - nose_up,
+        3: z2r - z3r - c * (k.l3 * s(theta2) - k.l4 * s(theta2 + k.beta)),
+        4: z2r - z1r - c * (to_pivot - k.l1 * s(theta1)),
+        5: z2r - z1l - c * (to_pivot - k.l1 * s(theta3)) - across,
+        6: z2r - z2l - c * (to_left_bogie - k.l3 * s(theta4)) - across,
+        7: z2r - z3l - c * (to_left_bogie - k.l4 * s(theta4 + k.beta)) - across,
+    }
+
+
+def test_eqs_1_and_3_to_7_hold_in_3d_wherever_the_rover_settles():
+    cases = [(p, i) for _, p in reference_predictions() for i in np.flatnonzero(p.settled)]
+    for prediction, i in cases + on_rough_ground("equal"):
+        left = closure(LSR1, prediction, i, small_roll=False)
+        assert max(map(abs, left.values())) <= 1e-12
+
+
+def test_eq_2_puts_the_middle_right_wheel_on_the_ground():
+    ground = smooth(11)
+    prediction = sweep_path(LSR1, ground, random_poses(2, 20, 0.5))
+    across = np.linspace(-0.5, 0.5, 5) * LSR1.wheel.width
+    for i in np.flatnonzero(prediction.settled):
+        assert abs(wheel_gaps(LSR1, ground, prediction, i, across)[1]) <= 2e-4
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.03, -0.06, 0.1])
+def test_eqs_1_and_3_to_7_hold_for_small_roll_as_the_paper_has_them(roll):
+    """The body's roll and pitch differ from those of the wheels' plane by products of both.
+
+    sin(camber) = cos(pitch) sin(roll) and tan(elevation) = tan(pitch) / cos(roll), so by
+    |roll| pitch^2 / 2 and |pitch| roll^2 / 2: millimetres at most, less than the 2 mm that the
+    paper allows its own solution.
+    """
+    k = links_of(LSR1)
+    prediction = sweep_path(LSR1, waves_and_side_slope(roll), ALONG_WAVES)
+    assert prediction.settled.all() and np.abs(prediction.pitch).max() > 0.05
+    for i in range(len(ALONG_WAVES)):
+        pitch, rolled = abs(prediction.pitch[i]), abs(prediction.roll[i])
+        length = k.l1 + 2.0 * (k.l2 + k.l3 + k.l4)
+        bound = length * pitch * rolled**2 / 2.0 + k.w * rolled * pitch**2 / 2.0
+        left = closure(LSR1, prediction, i, small_roll=True)
+        assert abs(left.pop(1)) <= 1e-12
+        assert max(map(abs, left.values())) <= 1.2 * bound + 1e-12
+        assert bound <= 2e-3
+
+
+def test_eqs_6_and_7_do_not_agree_as_printed():
+    """z2l - z3l is (7) less (6), and by symmetry (3) with Theta4: so (7) has - l4 sin."""
+    k = links_of(LSR1)
+    prediction, i = on_rough_ground("equal")[0]
+    z2l, z3l = prediction.wheel_centres[i, 4:, 2]
+    R = attitude_of(prediction, i)
+    nose_up, c = np.arctan2(R[2, 0], R[2, 2]), np.cos(np.arcsin(R[2, 1]))
+    theta4 = k.middle + nose_up - prediction.rocker_angle[i, 1] - prediction.bogie_angle[i, 1]
+    middle, front = k.l3 * np.sin(theta4), k.l4 * np.sin(theta4 + k.beta)
+    assert z2l - z3l == pytest.approx(c * (middle - front), abs=1e-12)
+    assert abs(z2l - z3l - c * (middle + front)) > 0.1
+
+
+# Forces: eqs (8) to (15)
+
+
+class Sides(NamedTuple):
+    """What the two sides, right first, do to the body in the frame of the wheels' plane."""
+
+    force: np.ndarray
+    """(2, 3) forces on the body at the rocker pivots: Fx, Fy, Fz [N]."""
+    moment: np.ndarray
+    """(2, 3) moments on the body: Mx, My, Mz [N m]."""
+    bogie: np.ndarray
+    """(2,) moments about the bogie pivots of what hangs on the bogies [N m]."""
+    lever: np.ndarray
+    """(2, 3) rocker pivots from the body origin [m]."""
+
+
+def frame_of(prediction: PathPrediction, i: int) -> np.ndarray:
+    """Return rows x ahead and level, y along the wheels' axis, z up in the wheels' plane."""
+    axis = attitude_of(prediction, i)[:, 1]
+    ahead = np.cross(axis, UP) / np.linalg.norm(np.cross(axis, UP))
+    return np.array([ahead, axis, np.cross(ahead, axis)])
+
+
+def sides_of(rover: Rover, prediction: PathPrediction, i: int) -> Sides:
+    """Cut both rockers off the body: eqs (12) to (15) give what they pass on."""
+    placed, frame = place_rover(rover, prediction, i), frame_of(prediction, i)
+    shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
+    on_wheels = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(prediction, i))
+    force, moment, bogie = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2)
+    acting = [
+        (on_wheels[k], prediction.contact_points[i, k], k // 3, placed.on_bogie[k])
+        for k in range(6)
+    ]
+    acting += [
+        (-mass * rover.gravity * UP, place, side, on_bogie)
+        for mass, place, side, on_bogie in placed.masses
+        if side is not None
+    ]
+    for f, point, side, on_bogie in acting:
+        force[side] += frame @ f
+        moment[side] += frame @ np.cross(point - placed.rocker_pivots[side], f)
+        if on_bogie:
+            bogie[side] += frame[1] @ np.cross(point - placed.bogie_pivots[side], f)
+    lever = (placed.rocker_pivots - placed.origin) @ frame.T
+    return Sides(force, moment, bogie, lever)
+
+
+def planar_sides(rover: Rover, prediction: PathPrediction, i: int) -> Sides:
+    """As `sides_of`, but by the paper's planar sums: links without weight or width."""
+    placed, frame = place_rover(rover, prediction, i), frame_of(prediction, i)
+    angle, N, T, S = (
+        getattr(prediction, name)[i]
+        for name in ("contact_angle", "wheel_loads", "tangential", "lateral")
+    )
+    fx, fz = T * np.cos(angle) - N * np.sin(angle), T * np.sin(angle) + N * np.cos(angle)
+    points = prediction.contact_points[i]
+    force, moment, bogie = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2)
+    for k in range(6):
+        side = k // 3
+        x, _, z = frame @ (points[k] - placed.rocker_pivots[side])
+        force[side] += fx[k], S[k], fz[k]
+        moment[side] += -z * S[k], z * fx[k] - x * fz[k], x * S[k]
+        if placed.on_bogie[k]:
+            x, _, z = frame @ (points[k] - placed.bogie_pivots[side])
+            bogie[side] += z * fx[k] - x * fz[k]
+    w = 2.0 * rover.suspension.rocker_pivot[1]
+    return Sides(force, moment, bogie, np.array([[0.0, -w / 2, 0.0], [0.0, w / 2, 0.0]]))
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("rover", [LSR1, M2020, turned_round(LSR1)], ids=lambda rover: rover.name)
+def test_eqs_8_to_15_hold_in_3d_with_all_weights(rover, policy):
+    size = rover.wheel.radius / LSR1.wheel.radius
+    ground = smooth(11)
+    ground = replace(
+        ground,
+        elevation=size * ground.elevation,
+        resolution=size * ground.resolution,
+        origin=(size * ground.origin[0], size * ground.origin[1]),
+    )
+    poses = random_poses(2, 30, 0.5) * [size, size, 1.0]
+    prediction = sweep_path(rover, ground, poses, policy=policy)
+    base = rover.suspension.wheels["front"][0] - rover.suspension.wheels["rear"][0]
+    body = rover.masses.body
+    for i in np.flatnonzero(prediction.settled):
+        sides, frame = sides_of(rover, prediction, i), frame_of(prediction, i)
+        weight = frame @ (-body.mass * rover.gravity * UP)
+        com = frame @ attitude_of(prediction, i) @ np.array(body.com)
+        forces = sides.force.sum(axis=0) + weight
+        moments = (
+            sides.moment + np.cross(sides.lever, sides.force)
+        ).sum(axis=0) + np.cross(com, weight)  # fmt: skip
+        assert np.abs(forces).max() <= ROUNDING * rover.weight, "(8), (10)"
+        assert np.abs(moments).max() <= ROUNDING * rover.weight * base, "(9), (11)"
+        assert np.abs(sides.bogie).max() <= ROUNDING * rover.weight * base, "(15)"
+        passed_on = sides.moment[0, 1] - sides.moment[1, 1]
+        assert abs(passed_on) <= ROUNDING * rover.weight * base, "(14) on both sides"
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.03, -0.06, 0.1])
+def test_eqs_8_to_15_hold_for_small_roll_as_the_paper_has_them(roll):
+    """What the paper leaves out explains all that is left.
+
+    It takes W for W cos(roll) in (10): an error of roll^2 / 2. It neglects the width of the side
+    assemblies in (9) and (11): forces times the distance of the contacts from the middle of the
+    wheels, which is under 4 mm on this ground. The links of this rover weigh nothing.
+    """
+    rover = weightless_links(LSR1)
+    prediction = sweep_path(rover, waves_and_side_slope(roll), ALONG_WAVES)
+    assert prediction.settled.all()
+    w, W = 2.0 * rover.suspension.rocker_pivot[1], rover.weight
+    for i in range(len(ALONG_WAVES)):
+        (right, left), (m_right, m_left), bogie, _ = planar_sides(rover, prediction, i)
+        tolerance = 1e-6 * W
+        frame, centres = frame_of(prediction, i), prediction.wheel_centres[i]
+        aside = np.abs((prediction.contact_points[i] - centres) @ frame[1])
+        assert aside.max() <= 4e-3
+        turning = np.hypot(prediction.tangential[i], prediction.wheel_loads[i]) @ aside
+        assert right[0] + left[0] == pytest.approx(0.0, abs=tolerance), "(8)"
+        turn = (right[0] - left[0]) * w / 2 + m_right[2] + m_left[2]
+        assert abs(turn) <= turning + tolerance, "(9)"
+        assert abs(right[2] + left[2] - W) <= W * prediction.roll[i] ** 2 / 2 + tolerance, "(10)"
+        tip = (left[2] - right[2]) * w / 2 + m_right[0] + m_left[0]
+        assert abs(tip) <= turning + tolerance, "(11)"
+        assert m_right[1] == pytest.approx(m_left[1], abs=tolerance), "(14)"
+        assert m_right[1] + m_left[1] == pytest.approx(0.0, abs=tolerance), "(14)"
+        assert np.abs(bogie).max() <= tolerance, "(15)"
+
+
+def test_lateral_forces_are_small_and_nearly_equal_where_the_roll_is_small():
+    rover = weightless_links(LSR1)
+    prediction = sweep_path(rover, waves_and_side_slope(0.06), ALONG_WAVES)
+    share = rover.weight * np.sin(0.06) / 6.0
+    assert np.abs(prediction.lateral).mean(axis=1) == pytest.approx(share, rel=0.02)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_torque_is_traction_times_wheel_radius(policy):
+    for prediction, i in on_rough_ground(policy):
+        pulls = LSR1.wheel.radius * prediction.tangential[i]
+        assert prediction.torque[i] == pytest.approx(pulls, abs=1e-12)

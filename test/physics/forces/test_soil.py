@@ -1,0 +1,371 @@
+"""The wheel-soil models against Wong's formulas worked by hand, their limits and their order."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rover_physics.errors import SoilError
+from rover_physics.forces.soil import (
+    COHESION,
+    EXPONENT,
+    K_C,
+    K_PHI,
+    LEAST_FRICTION,
+    SHEAR_MODULUS,
+    TAN_PHI,
+    contact_length,
+    coulomb_slip,
+    effective_friction,
+    find_mobilisation,
+    find_sinkage,
+    is_sinkage_moderate,
+    mobilised_share,
+    motion_resistance,
+    pack_soils,
+    solve_wheel,
+    thrust_at_slip,
+)
+from rover_physics.terrain.soil_file import load_soils
+
+MU = 0.8
+RIGID = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
+SLIP, SINKAGE, RESISTANCE, LARGEST, TORQUE, UTILISATION = range(6)
+
+
+def packed(name):
+    return pack_soils((name,))[1]
+
+
+# Worked from Wong's formulas by hand, with D = 2 r, k = k_c + b k_phi, x = i l / K:
+#
+# Lunar nominal, r = 0.25 m, b = 0.2 m, N = 200 N; k = 1400 + 0.2 x 820000 = 165400 N/m^2
+#   z0 = (3 x 200 / (2 x 165400 x sqrt(0.5)))^(2/3) = 0.002565079^(2/3) = 0.01873846 m
+#   R  = 165400 x 0.01873846^2 / 2 = 29.03843 N
+#   l  = 0.25 arccos(1 - 0.01873846 / 0.25) = 0.25 arccos(0.9250462) = 0.0974098 m
+#   A c + N tan(35 deg) = 0.2 l 170 + 200 x 0.7002075 = 3.311933 + 140.0415 = 143.3534 N
+#   i = 0.2: x = 0.2 x 0.0974098 / 0.0178 = 1.094492; 1 - (1 - exp(-x)) / x = 0.3921469
+#            F = 56.21561 N, F - R = 27.17717 N
+#   i = 1:   x = 5.472461; 0.8180345; F = 117.26806 N, F - R = 88.22963 N
+#
+# Dry sand, r = 0.5 m, b = 0.3 m, N = 2000 N; k = 990 + 0.3 x 1528430 = 459519 N/m^2.1
+#   z0 = (3 x 2000 / (1.9 x 459519))^(2/3.2) = 0.006872174^0.625 = 0.04448195 m
+#   R  = 459519 x 0.04448195^2.1 / 2.1 = 317.1541 N
+#   l  = 0.5 arccos(0.9110361) = 0.2125032 m
+#   A c + N tan(28 deg) = 66.30100 + 1063.4189 = 1129.7199 N
+#   i = 0.2: x = 1.700026; 0.5192301; F = 586.5846 N, F - R = 269.4305 N
+#   i = 1:   x = 8.500128; 0.8823786; F = 996.8407 N, F - R = 679.6866 N
+#
+# LETE sand, r = 0.4 m, b = 0.25 m, N = 3000 N; k = 102000 + 0.25 x 5301000 = 1427250 N/m^1.79
+#   z0 = (3 x 3000 / (2.21 x 1427250 x sqrt(0.8)))^(2/2.58) = 0.003190107^0.7751938 = 0.01161356 m
+#   R  = 1427250 x 0.01161356^1.79 / 1.79 = 274.1163 N
+#   l  = 0.4 arccos(0.9709661) = 0.09662378 m
+#   A c + N tan(31.1 deg) = 31.40273 + 1809.7157 = 1841.1184 N
+#   i = 0.2: x = 1.610396; 0.5031089; F = 926.2831 N, F - R = 652.1668 N
+#   i = 1:   x = 8.051982; 0.8758465; F = 1612.5372 N, F - R = 1338.4209 N
+HAND = [
+    ("lunar_nominal", 0.25, 0.2, 200.0, 0.01873846, 29.03843, 27.17717, 14.0539, 88.22963),
+    ("dry_sand", 0.5, 0.3, 2000.0, 0.04448195, 317.1541, 269.4305, 293.2923, 679.6866),
+    ("lete_sand", 0.4, 0.25, 3000.0, 0.01161356, 274.1163, 652.1668, 370.5132, 1338.4209),
+]
+
+
+@pytest.mark.parametrize(("name", "r", "b", "N", "z0", "R", "pull", "torque", "largest"), HAND)
+def test_the_model_gives_the_values_worked_by_hand(name, r, b, N, z0, R, pull, torque, largest):
+    result = solve_wheel(packed(name), MU, r, b, N, pull, 0.0)
+    assert result[SLIP] == pytest.approx(0.2, abs=2e-6)
+    assert result[SINKAGE] == pytest.approx(z0, rel=1e-6)
+    assert result[RESISTANCE] == pytest.approx(R, rel=1e-6)
+    assert result[TORQUE] == pytest.approx(torque, rel=1e-5)
+    assert result[LARGEST] == pytest.approx(largest, rel=5e-6)
+    assert result[UTILISATION] == pytest.approx(pull / largest, rel=5e-6)
+    assert effective_friction(packed(name), MU, r, b, N) == pytest.approx(largest / N, rel=5e-6)
+
+
+@pytest.mark.parametrize(("name", "r", "b", "N"), [case[:4] for case in HAND])
+def test_the_resistance_is_the_work_of_pressing_the_rut(name, r, b, N):
+    """R = b times the integral of p = (k_c / b + k_phi) z^n; and R / N = 3 sqrt(z0 / D) / ..."""
+    soil = packed(name)
+    z0 = find_sinkage(soil, r, b, N)
+    z = (np.arange(100_000) + 0.5) / 100_000 * z0
+    pressed = b * np.mean((soil[K_C] / b + soil[K_PHI]) * z ** soil[EXPONENT]) * z0
+    n = soil[EXPONENT]
+    assert motion_resistance(soil, b, z0) == pytest.approx(pressed, rel=1e-6)
+    ratio = 3.0 * math.sqrt(z0 / (2.0 * r)) / ((3.0 - n) * (n + 1.0))
+    assert motion_resistance(soil, b, z0) / N == pytest.approx(ratio, rel=1e-12)
+
+
+@pytest.mark.parametrize(("name", "r", "b", "N"), [case[:4] for case in HAND])
+def test_the_pressure_under_the_wheel_carries_its_load(name, r, b, N):
+    """Wong's two-term expansion against the integral over the arc of the rim."""
+    soil = packed(name)
+    z0 = find_sinkage(soil, r, b, N)
+    half_length = math.sqrt(2.0 * r * z0 - z0 * z0)
+    x = (np.arange(100_000) + 0.5) / 100_000 * half_length
+    z = np.sqrt(r * r - x * x) - (r - z0)
+    load = np.mean((soil[K_C] + b * soil[K_PHI]) * z ** soil[EXPONENT]) * half_length
+    assert load == pytest.approx(N, rel=0.06)
+
+
+loads = st.floats(0.5, 2000.0)
+names = st.sampled_from(RIGID)
+wheels = st.tuples(st.floats(0.05, 0.6), st.floats(0.03, 0.5))
+
+
+@given(names, wheels, loads, st.floats(-0.999, 0.999))
+@settings(deadline=None)
+def test_slip_to_pull_and_back_is_the_same_slip(name, wheel, N, slip):
+    soil, (r, b) = packed(name), wheel
+    result = solve_wheel(soil, MU, r, b, N, 0.0, 0.0)
+    assume(result[SINKAGE] < r)
+    pull = thrust_at_slip(soil, r, b, N, slip) - result[RESISTANCE]
+    # Full slip of a long contact is the flat end of an exponential: digits of pull become slip.
+    steepness = contact_length(r, result[SINKAGE]) / soil[SHEAR_MODULUS]
+    again = solve_wheel(soil, MU, r, b, N, pull, 0.0)
+    if result[LARGEST] > 0.0:
+        assert again[UTILISATION] <= 1.0
+    assert again[SLIP] == pytest.approx(slip, abs=1e-10 * (1.0 + steepness))
+
+
+@given(names, wheels, loads, st.floats(-0.9, 0.9), st.floats(1e-6, 0.1))
+@settings(deadline=None)
+def test_slip_rises_with_the_pull_needed(name, wheel, N, share, more):
+    soil, (r, b) = packed(name), wheel
+    largest = solve_wheel(soil, MU, r, b, N, 0.0, 0.0)[LARGEST]
+    assume(largest > 0.0)
+    less, pull = share * largest, (share + more) * largest
+    low = solve_wheel(soil, MU, r, b, N, less, 0.0)
+    high = solve_wheel(soil, MU, r, b, N, pull, 0.0)
+    assert low[SLIP] < high[SLIP]
+    assert low[TORQUE] < high[TORQUE]
+
+
+@given(names, wheels, loads, st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
+@settings(deadline=None)
+def test_forces_within_the_effective_friction_are_within_the_strength(name, wheel, N, t, s):
+    soil, (r, b) = packed(name), wheel
+    friction = effective_friction(soil, MU, r, b, N)
+    assume(friction > LEAST_FRICTION)
+    T, S = t * friction * N, s * friction * N
+    result = solve_wheel(soil, MU, r, b, N, T, S)
+    circle = math.hypot(t, s)
+    assert result[UTILISATION] <= circle * (1.0 + 1e-9)
+    thrust = math.hypot(T + result[RESISTANCE], S)
+    strength = result[LARGEST] + result[RESISTANCE]
+    if abs(thrust / strength - 1.0) > 1e-9:
+        assert (result[UTILISATION] > 1.0) == (thrust > strength)
+    assert -1.0 <= result[SLIP] <= 1.0
+
+
+@given(names, wheels, loads, st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
+@settings(deadline=None)
+def test_utilisation_is_the_share_of_the_largest_forces_in_that_direction(name, wheel, N, t, s):
+    soil, (r, b) = packed(name), wheel
+    largest = solve_wheel(soil, MU, r, b, N, 0.0, 0.0)[LARGEST]
+    assume(largest > 1e-3 * N and math.hypot(t, s) > 1e-3)
+    used = solve_wheel(soil, MU, r, b, N, t * largest, s * largest)[UTILISATION]
+    T, S = t * largest / used, s * largest / used
+    resistance = solve_wheel(soil, MU, r, b, N, T, S)[RESISTANCE]
+    assert math.hypot(T + resistance, S) == pytest.approx(largest + resistance, rel=1e-9)
+
+
+@given(st.floats(0.0, 1.0, exclude_max=True))
+def test_the_mobilisation_found_has_the_share_asked_for(share):
+    x = find_mobilisation(share)
+    assert mobilised_share(x) == pytest.approx(share, rel=1e-9, abs=1e-15)
+
+
+@given(st.floats(0.0, 500.0), st.floats(1e-6, 1.0))
+def test_more_slip_mobilises_more_shear(x, more):
+    assert 0.0 <= mobilised_share(x) < mobilised_share(x + more) < 1.0
+
+
+def test_the_share_is_half_of_a_small_displacement_and_goes_on_smoothly():
+    assert mobilised_share(1e-8) == pytest.approx(0.5e-8, rel=1e-8)
+    assert mobilised_share(1e-3 - 1e-12) == pytest.approx(mobilised_share(1e-3), rel=1e-8)
+    assert find_mobilisation(1e-5 - 1e-15) == pytest.approx(find_mobilisation(1e-5), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_thrust_starts_with_half_the_strength_over_the_shear_modulus(name):
+    """F -> (A c + N tan(phi)) i l / (2 K) for i -> 0."""
+    soil, r, b, N, slip = packed(name), 0.2, 0.15, 80.0, 1e-7
+    length = r * math.acos(1.0 - find_sinkage(soil, r, b, N) / r)
+    strength = b * length * soil[COHESION] + N * soil[TAN_PHI]
+    slope = strength * length / (2.0 * soil[SHEAR_MODULUS])
+    assert thrust_at_slip(soil, r, b, N, slip) / slip == pytest.approx(slope, rel=1e-6)
+    assert thrust_at_slip(soil, r, b, N, -slip) == -thrust_at_slip(soil, r, b, N, slip)
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_slip_is_one_at_the_largest_pull_and_beyond(name):
+    soil, wheel = packed(name), (0.2, 0.15, 80.0)
+    largest = solve_wheel(soil, MU, *wheel, 0.0, 0.0)[LARGEST]
+    at = solve_wheel(soil, MU, *wheel, largest * (1.0 - 1e-12), 0.0)
+    beyond = solve_wheel(soil, MU, *wheel, largest * 1.5, 0.0)
+    assert at[SLIP] == pytest.approx(1.0, abs=1e-9)
+    assert (beyond[SLIP], beyond[UTILISATION]) == (1.0, pytest.approx(1.5))
+    assert beyond[TORQUE] == pytest.approx(0.2 * (1.5 * largest + beyond[RESISTANCE]))
+    assert thrust_at_slip(soil, *wheel, 1.0) == pytest.approx(largest + beyond[RESISTANCE])
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_a_wheel_that_is_dragged_against_its_resistance_rolls_freely(name):
+    soil, wheel = packed(name), (0.2, 0.15, 80.0)
+    resistance = solve_wheel(soil, MU, *wheel, 0.0, 0.0)[RESISTANCE]
+    free = solve_wheel(soil, MU, *wheel, -resistance, 0.0)
+    braked = solve_wheel(soil, MU, *wheel, -1.2 * resistance, 0.0)
+    locked = solve_wheel(soil, MU, *wheel, -10.0 * 80.0, 0.0)
+    assert free[SLIP] == 0.0 and free[TORQUE] == 0.0
+    assert -1.0 < braked[SLIP] < 0.0 and braked[TORQUE] < 0.0
+    assert locked[SLIP] == -1.0 and locked[UTILISATION] > 1.0
+
+
+def test_a_lateral_force_needs_more_slip_but_makes_none_alone():
+    soil, wheel = packed("dry_sand"), (0.2, 0.15, 80.0)
+    straight = solve_wheel(soil, MU, *wheel, 8.0, 0.0)
+    resistance = straight[RESISTANCE]
+    right, left = (solve_wheel(soil, MU, *wheel, 8.0, S) for S in (-9.0, 9.0))
+    assert right == left
+    assert right[SLIP] > straight[SLIP] and right[UTILISATION] > straight[UTILISATION]
+    assert solve_wheel(soil, MU, *wheel, -resistance, 9.0)[SLIP] == 0.0
+
+
+@given(names, wheels, loads, st.floats(1.01, 5.0))
+@settings(deadline=None)
+def test_a_heavier_wheel_sinks_deeper(name, wheel, N, factor):
+    soil = packed(name)
+    assert find_sinkage(soil, *wheel, factor * N) > find_sinkage(soil, *wheel, N)
+
+
+@given(names, wheels, loads, st.floats(1.01, 3.0))
+@settings(deadline=None)
+def test_the_largest_pull_rises_with_the_friction_angle_and_the_cohesion(name, wheel, N, factor):
+    soil = packed(name)
+    assume(find_sinkage(soil, *wheel, N) < wheel[0])
+    before = solve_wheel(soil, MU, *wheel, N, 0.0, 0.0)[LARGEST]
+    for column in (TAN_PHI, COHESION):
+        stronger = soil.copy()
+        stronger[column] *= factor
+        assert solve_wheel(stronger, MU, *wheel, N, 0.0, 0.0)[LARGEST] > before
+
+
+@given(names, wheels, loads, st.floats(1.01, 5.0))
+@settings(deadline=None)
+def test_a_softer_soil_lets_a_wheel_sink_deeper_against_more_resistance(name, wheel, N, factor):
+    soil, softer = packed(name), packed(name)
+    softer[K_C] /= factor
+    softer[K_PHI] /= factor
+    firm = solve_wheel(soil, MU, *wheel, N, 0.0, 0.0)
+    soft = solve_wheel(softer, MU, *wheel, N, 0.0, 0.0)
+    assert soft[SINKAGE] > firm[SINKAGE]
+    assert soft[RESISTANCE] > firm[RESISTANCE]
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_without_cohesion_a_softer_soil_pulls_less_once_the_contact_is_long(name):
+    """Before that, and by cohesion, the longer contact of a deeper wheel gains more shear."""
+    soil, radius, width, N = packed(name), 0.25, 0.2, 200.0
+    soil[COHESION] = 0.0
+    long = math.sqrt(2.0 * soil[SHEAR_MODULUS] * 2.0 * radius)
+    pulls = []
+    for _ in range(300):
+        result = solve_wheel(soil, MU, radius, width, N, 0.0, 0.0)
+        if result[SINKAGE] > radius:
+            break
+        if contact_length(radius, result[SINKAGE]) > long:
+            pulls.append(result[LARGEST])
+        soil[K_C] *= 0.97
+        soil[K_PHI] *= 0.97
+    assert len(pulls) > 50
+    assert (np.diff(pulls) < 0.0).all()
+
+
+def test_a_wheel_sunk_to_its_axle_gives_no_pull():
+    soil = packed("mars_simulant")
+    result = solve_wheel(soil, MU, 0.1, 0.08, 2000.0, 1.0, 0.0)
+    assert result[SINKAGE] > 0.1
+    assert not is_sinkage_moderate(result[SINKAGE], 0.1)
+    assert result[LARGEST] == -result[RESISTANCE] < 0.0
+    assert result[SLIP] == 1.0 and result[UTILISATION] == np.inf
+    assert effective_friction(soil, MU, 0.1, 0.08, 2000.0) == LEAST_FRICTION
+
+
+def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged():
+    soil = packed("mars_simulant")
+    wheel = (0.1, 0.08, 90.0)
+    idle = solve_wheel(soil, MU, *wheel, 0.0, 0.0)
+    assert idle[SINKAGE] < 0.1 and idle[LARGEST] < 0.0
+    assert idle[UTILISATION] == np.inf and idle[SLIP] == 1.0
+    dragged = solve_wheel(soil, MU, *wheel, -idle[RESISTANCE], 0.0)
+    assert dragged[UTILISATION] == 0.0 and dragged[SLIP] == 0.0
+
+
+def test_sinkage_is_moderate_up_to_a_sixth_of_the_diameter():
+    assert is_sinkage_moderate(0.0333, 0.1)
+    assert not is_sinkage_moderate(0.0334, 0.1)
+
+
+@pytest.mark.parametrize("name", [None, *RIGID])
+@pytest.mark.parametrize("N", [0.0, -5.0, math.nan])
+def test_a_lifted_wheel_has_no_grip(name, N):
+    soil = pack_soils(default=name)[0]
+    slip, sinkage, resistance, largest, torque, utilisation = solve_wheel(
+        soil, MU, 0.1, 0.08, N, 2.0, 0.0
+    )
+    assert (slip, sinkage, resistance, largest) == (1.0, 0.0, 0.0, 0.0)
+    assert (torque, utilisation) == (0.2, np.inf)
+    if name is not None:
+        assert effective_friction(soil, MU, 0.1, 0.08, N) == LEAST_FRICTION
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_the_smallest_load_keeps_its_digits(name):
+    soil = packed(name)
+    result = solve_wheel(soil, MU, 0.1, 0.08, 1e-9, 1e-11, 0.0)
+    assert all(math.isfinite(value) for value in result)
+    assert 0.0 < result[SLIP] <= 1.0
+
+
+# Coulomb ground.
+
+
+@given(st.floats(0.1, 1000.0), st.floats(-1000.0, 1000.0), st.floats(-1000.0, 1000.0))
+def test_coulomb_ground_sticks_or_slips(N, T, S):
+    soil = pack_soils()[0]
+    slip, sinkage, resistance, largest, torque, utilisation = solve_wheel(
+        soil, MU, 0.1, 0.08, N, T, S
+    )
+    assert (sinkage, resistance, largest) == (0.0, 0.0, MU * N)
+    assert utilisation == pytest.approx(math.hypot(T, S) / (MU * N))
+    assert torque == 0.1 * T
+    assert slip == coulomb_slip(utilisation) == (0.0 if utilisation <= 1.0 else 1.0)
+    assert effective_friction(soil, MU, 0.1, 0.08, N) == MU
+
+
+def test_a_coulomb_soil_with_friction_of_its_own_keeps_it():
+    soil = packed("firm_ground")
+    own = load_soils()["firm_ground"].friction
+    assert effective_friction(soil, 0.3, 0.1, 0.08, 10.0) == own
+
+
+# Packing.
+
+
+def test_soils_are_packed_after_the_default():
+    table = pack_soils(("dry_sand", "lete_sand"), default="lunar_nominal")
+    assert table.shape == (3, 8)
+    assert table[:, EXPONENT].tolist() == [1.0, 1.1, 0.79]
+    assert table[1, TAN_PHI] == pytest.approx(math.tan(math.radians(28.0)), rel=1e-6)
+    assert pack_soils().shape == (1, 8)
+
+
+def test_soils_are_looked_up_where_asked():
+    own = {"dune": load_soils()["dry_sand"]}
+    assert pack_soils(("dune",), soils=own)[1, K_PHI] == 1528430.0
+    with pytest.raises(SoilError, match="no soil 'dry_sand'; soils are dune"):
+        pack_soils(("dry_sand",), soils=own)
+    with pytest.raises(SoilError, match="no soil 'dune'"):
+        pack_soils(default="dune")

@@ -1,0 +1,139 @@
+"""Drops: a wheel that rolls off an edge falls by its height, and no slope counts as an edge."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.verdict import Verdict, judge
+from support.reference_drives import drive_ground, drive_path, unlimited
+from support.rough_grounds import plane
+
+LSR1 = load_rover("lsr1")
+FREE = unlimited(LSR1)
+RADIUS = LSR1.wheel.radius
+SLIPPERY = 0.27
+"""Friction that holds a wheel up to 15 degrees: it falls from the edge almost at once."""
+
+
+def edge_down(height: float) -> Terrain:
+    """Return a step of `height` [m] that goes down along +x."""
+    up = drive_ground("step", height)
+    return Terrain(height - up.elevation, up.resolution, up.origin)
+
+
+def drive(
+    ground: Terrain, rover: Rover = FREE, spacing: float = 0.01, **options
+) -> tuple[PathPrediction, Verdict]:
+    prediction = sweep_path(rover, ground, drive_path(spacing), **options)
+    return prediction, judge(rover, prediction)
+
+
+def with_drop_limit(limit: float) -> Rover:
+    return replace(FREE, limits=replace(FREE.limits, wheel_drop=limit))
+
+
+@pytest.mark.parametrize("height", [0.05, 0.08, 0.1, 0.15, 0.2])
+def test_off_an_edge_each_wheel_drops_by_the_height_of_the_edge(height):
+    prediction, _ = drive(edge_down(height), friction=SLIPPERY)
+    drops = prediction.wheel_drop.max(axis=0)
+    assert (drops <= height + 1e-3).all()
+    assert (drops >= height - 0.012).all()
+
+
+@pytest.mark.parametrize("friction", [0.4, 0.8, 1.0])
+@pytest.mark.parametrize("height", [0.1, 0.2])
+def test_friction_holds_a_wheel_on_the_edge_before_it_falls(height, friction):
+    prediction, _ = drive(edge_down(height), friction=friction)
+    held = RADIUS * (1.0 - np.cos(np.arctan(friction)))
+    drops = prediction.wheel_drop.max(axis=0)
+    assert (drops >= height - held - 0.006).all()
+    assert (drops <= height + 1e-3).all()
+
+
+def test_the_higher_the_edge_the_deeper_the_drop():
+    drops = [
+        drive(edge_down(height))[0].wheel_drop.max() for height in (0.05, 0.1, 0.15, 0.2, 0.25)
+    ]
+    assert (np.diff(drops) > 0.03).all()
+
+
+def test_a_drop_is_told_where_the_wheel_lands():
+    prediction, _ = drive(edge_down(0.15))
+    for name, wheel in (("rear", 0), ("middle", 1), ("front", 2)):
+        where = prediction.poses[prediction.wheel_drop[:, wheel].argmax(), 0]
+        assert 0.0 < where + LSR1.suspension.wheels[name][0] <= 2.0 * RADIUS
+
+
+def test_a_drop_beyond_the_limit_is_refused_by_its_own_code():
+    ground = edge_down(0.15)
+    _, allowed = drive(ground, with_drop_limit(0.16))
+    _, refused = drive(ground, with_drop_limit(0.05))
+    assert allowed.traversable
+    assert not refused.traversable and set(refused.codes) == {"", "wheel_drop"}
+    assert "drops off an edge" in refused.reason and "limit 0.050 m" in refused.reason
+    assert refused.max_wheel_drop == allowed.max_wheel_drop
+
+
+def test_the_preset_refuses_to_fall_by_more_than_it_says():
+    codes = {height: drive(edge_down(height), LSR1)[1].code for height in (0.05, 0.15)}
+    assert codes[0.05] == "" and codes[0.15] == "wheel_drop"
+
+
+def test_while_a_wheel_falls_neither_friction_nor_torque_are_asked_for():
+    prediction, verdict = drive(edge_down(0.2), friction=0.4)
+    needed = prediction.friction_utilisation[prediction.falling.any(axis=1)]
+    assert len(needed) and needed.max() > 1.0
+    assert verdict.traversable and verdict.max_friction_utilisation < 1.0
+
+
+def test_up_a_step_no_wheel_drops():
+    for height in (0.05, 0.15):
+        prediction, _ = drive(drive_ground("step", height))
+        assert not prediction.wheel_drop.any() and not prediction.falling.any()
+
+
+def test_backwards_up_an_edge_is_a_climb_and_no_fall():
+    backwards = drive_path()[::-1]
+    prediction = sweep_path(FREE, edge_down(0.1), backwards)
+    assert not prediction.wheel_drop[1:].max() > 0.0
+
+
+def test_into_a_ditch_the_wheels_drop_and_have_to_climb_out():
+    prediction, verdict = drive(drive_ground("ditch", 0.3), friction=0.8, policy="optimal")
+    assert (prediction.wheel_drop.max(axis=0) > 0.1).all()
+    assert np.degrees(prediction.between.contact_angle).max() > 70.0
+    assert verdict.max_wheel_drop <= 0.15 + 1e-3
+
+
+@pytest.mark.parametrize("slope", [0.2, 0.5, 0.7])
+def test_a_long_slope_is_not_a_drop(slope):
+    prediction, _ = drive(plane(-slope, 0.0, half=2.0))
+    assert not prediction.falling.any() and not prediction.wheel_drop.any()
+
+
+@pytest.mark.parametrize("degrees", [10.0, 25.0, 35.0])
+def test_the_crest_of_a_slope_is_not_an_edge(degrees):
+    level = plane(0.0, 0.0, half=2.2)
+    x = level.origin[0] + level.resolution * np.arange(level.elevation.shape[1])
+    fall = np.where(x > 0.0, -np.tan(np.radians(degrees)) * x, 0.0)
+    prediction, _ = drive(replace(level, elevation=np.broadcast_to(fall, level.elevation.shape)))
+    assert not prediction.wheel_drop.any()
+
+
+def test_a_slope_too_slippery_to_stand_on_is_refused_for_friction_and_not_a_fall():
+    prediction, verdict = drive(plane(-0.5, 0.0, half=2.0), friction=0.3)
+    assert verdict.code == "friction" and not prediction.wheel_drop.any()
+
+
+@pytest.mark.parametrize("height", [0.08, 0.15])
+def test_a_drop_is_as_deep_with_waypoints_twice_as_far_apart(height):
+    fine, coarse = (
+        drive(edge_down(height), spacing=spacing)[0].wheel_drop.max() for spacing in (0.01, 0.02)
+    )
+    assert fine == pytest.approx(coarse, abs=0.01)

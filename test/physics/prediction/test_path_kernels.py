@@ -1,0 +1,101 @@
+"""Loops over waypoints: jumps are found where they are, and what adds up is the sum."""
+
+import numpy as np
+import pytest
+
+from rover_physics.contact.settling import NOT_SETTLED, OFF_MAP, SETTLED
+from rover_physics.prediction.evaluation import new_results
+from rover_physics.prediction.path_kernels import add_up, divide_stretches, find_jumps, sort_pieces
+
+HEIGHT_JUMP, SHORTEST = 0.025, 1e-4
+
+
+def results_with(contact_angles, statuses=SETTLED, heights=0.0):
+    """Return results of which the front right wheel has these contact angles and heights."""
+    results = new_results(len(contact_angles))
+    results["contact_angle"] = results["wheel_centres"] = 0.0
+    results["contact_angle"][:, 2] = contact_angles
+    results["wheel_centres"][:, 2, 2] = heights
+    results["status"] = statuses
+    return results
+
+
+def along_x(xs):
+    poses = np.zeros((len(xs), 3))
+    poses[:, 0] = xs
+    return poses
+
+
+def jumps_of(results, spacing=0.02, joined=None):
+    n = len(results)
+    ends = np.empty((n, 2), np.int64)
+    joined = np.ones(n - 1, bool) if joined is None else np.array(joined)
+    poses = along_x(spacing * np.arange(n))
+    count = find_jumps(results, poses, joined, 0.1, HEIGHT_JUMP, ends)
+    return ends[:count].tolist()
+
+
+def sorted_pieces(results, xs, pieces=4):
+    """Return open and closed pieces of one stretch: its ends, then the rows between them."""
+    spare = np.empty((2, pieces, 2), np.int64)
+    n_open, n_closed = sort_pieces(
+        np.array([[0, 1]]), pieces, results, along_x(xs), HEIGHT_JUMP, SHORTEST, *spare
+    )
+    return spare[0, :n_open].tolist(), spare[1, :n_closed].tolist()
+
+
+def test_a_jump_is_a_steep_contact_that_turns_or_a_wheel_that_rises():
+    assert jumps_of(results_with([0.0, 0.5, 0.6, 0.0])) == [[0, 1], [2, 3]]
+    assert jumps_of(results_with([0.0, 0.3, 0.0])) == []
+    assert jumps_of(results_with([0.0] * 3, heights=[0.0, 0.02, 0.05])) == [[1, 2]]
+
+
+def test_no_jump_is_looked_for_where_the_path_is_not_one_way():
+    results = results_with([0.0, 0.5, 0.0])
+    assert jumps_of(results, joined=[True, False]) == [[0, 1]]
+    assert jumps_of(results, spacing=0.0) == [] == jumps_of(results, spacing=0.11)
+
+
+@pytest.mark.parametrize("status", [OFF_MAP, NOT_SETTLED])
+def test_there_is_no_jump_to_a_waypoint_without_a_pose(status):
+    assert jumps_of(results_with([0.0, 0.5, 0.0], [SETTLED, status, SETTLED])) == []
+
+
+def test_stretches_are_divided_evenly_and_turned_the_shorter_way():
+    ends, place = np.array([[0, 1]]), np.array([3.0, 4.0])
+    poses = np.array([[0.0, 0.0, 3.0], [0.4, -0.8, -3.0]])
+    new_place, new_waypoint, new_poses = np.empty(3), np.empty(3, np.int64), np.empty((3, 3))
+    divide_stretches(ends, 4, place, np.array([4, 4]), poses, new_place, new_waypoint, new_poses)
+    assert new_place.tolist() == [3.25, 3.5, 3.75] and new_waypoint.tolist() == [4, 4, 4]
+    assert new_poses[:, :2] == pytest.approx(np.array([[0.1, -0.2], [0.2, -0.4], [0.3, -0.6]]))
+    turn = 2.0 * np.pi - 6.0
+    assert new_poses[:, 2] == pytest.approx(3.0 + turn * np.array([0.25, 0.5, 0.75]))
+
+
+def test_a_piece_is_closed_only_where_it_is_short_or_holds_a_pose_that_does_not_settle():
+    angles, xs = [0.0, 0.6, 0.0, 0.6, 0.6], np.array([0.0, 0.02, 0.005, 0.01, 0.015])
+    assert sorted_pieces(results_with(angles), xs) == ([[2, 3]], [])
+    assert sorted_pieces(results_with(angles), 1e-3 * xs) == ([], [[2, 3]])
+    stuck = [SETTLED, SETTLED, SETTLED, NOT_SETTLED, SETTLED]
+    assert sorted_pieces(results_with(angles, stuck), xs) == ([], [[2, 4]])
+
+
+def test_way_time_and_energy_are_summed_over_settled_stretches():
+    rng = np.random.default_rng(0)
+    results, poses = results_with(np.zeros(50)), rng.normal(size=(50, 3))
+    results["q"], results["power"] = rng.normal(size=(50, 6)), rng.uniform(size=50)
+    lost = np.zeros(50, bool)
+    lost[[7, 8, 30]] = True
+    results["status"][lost] = NOT_SETTLED
+    results["q"][lost] = results["power"][lost] = np.nan
+    sums = np.empty((3, 50))
+    add_up(poses, results, 0.03, sums)
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    durations = np.hypot(steps, np.nan_to_num(np.diff(results["q"][:, 0]))) / 0.03
+    power = np.nan_to_num(results["power"])
+    work = 0.5 * (power[1:] + power[:-1]) * durations
+    for found, increments in zip(sums, (steps, durations, work), strict=True):
+        expected = np.concatenate([[0.0], np.cumsum(increments)])
+        if increments is not steps:
+            expected[lost] = np.nan
+        np.testing.assert_array_equal(found, expected)

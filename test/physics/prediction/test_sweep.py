@@ -1,0 +1,241 @@
+"""Sweep: bad arguments, waypoints that stand for themselves, time and energy, several callers."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import FrozenInstanceError, fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rover_physics.errors import ModelError, PoseError, RoverError
+from rover_physics.prediction.sweep import OFF_MAP, SETTLED, sweep_path, sweep_paths
+from rover_physics.rover.rover_file import load_rover
+from support.rough_grounds import fractal, plane, random_poses, rocky
+
+LSR1 = load_rover("lsr1")
+LEVEL = plane(0.0, 0.0)
+POSE = [[0.0, 0.0, 0.0]]
+NAN, INF = float("nan"), float("inf")
+GROWING = {"energy", "time", "distance"}
+ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint", "bounds"}
+few = settings(max_examples=20, deadline=None)
+
+
+def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndarray:
+    """Return a straight path along x."""
+    return np.column_stack([np.linspace(start, end, count), np.zeros(count), np.full(count, yaw)])
+
+
+def columns(prediction):
+    """Return the arrays of a prediction that hold a row per waypoint of its own, by name."""
+    return {
+        field.name: getattr(prediction, field.name)
+        for field in fields(prediction)
+        if field.name not in ALONG_THE_PATH and field.name != "policy"
+    }
+
+
+def assert_identical(prediction, expected, rows=slice(None)):
+    for name, values in columns(prediction).items():
+        assert values.tobytes() == columns(expected)[name][rows].tobytes(), name
+
+
+# Bad input
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        ([0.0, 0.0, 0.0], r"shape \(3,\).*\(n, 3\)"),
+        ([[0.0, 0.0]], r"shape \(1, 2\).*\(n, 3\)"),
+        (np.zeros((2, 4)), r"shape \(2, 4\).*\(n, 3\)"),
+        (np.zeros((1, 2, 3)), r"shape \(1, 2, 3\).*\(n, 3\)"),
+        (np.zeros((0, 3)), r"shape \(0, 3\).*n >= 1"),
+        ([[0.0, 0.0, 0.0], [0.0, NAN, 0.0]], r"y of pose 1 is nan.*finite"),
+        ([[INF, 0.0, 0.0]], r"x of pose 0 is inf.*finite"),
+        ([[0.0, 0.0, -INF]], r"yaw of pose 0 is -inf.*finite"),
+        ([["here", 0.0, 0.0]], "not numbers"),
+        ([[0.0, 0.0, 0.0], [0.0, 0.0]], "not numbers"),
+        (None, "poses"),
+    ],
+)
+def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
+    with pytest.raises(PoseError, match=words):
+        sweep_path(LSR1, LEVEL, poses)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"policy": "best"}, "'best'.*equal, optimal"),
+        ({"friction": 0.0}, r"friction is 0.0.*above 0"),
+        ({"friction": -0.5}, r"friction is -0.5.*above 0"),
+        ({"friction": NAN}, r"friction is nan.*above 0"),
+        ({"friction": INF}, r"friction is inf"),
+        ({"max_torque": 0.0}, r"max_torque is 0.0.*above 0"),
+        ({"max_torque": -1.0}, r"max_torque is -1.0.*above 0"),
+        ({"max_torque": NAN}, r"max_torque is nan.*above 0"),
+        ({"payload": -1.0}, r"payload is -1.0"),
+        ({"joint_angles": {"arm_yaw": NAN}}, "arm_yaw"),
+    ],
+)
+def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
+    with pytest.raises(ModelError, match=words):
+        sweep_path(LSR1, LEVEL, POSE, **arguments)
+
+
+def test_refusals_have_one_root():
+    assert issubclass(PoseError, RoverError)
+    assert issubclass(ModelError, RoverError)
+
+
+# What comes back
+
+
+def test_a_prediction_has_a_row_per_waypoint():
+    prediction = sweep_path(LSR1, LEVEL, line(-0.2, 0.2, 7))
+    for name, values in columns(prediction).items():
+        assert len(values) == 7, name
+    for name in GROWING:
+        assert getattr(prediction, name).shape == (7,), name
+    for name in ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation"):
+        assert getattr(prediction, name).shape == (7, 6), name
+    assert prediction.wheel_centres.shape == (7, 6, 3)
+    assert prediction.rocker_angle.shape == prediction.bogie_angle.shape == (7, 2)
+
+
+def test_a_prediction_cannot_be_reassigned():
+    with pytest.raises(FrozenInstanceError):
+        sweep_path(LSR1, LEVEL, POSE).policy = "optimal"
+
+
+def test_whole_numbers_and_lists_are_poses_too():
+    assert_identical(
+        sweep_path(LSR1, LEVEL, [[0, 0, 1]]), sweep_path(LSR1, LEVEL, np.array([[0.0, 0, 1]]))
+    )
+
+
+def test_the_poses_of_the_caller_are_left_alone():
+    poses = np.asfortranarray(line(-0.2, 0.2))
+    before = poses.copy()
+    prediction = sweep_path(LSR1, LEVEL, poses)
+    assert np.array_equal(poses, before)
+    assert np.array_equal(prediction.poses, before)
+
+
+def test_x_and_y_of_the_body_are_those_asked_for():
+    poses = random_poses(3, 50, 2.0)
+    prediction = sweep_path(LSR1, fractal(3), poses)
+    assert np.array_equal(prediction.position[:, :2], poses[:, :2])
+
+
+def test_a_full_turn_of_the_heading_changes_nothing():
+    poses = random_poses(4, 20, 2.0)
+    here = sweep_path(LSR1, fractal(4), poses)
+    there = sweep_path(LSR1, fractal(4), poses + np.array([0.0, 0.0, 2.0 * np.pi]))
+    assert there.wheel_centres == pytest.approx(here.wheel_centres, abs=1e-5)
+
+
+# Each waypoint on its own
+
+
+@few
+@given(st.integers(0, 10_000), st.integers(1, 70))
+def test_any_choice_of_poses_gives_identical_rows(seed, count):
+    ground, poses = rocky(1), random_poses(1, 70, 2.6)
+    rows = np.random.default_rng(seed).choice(70, count, replace=False)
+    everything = sweep_path(LSR1, ground, poses)
+    chosen = sweep_path(LSR1, ground, poses[rows])
+    assert_identical(chosen, everything, rows)
+    assert (everything.status == SETTLED).any()
+    assert (everything.status == OFF_MAP).any()
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_paths_swept_together_are_as_swept_one_by_one(policy):
+    ground = rocky(3)
+    paths = [random_poses(1, 1, 1.0), line(-1.0, 1.0, 101), line(1.0, -1.0, 60), line(9.0, 9.1, 4)]
+    together = sweep_paths(LSR1, ground, paths, policy=policy)
+    assert sum(len(prediction.between.poses) for prediction in together) > 20
+    for poses, prediction in zip(paths, together, strict=True):
+        alone = sweep_path(LSR1, ground, poses, policy=policy)
+        for part, expected in ((prediction, alone), (prediction.between, alone.between)):
+            assert_identical(part, expected)
+            for name in sorted(ALONG_THE_PATH - {"between", "bounds"}):
+                assert getattr(part, name).tobytes() == getattr(expected, name).tobytes(), name
+
+
+def test_no_path_gives_no_prediction():
+    assert sweep_paths(LSR1, LEVEL, []) == []
+
+
+def test_two_callers_at_once_get_what_each_gets_alone():
+    grounds = [fractal(1), rocky(2)]
+    paths = [random_poses(k, 1500, 2.0) for k in range(2)]
+    alone = [sweep_path(LSR1, *pair) for pair in zip(grounds, paths, strict=True)]
+    with ThreadPoolExecutor(4) as callers:
+        together = [
+            callers.submit(sweep_path, LSR1, grounds[k % 2], paths[k % 2]) for k in range(8)
+        ]
+        for k, future in enumerate(together):
+            assert_identical(future.result(), alone[k % 2])
+
+
+def test_the_same_question_gets_the_same_answer():
+    ground, poses = rocky(3), random_poses(3, 200, 2.0)
+    assert_identical(sweep_path(LSR1, ground, poses), sweep_path(LSR1, ground, poses))
+
+
+# Time, distance, energy
+
+
+def test_time_is_the_way_at_nominal_speed():
+    prediction = sweep_path(LSR1, LEVEL, line(-0.3, 0.3))
+    assert prediction.time[0] == 0.0
+    assert prediction.time[-1] == pytest.approx(0.6 / LSR1.nominal_speed)
+    assert prediction.distance[-1] == pytest.approx(0.6)
+
+
+def test_the_way_up_a_slope_takes_longer_than_its_shadow():
+    prediction = sweep_path(LSR1, plane(0.4, 0.0), line(-0.3, 0.3))
+    way = 0.6 * np.hypot(1.0, 0.4)
+    assert prediction.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)
+
+
+def test_wheels_too_slow_for_the_nominal_speed_set_the_time():
+    slow = replace(LSR1, wheel=replace(LSR1.wheel, max_speed=0.1))
+    prediction = sweep_path(slow, LEVEL, line(-0.3, 0.3))
+    assert prediction.time[-1] == pytest.approx(0.6 / (0.1 * 0.10))
+
+
+def test_level_ground_costs_no_energy():
+    assert sweep_path(LSR1, LEVEL, line(-0.3, 0.3)).energy[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_energy_uphill_is_the_weight_lifted():
+    prediction = sweep_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), friction=2.0)
+    lifted = LSR1.weight * np.ptp(prediction.position[:, 2])
+    assert prediction.energy[0] == 0.0
+    assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)
+
+
+def test_braking_downhill_gives_nothing_back():
+    prediction = sweep_path(LSR1, plane(-0.3, 0.0), line(-0.3, 0.3))
+    assert (prediction.torque < 0.0).all()
+    assert prediction.energy[-1] == 0.0
+
+
+@few
+@given(st.integers(0, 19), st.floats(-np.pi, np.pi))
+def test_energy_time_and_distance_never_fall(seed, yaw):
+    steps = np.linspace(-1.5, 1.5, 60)[:, None]
+    poses = np.hstack([steps * [np.cos(yaw), np.sin(yaw)], np.full((60, 1), yaw)])
+    prediction = sweep_path(LSR1, rocky(seed), poses)
+    for name in GROWING:
+        values = getattr(prediction, name)
+        values = values[~np.isnan(values)]
+        assert values.size >= 50
+        assert (np.diff(values) >= 0.0).all(), name
+    assert (np.diff(prediction.time[prediction.settled]) > 0.0).all()
+    assert (prediction.power[prediction.settled] >= 0.0).all()

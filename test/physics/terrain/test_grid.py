@@ -1,0 +1,414 @@
+"""The terrain: what is refused, the bilinear look-up, filled gaps and files."""
+
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rover_physics.errors import TerrainError
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+
+
+def plane(ny=6, nx=8, resolution=0.5, origin=(-1.0, 2.0), a=0.1, b=-0.2, c=0.3):
+    """Return the terrain z = a + b x + c y."""
+    x = origin[0] + resolution * np.arange(nx)
+    y = origin[1] + resolution * np.arange(ny)
+    return Terrain(a + b * x[None, :] + c * y[:, None], resolution, origin)
+
+
+coefficients = st.floats(-2.0, 2.0)
+
+
+@given(
+    coefficients,
+    coefficients,
+    coefficients,
+    st.floats(0.01, 3.0),
+    st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)),
+    st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), min_size=1, max_size=20),
+)
+@settings(deadline=None)
+def test_look_up_reproduces_planes(a, b, c, resolution, origin, places):
+    terrain = plane(5, 7, resolution, origin, a, b, c)
+    xmin, xmax, ymin, ymax = terrain.bounds
+    u, v = np.array(places).T
+    x, y = xmin + u * (xmax - xmin), ymin + v * (ymax - ymin)
+    assert terrain.contains(x, y).all()
+    assert np.allclose(terrain.elevation_at(x, y), a + b * x + c * y, rtol=0.0, atol=1e-10)
+
+
+@given(st.integers(0, 5), st.integers(0, 7))
+def test_look_up_at_a_cell_centre_gives_its_height(row, column):
+    heights = np.random.default_rng(1).normal(size=(6, 8))
+    terrain = Terrain(heights, 0.5, (-1.0, 2.0))
+    z = terrain.elevation_at(-1.0 + 0.5 * column, 2.0 + 0.5 * row)
+    assert z == pytest.approx(heights[row, column], abs=1e-12)
+
+
+def test_rows_go_along_y_and_columns_along_x():
+    heights = np.array([[0.0, 1.0], [2.0, 3.0]])
+    terrain = Terrain(heights, 1.0, (10.0, 20.0))
+    assert terrain.elevation_at([10.0, 11.0, 10.0, 11.0], [20.0, 20.0, 21.0, 21.0]).tolist() == [
+        0.0,
+        1.0,
+        2.0,
+        3.0,
+    ]
+    assert terrain.bounds == (10.0, 11.0, 20.0, 21.0)
+
+
+def test_look_up_is_unknown_off_the_map():
+    terrain = plane()
+    xmin, xmax, ymin, ymax = terrain.bounds
+    x = [xmin - 0.01, xmax + 0.01, 0.0, 0.0, np.nan]
+    y = [3.0, 3.0, ymin - 0.01, ymax + 0.01, 3.0]
+    assert np.isnan(terrain.elevation_at(x, y)).all()
+    assert not terrain.contains(x, y).any()
+
+
+def test_look_up_is_unknown_where_a_corner_is_unknown():
+    heights = plane().elevation.copy()
+    heights[2, 3] = np.nan
+    terrain = Terrain(heights, 0.5, (-1.0, 2.0))
+    x, y = -1.0 + 0.5 * 3, 2.0 + 0.5 * 2
+    around = terrain.elevation_at(
+        [x - 0.2, x + 0.2, x - 0.2, x + 0.2], [y - 0.2, y - 0.2, y + 0.2, y + 0.2]
+    )
+    assert np.isnan(around).all()
+    assert np.isfinite(terrain.elevation_at(x - 0.6, y))
+    assert terrain.contains(x, y)
+
+
+def test_look_up_keeps_the_shape_of_its_points():
+    terrain = plane()
+    assert terrain.elevation_at(0.0, 3.0).shape == ()
+    assert terrain.elevation_at(np.zeros((2, 3)), 3.0).shape == (2, 3)
+    assert terrain.contains(np.zeros((2, 1)), np.full(3, 3.0)).shape == (2, 3)
+
+
+def test_elevation_becomes_contiguous_float64():
+    heights = np.asfortranarray(np.arange(12, dtype=np.float32).reshape(3, 4))
+    terrain = Terrain(heights, np.float32(0.5), np.array([1, 2]))
+    assert terrain.elevation.dtype == np.float64
+    assert terrain.elevation.flags.c_contiguous
+    assert isinstance(terrain.resolution, float)
+    assert terrain.origin == (1.0, 2.0)
+
+
+FLAT = np.zeros((4, 5))
+
+
+@pytest.mark.parametrize(
+    ("elevation", "text"),
+    [
+        (np.zeros(5), r"elevation has shape \(5,\)"),
+        (np.zeros((2, 3, 4)), r"elevation has shape \(2, 3, 4\)"),
+        (np.zeros((1, 5)), "at least 2 rows and 2 columns"),
+        (np.zeros((0, 0)), "at least 2 rows and 2 columns"),
+        (np.full((3, 4), np.nan), "all 3 x 4 are NaN"),
+        (np.array([[0.0, 1.0], [np.inf, 0.0]]), r"elevation\[1, 0\] is inf"),
+        (np.array([["a", "b"], ["c", "d"]]), "an array of numbers"),
+        (np.zeros((3, 3), dtype=bool), "an array of numbers"),
+        (np.zeros((3, 3), dtype=complex), "an array of numbers"),
+    ],
+)
+def test_a_wrong_elevation_is_refused(elevation, text):
+    with pytest.raises(TerrainError, match=text):
+        Terrain(elevation, 0.1)
+
+
+@pytest.mark.parametrize("resolution", [0.0, -0.1, np.nan, np.inf, "0.1", True, [0.1, 0.1], None])
+def test_a_wrong_resolution_is_refused(resolution):
+    with pytest.raises(TerrainError, match="resolution is .*; it must be one number above 0 in m"):
+        Terrain(FLAT, resolution)
+
+
+@pytest.mark.parametrize("origin", [(0.0,), (0.0, 1.0, 2.0), (0.0, np.nan), "ab", None, 1.0])
+def test_a_wrong_origin_is_refused(origin):
+    with pytest.raises(TerrainError, match="origin is .*; it must be two numbers in m"):
+        Terrain(FLAT, 0.1, origin)
+
+
+@pytest.mark.parametrize(
+    ("friction", "text"),
+    [
+        (np.ones((5, 4)), r"friction has shape \(5, 4\); it must be that of elevation, \(4, 5\)"),
+        (np.zeros((4, 5)), r"friction\[0, 0\] is 0.0; it must be above 0"),
+        (np.full((4, 5), -1.0), r"friction\[0, 0\] is -1.0"),
+        (np.full((4, 5), np.inf), r"friction\[0, 0\] is inf"),
+        (np.full((4, 5), "x"), "friction has type"),
+    ],
+)
+def test_a_wrong_friction_layer_is_refused(friction, text):
+    with pytest.raises(TerrainError, match=text):
+        Terrain(FLAT, 0.1, friction=friction)
+
+
+def test_unknown_friction_is_allowed():
+    friction = np.full((4, 5), np.nan)
+    friction[0, 0] = 0.4
+    assert Terrain(FLAT, 0.1, friction=friction).friction is not None
+
+
+SOIL = np.full((4, 5), -1)
+NAMES = ("dry_sand", "slab")
+
+
+def test_soils_are_indices_into_names():
+    soil = SOIL.astype(np.int64)
+    soil[0, 1] = 1
+    terrain = Terrain(FLAT, 0.1, soil=soil, soil_names=list(NAMES))
+    assert terrain.soil is not None and terrain.soil.dtype == np.int32
+    assert terrain.soil_names == NAMES
+    assert Terrain(FLAT, 0.1, soil=SOIL).soil_names == ()
+
+
+@pytest.mark.parametrize(
+    ("soil", "names", "text"),
+    [
+        (np.full((5, 4), -1), NAMES, r"soil has shape \(5, 4\); it must be that of elevation"),
+        (SOIL + 3, NAMES, r"soil\[0, 0\] is 2; it must be -1 for the default, or 0 to 1"),
+        (np.full((4, 5), -2), NAMES, r"soil\[0, 0\] is -2"),
+        (np.full((4, 5), 2**32), NAMES, r"soil\[0, 0\] is 4294967296"),
+        (np.full((4, 5), 255, np.uint8), NAMES, r"soil\[0, 0\] is 255"),
+        (np.zeros((4, 5), int), (), r"soil\[0, 0\] is 0; .* as there are no soil_names"),
+        (np.zeros((4, 5)), NAMES, "soil has type float64; it must be an array of whole numbers"),
+        (np.zeros((4, 5), bool), NAMES, "soil has type bool"),
+        (SOIL, "dry_sand", "soil_names is dry_sand; it must be a list of different names"),
+        (SOIL, ("a", ""), r"soil_names is \['a', ''\]"),
+        (SOIL, ("a", 3), r"soil_names is \['a', 3\]"),
+        (SOIL, ("a", "b", "a"), "soil_names has 'a' twice"),
+        (SOIL, np.array([["a"]]), "soil_names is"),
+        (None, NAMES, "soil_names are dry_sand, slab without a soil layer"),
+    ],
+)
+def test_a_wrong_soil_layer_is_refused(soil, names, text):
+    with pytest.raises(TerrainError, match=text):
+        Terrain(FLAT, 0.1, soil=soil, soil_names=names)
+
+
+@pytest.mark.parametrize(
+    ("std", "text"),
+    [
+        (np.zeros((5, 4)), r"elevation_std has shape \(5, 4\)"),
+        (np.full((4, 5), -0.01), r"elevation_std\[0, 0\] is -0.01; it must be at least 0"),
+        (np.full((4, 5), np.inf), r"elevation_std\[0, 0\] is inf"),
+        (np.full((4, 5), np.nan), r"elevation_std\[0, 0\] is nan; .* where the height is known"),
+        (np.full((4, 5), "x"), "elevation_std has type"),
+    ],
+)
+def test_a_wrong_uncertainty_is_refused(std, text):
+    with pytest.raises(TerrainError, match=text):
+        Terrain(FLAT, 0.1, elevation_std=std)
+
+
+def test_the_uncertainty_may_be_unknown_where_the_height_is():
+    heights = np.where(np.arange(20).reshape(4, 5) == 7, np.nan, 0.0)
+    std = np.where(np.isnan(heights), np.nan, 0.02)
+    assert Terrain(heights, 0.1, elevation_std=std).elevation_std is not None
+
+
+def test_a_filled_gap_is_as_uncertain_as_the_worst_of_its_rim():
+    _, gapped = with_gap()
+    heights = gapped.elevation.copy()
+    heights[2, 2] = np.nan
+    heights[3, 3] = np.nan
+    std = np.where(np.isnan(heights), np.nan, 0.01)
+    std[7, 10], std[2, 3], std[15, 15] = 0.05, 0.03, 0.9
+    filled = Terrain(heights, 0.1, elevation_std=std).fill_gaps(0.3).elevation_std
+    assert filled is not None
+    assert (filled[8:11, 9:14] == 0.05).all()
+    assert (filled[2, 2], filled[3, 3]) == (0.03, 0.03)
+    known = np.isfinite(heights)
+    assert np.array_equal(filled[known], std[known])
+
+
+def with_gap(ny=20, nx=24, rows=slice(8, 11), columns=slice(9, 14)):
+    terrain = plane(ny, nx, 0.1, (0.0, 0.0))
+    heights = terrain.elevation.copy()
+    heights[rows, columns] = np.nan
+    return terrain, Terrain(heights, 0.1)
+
+
+def test_a_small_gap_in_a_plane_is_filled_exactly():
+    whole, gapped = with_gap()
+    assert np.allclose(gapped.fill_gaps(0.3).elevation, whole.elevation, rtol=0.0, atol=1e-12)
+
+
+def test_a_gap_is_as_wide_as_its_shorter_side():
+    _, gapped = with_gap()
+    assert np.isnan(gapped.fill_gaps(0.2).elevation).sum() == 15
+    assert np.isnan(gapped.fill_gaps(0.29).elevation).sum() == 15
+    assert not np.isnan(gapped.fill_gaps(0.3).elevation).any()
+
+
+def test_a_large_gap_stays_while_a_small_one_is_filled():
+    whole, gapped = with_gap()
+    heights = gapped.elevation.copy()
+    heights[2, 2] = np.nan
+    filled = Terrain(heights, 0.1).fill_gaps(0.1).elevation
+    assert filled[2, 2] == pytest.approx(whole.elevation[2, 2], abs=1e-12)
+    assert np.isnan(filled[8:11, 9:14]).all()
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns"),
+    [
+        (slice(0, 2), slice(5, 6)),
+        (slice(18, 20), slice(5, 6)),
+        (slice(5, 6), slice(0, 2)),
+        (slice(5, 6), slice(22, 24)),
+    ],
+)
+def test_a_gap_at_the_edge_of_the_map_stays(rows, columns):
+    _, gapped = with_gap(rows=rows, columns=columns)
+    assert np.isnan(gapped.fill_gaps(5.0).elevation).sum() == 2
+
+
+def test_filling_makes_no_new_extremes():
+    heights = np.random.default_rng(3).normal(size=(30, 30))
+    unknown = np.zeros((30, 30), dtype=bool)
+    unknown[10:14, 12:20] = True
+    filled = Terrain(np.where(unknown, np.nan, heights), 0.1).fill_gaps(0.5).elevation[unknown]
+    rim = heights[9:15, 11:21]
+    assert rim.min() <= filled.min() <= filled.max() <= rim.max()
+
+
+def test_filling_leaves_known_cells_and_the_terrain_itself_alone():
+    _, gapped = with_gap()
+    before = gapped.elevation.copy()
+    known = ~np.isnan(before)
+    filled = gapped.fill_gaps(1.0)
+    assert np.array_equal(filled.elevation[known], before[known])
+    assert np.array_equal(gapped.elevation, before, equal_nan=True)
+    whole = plane()
+    assert whole.fill_gaps(1.0) is whole
+
+
+@pytest.mark.parametrize("max_gap", [-0.1, np.nan, np.inf])
+def test_a_wrong_gap_width_is_refused(max_gap):
+    with pytest.raises(TerrainError, match="max_gap is"):
+        plane().fill_gaps(max_gap)
+
+
+def test_a_saved_terrain_is_loaded_as_it_was(tmp_path):
+    heights = np.random.default_rng(2).normal(size=(4, 5))
+    heights[1, 2] = np.nan
+    friction = np.where(np.isnan(heights), np.nan, 0.7)
+    terrain = Terrain(heights, 0.25, (3.0, -4.0), friction)
+    save_terrain(tmp_path / "a.npz", terrain, source="made up")
+    loaded = load_terrain(tmp_path / "a.npz")
+    assert np.array_equal(loaded.elevation, heights, equal_nan=True)
+    assert loaded.friction is not None
+    assert np.array_equal(loaded.friction, friction, equal_nan=True)
+    assert (loaded.resolution, loaded.origin) == (0.25, (3.0, -4.0))
+    assert (loaded.soil, loaded.soil_names, loaded.elevation_std) == (None, (), None)
+
+
+def test_saved_soils_and_uncertainty_are_loaded_as_they_were(tmp_path):
+    soil = np.random.default_rng(4).integers(-1, 2, (4, 5))
+    std = np.random.default_rng(5).uniform(0.0, 0.1, (4, 5))
+    terrain = Terrain(FLAT, 0.25, soil=soil, soil_names=NAMES, elevation_std=std)
+    save_terrain(tmp_path / "a.npz", terrain)
+    loaded = load_terrain(tmp_path / "a.npz")
+    assert loaded.soil_names == NAMES
+    assert np.array_equal(loaded.soil, soil)
+    assert np.array_equal(loaded.elevation_std, std)
+
+
+def test_a_file_with_a_wrong_soil_is_named(tmp_path):
+    entries = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0], "soil": SOIL + 1}
+    np.savez(tmp_path / "map.npz", **entries, soil_names="dry_sand")
+    with pytest.raises(TerrainError, match=r"map\.npz: soil_names is dry_sand; it must be a list"):
+        load_terrain(tmp_path / "map.npz")
+    np.savez(tmp_path / "map.npz", **entries)
+    with pytest.raises(TerrainError, match=r"map\.npz: soil\[0, 0\] is 0; it must be -1"):
+        load_terrain(tmp_path / "map.npz")
+
+
+def test_a_file_with_float32_and_further_entries_is_loaded(tmp_path):
+    path = tmp_path / "map.npz"
+    np.savez(
+        path,
+        elevation=FLAT.astype(np.float32),
+        resolution=np.float32(0.5),
+        resolution_xy=[0.5, 0.5],
+        origin=[1, 2],
+        source="a survey",
+        licence="MIT",
+    )
+    terrain = load_terrain(str(path))
+    assert terrain.elevation.dtype == np.float64
+    assert terrain.origin == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("name", ["elevation", "resolution", "origin"])
+def test_a_file_without_an_entry_is_refused(tmp_path, name):
+    entries = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
+    del entries[name]
+    np.savez(tmp_path / "map.npz", **entries)
+    with pytest.raises(TerrainError, match=rf"map\.npz: no entry {name};"):
+        load_terrain(tmp_path / "map.npz")
+
+
+def test_a_file_with_an_impossible_entry_is_named(tmp_path):
+    np.savez(tmp_path / "map.npz", elevation=FLAT, resolution=-1.0, origin=[0.0, 0.0])
+    with pytest.raises(TerrainError, match=r"map\.npz: resolution is -1\.0"):
+        load_terrain(tmp_path / "map.npz")
+
+
+def test_nothing_is_unpickled(tmp_path):
+    heights = np.empty((2, 2), dtype=object)
+    np.savez(tmp_path / "map.npz", elevation=heights, resolution=0.1, origin=[0.0, 0.0])
+    with pytest.raises(TerrainError, match="entry elevation is damaged or not numeric"):
+        load_terrain(tmp_path / "map.npz")
+
+
+def test_a_file_that_is_no_npz_is_refused(tmp_path):
+    (tmp_path / "text.npz").write_text("elevation", encoding="utf-8")
+    (tmp_path / "empty.npz").write_bytes(b"")
+    (tmp_path / "cut.npz").write_bytes(b"PK\x03\x04 and no more")
+    np.save(tmp_path / "single.npy", FLAT)
+    for name in ("text.npz", "empty.npz", "cut.npz", "single.npy"):
+        with pytest.raises(TerrainError, match=rf"{name}: .*\.npz"):
+            load_terrain(tmp_path / name)
+
+
+def test_a_damaged_entry_is_named(tmp_path):
+    save_terrain(tmp_path / "good.npz", plane())
+    with (
+        zipfile.ZipFile(tmp_path / "good.npz") as good,
+        zipfile.ZipFile(tmp_path / "bad.npz", "w") as bad,
+    ):
+        for name in good.namelist():
+            content = good.read(name)
+            bad.writestr(name, content[:-20] if name.startswith("elevation") else content)
+    with pytest.raises(TerrainError, match=r"bad\.npz: entry elevation is damaged"):
+        load_terrain(tmp_path / "bad.npz")
+
+
+def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
+    with pytest.raises(TerrainError, match=r"none\.npz: cannot be read: No such file"):
+        load_terrain(tmp_path / "none.npz")
+    with pytest.raises(TerrainError, match="cannot be read: Is a directory"):
+        load_terrain(tmp_path)
+    with pytest.raises(TerrainError, match="cannot be written: No such file"):
+        save_terrain(tmp_path / "none" / "map.npz", plane())
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["erc_marsyard2021_9cm", "mer_spirit_sol1352_hazcam_3cm", "otira_tls_boulders_3cm"],
+)
+def test_a_real_map_is_loaded_and_known_at_its_known_cells(terrain_dir, name):
+    terrain = load_terrain(terrain_dir / f"{name}.npz")
+    known = np.isfinite(terrain.elevation)
+    rows, columns = np.nonzero(known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:])
+    x = terrain.origin[0] + terrain.resolution * columns
+    y = terrain.origin[1] + terrain.resolution * rows
+    z = terrain.elevation_at(x + 1e-9, y + 1e-9)
+    assert np.allclose(z, terrain.elevation[rows, columns], rtol=0.0, atol=1e-6)
+    filled = terrain.fill_gaps(0.3)
+    assert np.isnan(filled.elevation).sum() <= np.isnan(terrain.elevation).sum()

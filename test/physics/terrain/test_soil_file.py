@@ -1,0 +1,133 @@
+"""Soil files: the presets, and what is refused by name."""
+
+import math
+
+import pytest
+
+from rover_physics.errors import RoverError, SoilError
+from rover_physics.files.config_files import find_config
+from rover_physics.terrain.soil_file import load_soils, soil_named, soils_from_dict
+
+
+def dry_sand(**changes):
+    """Return the entry of dry sand, with keys changed, or left out where None."""
+    entry = {
+        "model": "bekker_wong",
+        "cohesion": 1040.0,
+        "friction_angle": 0.488692,
+        "k_c": 990.0,
+        "k_phi": 1528430.0,
+        "n": 1.1,
+        "shear_modulus": 0.025,
+        "source": "a book",
+        **changes,
+    }
+    return {key: value for key, value in entry.items() if value is not None}
+
+
+@pytest.mark.parametrize(
+    ("name", "cohesion", "degrees", "k_c", "k_phi", "n", "shear_modulus"),
+    [
+        ("lunar_nominal", 170.0, 35.0, 1.4e3, 820e3, 1.0, 0.0178),
+        ("mars_simulant", 300.0, 17.8, 5.79e3, 180e3, 0.8, 0.01),
+        ("dry_sand", 1040.0, 28.0, 0.99e3, 1528.43e3, 1.1, 0.025),
+        ("lete_sand", 1300.0, 31.1, 102e3, 5301e3, 0.79, 0.012),
+    ],
+)
+def test_presets_have_the_published_values_in_si_units(
+    name, cohesion, degrees, k_c, k_phi, n, shear_modulus
+):
+    soil = load_soils()[name]
+    assert (soil.name, soil.model) == (name, "bekker_wong")
+    assert (soil.cohesion, soil.k_c, soil.k_phi, soil.n) == (cohesion, k_c, k_phi, n)
+    assert math.degrees(soil.friction_angle) == pytest.approx(degrees, abs=1e-4)
+    assert soil.shear_modulus == shear_modulus
+    assert math.isnan(soil.friction)
+
+
+def test_every_preset_says_where_it_is_from_and_is_in_the_docs():
+    page = find_config("soils.yaml").parent.parent / "docs" / "soil.md"
+    text = page.read_text(encoding="utf-8") if page.exists() else None
+    for name, soil in load_soils().items():
+        assert soil.source.strip()
+        assert text is None or f"`{name}`" in text
+
+
+def test_a_file_of_ones_own_is_read(tmp_path):
+    path = tmp_path / "soils.yaml"
+    path.write_text(
+        "slab: {model: coulomb, friction: 0.6, source: measured}\n"
+        "ground: {model: coulomb, source: the map}\n",
+        encoding="utf-8",
+    )
+    soils = load_soils(path)
+    slab = soils["slab"]
+    assert (slab.name, slab.model, slab.source) == ("slab", "coulomb", "measured")
+    assert slab.friction == 0.6 and math.isnan(slab.n)
+    assert math.isnan(soils["ground"].friction)
+    assert soil_named("slab", soils) is soils["slab"]
+
+
+def test_an_unknown_soil_lists_the_soils_there_are():
+    with pytest.raises(SoilError, match="no soil 'dry_sandy'; did you mean dry_sand. soils are"):
+        soil_named("dry_sandy")
+    assert issubclass(SoilError, RoverError)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"model": "mohr"}, "dune.model is 'mohr'; it must be coulomb or bekker_wong"),
+        ({"model": None}, "missing key dune.model"),
+        ({"source": ""}, "dune.source is ''; it must be a text that is not empty"),
+        ({"source": None}, "missing key dune.source"),
+        ({"cohesion": -1.0}, "dune.cohesion is -1.0; it must be a number at least 0 in Pa"),
+        ({"cohesion": math.nan}, "dune.cohesion is nan"),
+        ({"cohesion": "1e3"}, "dune.cohesion is '1e3'.*YAML reads '1e3' as text"),
+        ({"friction_angle": 28.0}, "dune.friction_angle is 28.0; .* at most 1.2 in rad"),
+        ({"friction_angle": -0.1}, "dune.friction_angle is -0.1"),
+        ({"friction_angle": 0.0, "cohesion": 0.0}, "dune.cohesion is 0.0; .*some strength"),
+        ({"k_c": -1.0}, "dune.k_c is -1.0"),
+        ({"k_phi": 0.0}, r"dune.k_phi is 0.0; it must be a number above 0 in N/m\^\(n\+2\)"),
+        ({"k_phi": None}, "missing key dune.k_phi"),
+        ({"n": 0.0}, "dune.n is 0.0; it must be a number above 0 and at most 2"),
+        ({"n": 3.0}, "dune.n is 3.0"),
+        ({"n": True}, "dune.n is true"),
+        ({"shear_modulus": 0.0}, "dune.shear_modulus is 0.0; .*above 0 in m"),
+        ({"friction": 0.5}, "unknown key dune.friction"),
+        ({"cohesoin": 1.0}, "unknown key dune.cohesoin; did you mean cohesion"),
+    ],
+)
+def test_a_wrong_value_is_refused_by_its_key(changes, text):
+    with pytest.raises(SoilError, match=rf"my soils: {text}"):
+        soils_from_dict({"dune": dry_sand(**changes)}, "my soils")
+
+
+def test_a_coulomb_soil_has_no_bekker_keys():
+    entry = {"model": "coulomb", "friction": 0.5, "n": 1.0, "source": "s"}
+    with pytest.raises(SoilError, match=r"unknown key slab\.n"):
+        soils_from_dict({"slab": entry}, "x")
+    entry = {"model": "coulomb", "friction": 0.0, "source": "s"}
+    with pytest.raises(SoilError, match=r"slab\.friction is 0\.0; it must be a number above 0"):
+        soils_from_dict({"slab": entry}, "x")
+
+
+@pytest.mark.parametrize("data", [None, [], {}, 3.0, "dune"])
+def test_what_is_no_mapping_of_soils_is_refused(data):
+    with pytest.raises(SoilError, match="x: is .*; it must be a mapping of names to soils"):
+        soils_from_dict(data, "x")
+
+
+def test_a_soil_that_is_no_mapping_or_has_no_name_is_refused():
+    with pytest.raises(SoilError, match="x: dune is 3; it must be a mapping with"):
+        soils_from_dict({"dune": 3}, "x")
+    with pytest.raises(SoilError, match="x: soil name is 7; it must be a text"):
+        soils_from_dict({7: dry_sand()}, "x")
+
+
+def test_a_file_that_cannot_be_read_is_refused(tmp_path):
+    with pytest.raises(SoilError, match=r"none\.yaml: cannot be read"):
+        load_soils(tmp_path / "none.yaml")
+    (tmp_path / "twice.yaml").write_text("a: {}\na: {}\n", encoding="utf-8")
+    with pytest.raises(SoilError, match="duplicate key a in lines 1 and 2"):
+        load_soils(tmp_path / "twice.yaml")

@@ -1,0 +1,143 @@
+"""Contact angles from simulated motion and from the map, over slopes, steps and rocks."""
+
+import numpy as np
+import pytest
+
+from rover_physics.errors import ModelError
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traction.balance import MeasuredState
+from rover_physics.traction.contact_ekf import (
+    SPREAD,
+    Motion,
+    MotionContactEstimator,
+    level_estimate,
+)
+from rover_physics.traction.map_contacts import MapContactFinder
+from support.reference_drives import drive_ground
+from support.rough_grounds import fractal, plane, rocky
+from support.rover_geometry import turned_round
+from support.traction_states import drive_states, state_of
+
+LSR1 = load_rover("lsr1")
+
+
+def follow(rover, motions, duration):
+    estimator = MotionContactEstimator(rover)
+    estimates = [estimator.update(motion, duration) for motion in motions]
+    angles = np.array([estimate.angles for estimate in estimates])
+    deviations = np.sqrt([np.diag(estimate.covariance) for estimate in estimates])
+    return angles, deviations
+
+
+def rms(errors):
+    return float(np.sqrt(np.mean(errors[150:] ** 2)))
+
+
+@pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])
+def test_on_an_even_slope_the_angles_are_found_to_a_hundredth(slope):
+    prediction, motions, duration = drive_states(LSR1, plane(*slope, half=2.5))
+    angles, _ = follow(LSR1, motions, duration)
+    assert np.abs(angles - prediction.contact_angle)[400:].max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("ground", "share"),
+    [
+        (drive_ground("slope", 20.0), 0.15),
+        (drive_ground("step", 0.08), 0.6),
+        (fractal(1), 0.45),
+        (rocky(1), 0.45),
+    ],
+    ids=["slope", "step", "fractal", "rocky"],
+)
+@pytest.mark.parametrize("rover", [LSR1, turned_round(LSR1)], ids=lambda rover: rover.name)
+def test_motion_tells_the_angles_where_zero_is_far_off(rover, ground, share):
+    prediction, motions, duration = drive_states(rover, ground)
+    angles, deviations = follow(rover, motions, duration)
+    truth = prediction.contact_angle
+    assert rms(angles - truth) < share * rms(truth)
+    outside = np.abs(angles - truth)[150:] > 3.0 * deviations[150:]
+    assert outside.mean() < 0.02
+
+
+def test_a_wheel_that_slips_does_not_spoil_the_estimate():
+    prediction, motions, duration = drive_states(LSR1, fractal(1))
+    for motion in motions[400:700]:
+        motion.wheel_rates[2] *= 3.0
+    angles, _ = follow(LSR1, motions, duration)
+    truth = prediction.contact_angle
+    assert rms(angles - truth) < 0.8 * rms(truth)
+
+
+def test_at_rest_nothing_is_learnt_or_forgotten():
+    _, motions, duration = drive_states(LSR1, fractal(1))
+    estimator = MotionContactEstimator(LSR1)
+    for motion in motions[:300]:
+        moved = estimator.update(motion, duration)
+    at = motions[300]
+    still = Motion(
+        at.roll, at.pitch, at.rocker_angle, at.bogie_angles, 0.0, np.zeros(2), np.zeros(6),
+        np.zeros(3),
+    )  # fmt: skip
+    rested = estimator.update(still, 100.0)
+    assert np.array_equal(rested.angles, moved.angles)
+    assert np.array_equal(rested.covariance, moved.covariance)
+
+
+def test_covariances_stay_symmetric_and_positive():
+    _, motions, duration = drive_states(LSR1, rocky(2))
+    estimator = MotionContactEstimator(LSR1)
+    for motion in motions:
+        covariance = estimator.update(motion, duration).covariance
+        assert np.allclose(covariance, covariance.T, atol=1e-12)
+        assert np.linalg.eigvalsh(covariance).min() > 0.0
+
+
+def test_without_a_source_the_angles_are_zero_and_as_uncertain_as_ground_is():
+    estimate = level_estimate()
+    assert estimate.source == "zero" and not estimate.angles.any()
+    assert np.diag(estimate.covariance) == pytest.approx(np.full(6, SPREAD**2))
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.05, -0.05])
+def test_the_map_tells_the_angles_whatever_height_odometry_says(drift):
+    ground = fractal(1)
+    prediction, _, _ = drive_states(LSR1, ground)
+    finder, errors = MapContactFinder(LSR1, ground), []
+    for i in range(0, 1201, 20):
+        x, y, z = prediction.position[i]
+        found = finder.find(state_of(prediction, i), np.array([x, y, z + drift, 0.0]), 0.0)
+        assert found.source == "map"
+        errors.append(found.angles - prediction.contact_angle[i])
+    assert np.median(np.abs(errors)) < 0.03
+
+
+def test_at_the_foot_of_a_face_it_is_the_face_that_counts():
+    ground = drive_ground("step", 0.16)
+    pose = np.array([-0.4 - 0.1, 0.0, 0.3, 0.0])
+    face = np.arctan2(0.16, 0.04)  # it rises over two cells
+    level = MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.zeros(6))
+    angles = MapContactFinder(LSR1, ground).find(level, pose, 0.0).angles
+    assert angles[[2, 5]] == pytest.approx(np.full(2, face), abs=0.02)
+    assert angles[[0, 1, 3, 4]] == pytest.approx(np.zeros(4), abs=0.02)
+    back = MapContactFinder(LSR1, ground).find(level, pose, 0.0, forward=False).angles
+    assert back == pytest.approx(np.zeros(6), abs=0.02)
+
+
+def test_uncertain_odometry_makes_uncertain_angles():
+    ground = plane(0.1, 0.0, half=2.0)
+    prediction, _, _ = drive_states(LSR1, plane(0.1, 0.0, half=2.5))
+    finder = MapContactFinder(LSR1, ground)
+    pose = np.array([*prediction.position[600], 0.0])
+    well, badly = (finder.find(state_of(prediction, 600), pose, d) for d in (0.01, 0.05))
+    assert badly.covariance[0, 0] > 2.0 * well.covariance[0, 0]
+
+
+def test_ground_that_the_map_does_not_have_is_refused_by_wheel():
+    elevation = np.zeros((101, 101))
+    elevation[:, 55:] = np.nan
+    finder = MapContactFinder(LSR1, Terrain(elevation, 0.04, (-2.0, -2.0)))
+    prediction, _, _ = drive_states(LSR1, plane(0.0, 0.0, half=2.5))
+    with pytest.raises(ModelError, match="front_right"):
+        finder.find(state_of(prediction, 600), np.array([0.0, 0.0, 0.3, 0.0]), 0.0)

@@ -1,0 +1,27 @@
+"""What the planner calls passable with traction control is passed with it, and not without."""
+
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.traversability_class import grade_path
+from support.reference_drives import drive_ground, drive_path, unlimited
+
+pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
+from benchmarks.traction import EQUAL, MAP, Obstacle, drive
+
+STEP = Obstacle("step", 0.10, 0.5)
+"""As high as a wheel radius, at a friction with which equal torques do not do."""
+
+
+def test_the_planner_calls_the_step_passable_only_with_traction_control():
+    rover = unlimited(load_rover("lsr1"))
+    ground = drive_ground(STEP.kind, STEP.size)
+    grades = [grade.grade for grade in grade_path(rover, ground, drive_path(), friction=0.5)]
+    assert "passable with traction control" in grades and "impassable" not in grades
+
+
+@pytest.mark.parametrize(("controller", "passes"), [(EQUAL, False), (MAP, True)])
+def test_in_mujoco_the_step_is_passed_with_the_programme_and_not_with_equal_torques(
+    controller, passes
+):
+    assert drive(STEP, controller).passed is passes

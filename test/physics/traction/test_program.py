@@ -1,0 +1,247 @@
+"""Shared torques: they balance, need the least friction, and say what gives way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_torques import can_stand
+
+from rover_physics.errors import ModelError
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traction.balance import BalanceWriter, MeasuredState
+from rover_physics.traction.line_search import find_best_between, measure_peak
+from rover_physics.traction.program import (
+    CONES,
+    LIMIT,
+    Reference,
+    TractionWeights,
+    build_traction_qp,
+)
+from rover_physics.traction.solver import TractionWorkspace, solve_traction
+from support.rough_grounds import plane
+from support.rover_geometry import balance_matrix
+from support.traction_states import rough_states, state_of
+
+LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
+FRICTION = np.full(6, 0.8)
+
+
+def level(angles=(0.0,) * 6):
+    return MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.array(angles))
+
+
+def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programmes=12, **more):
+    rows = BalanceWriter(rover).write(state, net)
+    wheel = rover.wheel
+    return solve_traction(
+        more.pop("workspace", None) or TractionWorkspace(), rows, friction,
+        torque or wheel.max_torque, wheel.radius, most_programmes=programmes, **more,
+    )  # fmt: skip
+
+
+def test_equal_torques_are_those_of_the_sweep():
+    writer = BalanceWriter(LSR1)
+    for prediction, i in rough_states(LSR1, 60):
+        rows = writer.write(state_of(prediction, i), 0.0)
+        x = rows.force_unit * rows.complete(np.zeros(6))
+        for values, name in (
+            (x[6:12], "wheel_loads"),
+            (x[:6], "tangential"),
+            (x[12] + x[13] * rows.along, "lateral"),
+        ):
+            assert values == pytest.approx(getattr(prediction, name)[i], abs=1e-9 * LSR1.weight)
+
+
+def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_optimum():
+    workspace, writer, short = TractionWorkspace(), BalanceWriter(LSR1), []
+    for prediction, i in rough_states(LSR1, 1000):
+        rows = writer.write(state_of(prediction, i), 0.0)
+        answer = solve_traction(
+            workspace, rows, FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius,
+            most_programmes=12,
+        )  # fmt: skip
+        assert not answer.fallback and answer.load_slack == answer.torque_slack == 0.0
+        A, b, along = balance_matrix(LSR1, prediction, i)
+        forces = np.concatenate([answer.loads, answer.tractions])
+        terms = np.polyfit(along, answer.lateral, 1)[::-1]
+        left = A @ np.concatenate([forces, terms]) / LSR1.weight - b
+        assert np.abs(left).max() < 1e-4
+        if can_stand(LSR1, prediction, i, answer.utilisation.max() / 1.03, 2.0):
+            short.append(i)
+    assert short == []
+
+
+def test_rows_of_the_programme_hold_to_a_ten_thousandth_of_the_weight():
+    workspace, writer = TractionWorkspace(), BalanceWriter(LSR1)
+    for prediction, i in rough_states(LSR1, 100):
+        rows = writer.write(state_of(prediction, i), 0.0)
+        x = rows.complete(np.zeros(6))
+        qp = build_traction_qp(rows, FRICTION, 12.0, Reference(x, measure_peak(rows, FRICTION, x)))
+        y, _, status, solved = workspace.solve(qp)
+        assert solved, status
+        unit = qp.scale[0] / 6.0
+        values = qp.A @ y
+        outside = np.maximum(values - qp.upper, qp.lower - values)
+        assert outside[:9].max() * unit < 1e-4
+        assert outside[CONES:LIMIT].max() * unit < 1e-4
+
+
+def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
+    prediction, i = next(rough_states(LSR1, 1))
+    rows = BalanceWriter(LSR1).write(state_of(prediction, i), 5.0)
+    x = rows.complete(np.array([0.1, -0.05, 0.0, 0.05, 0.1, 0.2]))
+    reference = Reference(x, 0.4)
+    qp = build_traction_qp(rows, FRICTION, 12.0, reference)
+
+    def rounded(x, peak):
+        across = np.hypot(x[:6], x[12] + x[13] * rows.along)
+        return across - peak * FRICTION * x[6:12]
+
+    def polygon(x, peak):
+        y = np.zeros(18)
+        y[:14], y[14] = (x - qp.shift[:14]) / qp.scale[:14], peak / qp.scale[14]
+        rows_ = (qp.A @ y - qp.upper)[CONES:LIMIT].reshape(6, -1)
+        return qp.scale[0] * rows_.max(axis=1)
+
+    assert polygon(x, 0.4) == pytest.approx(rounded(x, 0.4), abs=1e-12)
+    step, rng = 1e-6, np.random.default_rng(1)
+    for _ in range(20):
+        dx, du = rng.standard_normal(14), rng.standard_normal()
+        slopes = [
+            (f(x + step * dx, 0.4 + step * du) - f(x - step * dx, 0.4 - step * du)) / (2 * step)
+            for f in (polygon, rounded)
+        ]
+        assert slopes[0] == pytest.approx(slopes[1], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("torques", "changes"),
+    [
+        ((-0.2, 0.2, 0.0), (-0.733, 1.467, -0.733)),
+        ((-0.2, 0.0, 0.2), (-0.733, 1.467, -0.733)),
+        ((0.0, -0.2, 0.2), (0.0, 0.0, 0.0)),
+    ],
+)
+def test_the_rows_of_the_programme_have_the_slopes_of_figure_4(torques, changes):
+    rows = BalanceWriter(LSR1).write(level(), 0.0)
+    reference = Reference(rows.complete(np.zeros(6)), 0.1)
+    qp = build_traction_qp(rows, FRICTION, 12.0, reference)
+    determined, pulls = qp.A[:9, 6:14], qp.A[:9, :6]
+    tractions = np.tile(torques, 2) / LSR1.wheel.radius
+    loads = np.linalg.lstsq(determined, -pulls @ tractions, rcond=None)[0][:6]
+    assert loads == pytest.approx(np.tile(changes, 2), abs=5e-4)
+
+
+def test_straight_up_a_plane_all_wheels_use_the_same_share():
+    prediction = sweep_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])
+    answer = solve(LSR1, state_of(prediction, 0))
+    assert answer.utilisation == pytest.approx(np.full(6, 0.4 / 0.8), rel=2e-3)
+
+
+def test_tractions_add_up_to_the_wanted_push():
+    answer = solve(LSR1, level(), net=12.0)
+    assert answer.tractions.sum() == pytest.approx(12.0, abs=1e-6)
+    assert answer.loads.sum() == pytest.approx(LSR1.weight, rel=1e-9)
+
+
+def test_any_rover_is_balanced():
+    prediction = sweep_path(M2020, plane(0.2, 0.1, half=5.0), [[0.0, 0.0, 0.3]])
+    answer = solve(M2020, state_of(prediction, 0))
+    assert not answer.fallback and 0.2 < answer.utilisation.max() < 0.4
+    assert answer.torques == pytest.approx(answer.tractions * M2020.wheel.radius)
+
+
+def test_too_little_friction_is_told_by_how_much():
+    prediction = sweep_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])
+    answer = solve(LSR1, state_of(prediction, 0), friction=np.full(6, 0.2))
+    assert not answer.fallback
+    assert answer.friction_slack == pytest.approx(1.0, rel=0.02)
+
+
+def test_too_weak_motors_are_told_by_how_much_and_their_torques_are_cut_off():
+    prediction = sweep_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])
+    needed = LSR1.weight * np.sin(np.arctan(0.4)) / 6.0 * LSR1.wheel.radius
+    answer = solve(LSR1, state_of(prediction, 0), torque=0.6 * needed)
+    assert not answer.fallback
+    assert answer.torque_slack == pytest.approx(0.4 * needed, rel=0.02)
+    assert np.abs(answer.torques).max() == pytest.approx(0.6 * needed)
+
+
+def test_a_wheel_that_has_to_lift_is_told_with_its_missing_load():
+    state = replace(level(), roll=1.2)
+    answer = solve(LSR1, state)
+    assert not answer.fallback
+    assert answer.load_slack == pytest.approx(-answer.loads.min()) and answer.load_slack > 1.0
+    assert np.isinf(answer.utilisation.max()) and np.isinf(answer.friction_slack)
+
+
+def test_the_peak_never_rises_from_one_programme_to_the_next():
+    writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
+    for prediction, i in rough_states(LSR1, 50):
+        rows = writer.write(state_of(prediction, i), 0.0)
+        last, peak = None, measure_peak(rows, FRICTION, rows.complete(np.zeros(6)))
+        for _ in range(6):
+            answer = solve_traction(
+                workspace, rows, FRICTION, 2.0, 0.1, last=last, most_programmes=1
+            )
+            assert not answer.fallback
+            assert answer.utilisation.max() <= peak * (1.0 + 1e-3)
+            last, peak = answer.tractions, answer.utilisation.max()
+
+
+def test_the_best_place_on_the_line_is_no_worse_than_any_other_and_keeps_the_balance():
+    rng, weights = np.random.default_rng(5), TractionWeights(effort=0.0)
+    for prediction, i in rough_states(LSR1, 30):
+        rows = BalanceWriter(LSR1).write(state_of(prediction, i), 0.0)
+        start, aim = (rows.complete(0.1 * rng.standard_normal(6)) for _ in range(2))
+        x, peak, _ = find_best_between(rows, FRICTION, 12.0, weights, start, aim)
+        assert rows.A @ x == pytest.approx(rows.b, abs=1e-12)
+        assert peak == measure_peak(rows, FRICTION, x)
+        places = [start + t * (aim - start) for t in np.linspace(0.0, 1.5, 301)]
+        lifted = [min(place[6:12].min(), 0.0) for place in places]
+        least = min(
+            measure_peak(rows, FRICTION, place)
+            for place, lift in zip(places, lifted, strict=True)
+            if lift == 0.0
+        )
+        assert peak <= 1.01 * least
+
+
+def test_limits_of_torque_turn_to_wheels_with_torque_left():
+    prediction, i = next(rough_states(LSR1, 1))
+    free = solve(LSR1, state_of(prediction, i), net=10.0)
+    most = 0.9 * np.abs(free.torques).max()
+    held = solve(LSR1, state_of(prediction, i), net=10.0, torque=most)
+    assert np.abs(held.torques).max() <= most and held.torque_slack < 1e-3 * most
+
+
+def test_an_unsolved_programme_falls_back_to_equal_torques_and_says_so():
+    prediction, i = next(rough_states(LSR1, 1))
+    answer = solve(LSR1, state_of(prediction, i), workspace=TractionWorkspace(most_iterations=1))
+    assert answer.fallback and answer.programmes == 0 and answer.status != "solved"
+    assert answer.torques == pytest.approx(prediction.torque[i], abs=1e-9)
+
+
+def test_equal_torques_on_demand_are_no_fallback():
+    prediction, i = next(rough_states(LSR1, 1))
+    answer = solve(LSR1, state_of(prediction, i), programmes=0)
+    assert not answer.fallback and np.ptp(answer.torques) < 1e-12
+
+
+def test_a_start_from_the_last_answer_takes_less():
+    workspace = TractionWorkspace()
+    prediction, i = next(rough_states(LSR1, 1))
+    cold = solve(LSR1, state_of(prediction, i), workspace=workspace)
+    warm = solve(LSR1, state_of(prediction, i), workspace=workspace, last=cold.tractions)
+    assert warm.programmes == 1 and warm.iterations < 0.5 * cold.iterations
+    assert warm.utilisation.max() == pytest.approx(cold.utilisation.max(), rel=5e-3)
+
+
+def test_what_makes_no_sense_is_refused():
+    with pytest.raises(ModelError, match="friction"):
+        solve(LSR1, level(), friction=np.zeros(6))
+    with pytest.raises(ModelError, match="must all be above 0"):
+        solve(LSR1, level(), torque=-1.0)
+    with pytest.raises(ModelError, match="contact angles"):
+        BalanceWriter(LSR1).write(level(np.full(6, np.pi / 2) * [1, 1, 1, -1, -1, -1]), 0.0)

@@ -1,0 +1,197 @@
+"""Trapped: holes that a rover can drive into but neither on nor back out of."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability import entrapment as trap
+from rover_physics.traversability.judge_path import judge_path
+
+RESOLUTION = 0.02
+LSR1 = load_rover("lsr1")
+DEEP_DROPS = replace(LSR1, limits=replace(LSR1.limits, wheel_drop=1.0))
+X = np.tile(-3.0 + RESOLUTION * np.arange(301), (301, 1))
+
+
+def edge(height: float) -> Terrain:
+    """Return ground that changes by `height` [m] at x = 0."""
+    step = height * np.clip(X / RESOLUTION + 0.5, 0.0, 1.0)
+    return Terrain(step, RESOLUTION, (-3.0, -3.0))
+
+
+def hole(depth: float, width: float = 1.6) -> Terrain:
+    """Return ground with a hole across the way, `depth` and `width` [m], around x = 0."""
+    inside = np.clip((0.5 * width - np.abs(X)) / RESOLUTION + 0.5, 0.0, 1.0)
+    return Terrain(-depth * inside, RESOLUTION, (-3.0, -3.0))
+
+
+def way(start: float, end: float) -> np.ndarray:
+    x = np.arange(start, end, 0.01)
+    return np.column_stack([x, 0.0 * x, 0.0 * x])
+
+
+def verdict_on(ground: Terrain, start: float, end: float, rover=DEEP_DROPS, **arguments):
+    return judge_path(rover, ground, way(start, end), **arguments)[1]
+
+
+def test_a_path_that_ends_in_a_hole_without_way_out_is_refused_as_trapped():
+    verdict = verdict_on(hole(0.15), -1.6, 0.1)
+    assert not verdict.traversable
+    assert verdict.code == "trapped"
+    assert "no way on" in verdict.reason
+    assert "no way back" in verdict.reason
+    assert way(-1.6, 0.1)[verdict.first_failure, 0] < 0.0
+    assert verdict.codes[verdict.first_failure] == "trapped"
+
+
+def test_a_path_that_passes_such_a_hole_is_refused_where_the_rover_goes_in():
+    verdict = verdict_on(hole(0.15), -1.6, 1.6)
+    assert verdict.code == "trapped"
+    assert way(-1.6, 1.6)[verdict.first_failure, 0] < 0.0
+
+
+@pytest.mark.parametrize("end", [0.1, 1.6])
+def test_traction_control_gets_out_of_what_equal_torques_are_trapped_in(end):
+    assert verdict_on(hole(0.15), -1.6, end, policy="optimal").traversable
+
+
+@pytest.mark.parametrize("end", [0.1, 1.6])
+def test_weak_motors_are_trapped_where_strong_ones_are_not(end):
+    weak = verdict_on(hole(0.15), -1.6, end, policy="optimal", max_torque=0.5)
+    assert weak.code == "trapped"
+    assert "torque" in weak.reason
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_a_shallow_hole_traps_nobody(policy):
+    assert verdict_on(hole(0.05), -1.6, 0.1, policy=policy).traversable
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_a_step_down_to_open_ground_is_no_trap(policy):
+    """Back up may be impossible, but the way on is open."""
+    assert verdict_on(edge(-0.15), -1.2, 1.2, policy=policy).traversable
+    assert not verdict_on(edge(0.15), -1.2, 1.2, max_torque=0.5).traversable
+
+
+def test_an_end_below_an_edge_before_the_map_ends_is_a_trap():
+    """Nobody can say that the way on is open."""
+    whole = edge(-0.15)
+    ground = Terrain(whole.elevation[:, :231], RESOLUTION, whole.origin)
+    verdict = verdict_on(ground, -1.2, 1.0, max_torque=0.5)
+    assert verdict.code == "trapped"
+    assert "off the map" in verdict.reason
+    assert verdict_on(whole, -1.2, 1.0, max_torque=0.5).traversable
+
+
+def test_a_drop_beyond_the_limit_is_refused_as_a_drop():
+    verdict = verdict_on(edge(-0.15), -1.2, 1.2, rover=LSR1)
+    assert verdict.code == "wheel_drop"
+
+
+def test_ground_without_edges_is_judged_as_before():
+    for policy in ("equal", "optimal"):
+        assert verdict_on(edge(0.0), -1.2, 1.2, policy=policy).traversable
+
+
+def bowl(depth: float, floor: float, slope: float, reach: float = 6.0) -> Terrain:
+    """Return a round crater: a level floor of radius `floor` [m], then walls of `slope` [rad]."""
+    axis = np.arange(-reach, reach + 0.5 * 0.05, 0.05)
+    away = np.hypot(*np.meshgrid(axis, axis))
+    height = np.clip((away - floor) * np.tan(slope), 0.0, depth)
+    return Terrain(height, 0.05, (-reach, -reach))
+
+
+def verdict_in(ground: Terrain, start: float, end: float, **arguments):
+    x = np.arange(start, end, 0.04)
+    poses = np.column_stack([x, 0.0 * x, 0.0 * x])
+    return judge_path(LSR1, ground, poses, **arguments)[1]
+
+
+CRATER = bowl(0.7, 1.2, np.radians(18.0))
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_a_crater_of_soft_soil_is_a_trap_that_has_no_edges(policy):
+    """Down its walls the soil brakes the rover, up any of them the soil holds it too."""
+    ending = verdict_in(CRATER, -5.0, 0.0, soil="dry_sand", policy=policy)
+    passing = verdict_in(CRATER, -5.0, 5.0, soil="dry_sand", policy=policy)
+    for verdict in (ending, passing):
+        assert verdict.code == "trapped"
+        assert "no way on" in verdict.reason
+        assert "no way back" in verdict.reason
+        assert -5.0 + 0.04 * verdict.first_failure < -1.0
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_the_same_crater_of_firm_ground_is_none(policy):
+    assert verdict_in(CRATER, -5.0, 0.0, policy=policy).traversable
+    assert verdict_in(CRATER, -5.0, 5.0, policy=policy).traversable
+
+
+def test_a_crater_with_gentle_walls_is_no_trap_on_soil_either():
+    gentle = bowl(0.35, 1.2, np.radians(4.0), reach=9.0)
+    assert verdict_in(gentle, -8.0, 0.0, soil="dry_sand").traversable
+
+
+def test_down_a_sandy_slope_to_open_ground_is_no_trap():
+    """The way back up is too steep, but the plain ahead is open."""
+    x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
+    ramp = Terrain(np.clip(-x * np.tan(0.3), 0.0, 0.7), 0.05, (-6.0, -6.0))
+    assert verdict_in(ramp, -4.5, 1.5, soil="dry_sand").traversable
+    assert not judge_path(
+        LSR1, ramp, np.column_stack([np.arange(1.5, -4.5, -0.04), *np.zeros((2, 150))]),
+        soil="dry_sand", backward=True,
+    )[1].traversable  # fmt: skip
+
+
+def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
+    x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
+    ramp = np.clip(-x * np.tan(0.3), 0.0, 0.7)
+    wall = Terrain(np.where(x > 3.0, 1.0, ramp), 0.05, (-6.0, -6.0))
+    verdict = verdict_in(wall, -4.5, 3.0, soil="dry_sand")
+    assert not verdict.traversable
+    assert verdict.code != "trapped"
+    assert verdict_in(wall, -4.5, 1.4, soil="dry_sand").traversable
+
+
+@pytest.mark.parametrize("soil", [None, "dry_sand"])
+def test_an_obstacle_ahead_on_level_ground_is_no_trap(soil):
+    x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
+    wall = Terrain(np.where(x > 2.0, 1.0, 0.0), 0.05, (-6.0, -6.0))
+    verdict = verdict_in(wall, -2.0, 3.0, soil=soil)
+    assert not verdict.traversable
+    assert verdict.code != "trapped"
+
+
+def test_backwards_into_a_crater_is_as_much_a_trap():
+    x = np.arange(-5.0, 0.0, 0.04)
+    poses = np.column_stack([x, 0.0 * x, np.full(len(x), np.pi)])
+    verdict = judge_path(LSR1, CRATER, poses, soil="dry_sand", backward=True)[1]
+    assert verdict.code == "trapped"
+
+
+def test_on_coulomb_ground_without_drops_nothing_more_is_swept(monkeypatch):
+    asked = []
+    monkeypatch.setattr(trap, "sweep_path", lambda *a, **k: asked.append(a) or sweep_path(*a, **k))
+    assert verdict_in(CRATER, -5.0, 5.0).traversable
+    assert verdict_in(edge(0.0), -2.0, 2.0, soil="dry_sand").traversable
+    assert not asked
+    assert verdict_in(CRATER, -5.0, 0.0, soil="dry_sand").code == "trapped"
+    assert asked
+
+
+def test_forces_at_rest_are_the_same_both_ways_on_coulomb_ground():
+    x = np.arange(-5.0, 5.0, 0.1)
+    poses = np.column_stack([x, 0.0 * x, 0.0 * x])
+    there, back = (
+        sweep_path(LSR1, CRATER, path, backward=backward)
+        for path, backward in ((poses, False), (poses[::-1], True))
+    )
+    np.testing.assert_allclose(back.wheel_loads[::-1], there.wheel_loads, atol=1e-9)
+    np.testing.assert_allclose(back.tangential[::-1], there.tangential, atol=1e-9)
+    np.testing.assert_allclose(back.torque[::-1], there.torque, atol=1e-9)

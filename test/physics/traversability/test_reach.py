@@ -1,0 +1,220 @@
+"""Reach: the arm's inverse kinematics, and the query whether the rover can reach and push."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rover_physics.errors import ModelError, PoseError
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.manipulator import (
+    arm_angles,
+    distance_to_reach,
+    inverse_kinematics,
+    link_points,
+)
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.reach import judge_reach
+from support.rough_grounds import plane, smooth
+from support.rover_geometry import attitude_of
+
+LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
+ARM = LSR1.manipulator
+UNEQUAL = replace(ARM, link_lengths=(0.2, 0.5, 0.2))
+LIMITED = replace(ARM, joint_limits=((-3.2, 3.2), (-1.0, 1.0), (0.0, 2.5)))
+LEVEL, POSE = plane(0.0, 0.0), [0.0, 0.0, 0.0]
+HEIGHT = 0.30
+turns = st.floats(-3.1, 3.1)
+places = st.floats(-1.0, 1.0)
+few = settings(max_examples=20, deadline=None)
+
+
+def limited() -> Rover:
+    return replace(LSR1, manipulator=LIMITED)
+
+
+# Inverse kinematics
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.sampled_from([ARM, UNEQUAL]), places, places, places)
+def test_the_tip_comes_to_every_point_within_reach_in_two_ways(arm, x, y, z):
+    solutions = inverse_kinematics(arm, [x, y, z])
+    shoulder = np.add(arm.base, [0.0, 0.0, arm.link_lengths[0]])
+    distance = np.linalg.norm(np.subtract([x, y, z], shoulder))
+    upper, fore = arm.link_lengths[1:]
+    assert len(solutions) == (2 if abs(upper - fore) <= distance <= upper + fore else 0)
+    for angles in solutions:
+        assert link_points(arm, angles)[3] == pytest.approx([x, y, z], abs=1e-7)
+        assert (np.abs(angles) <= np.pi + 1e-12).all()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.sampled_from([ARM, UNEQUAL]), turns, turns, turns)
+def test_of_the_two_ways_one_is_the_arm_that_was_there(arm, yaw, shoulder, elbow):
+    angles = np.array([yaw, shoulder, elbow])
+    points = link_points(arm, angles)
+    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    assume((points[3] - points[1]) @ ahead > 1e-3)  # the arm faces its tip
+    assume(abs(np.sin(elbow)) > 1e-3)
+    solutions = inverse_kinematics(arm, points[3])
+    apart = [np.abs(np.sin(0.5 * (found - angles))).max() for found in solutions]
+    assert min(apart) <= 1e-6
+
+
+def test_elbow_up_comes_first():
+    up, down = inverse_kinematics(ARM, [0.6, 0.1, 0.1])
+    assert link_points(ARM, up)[2, 2] > link_points(ARM, down)[2, 2]
+
+
+def test_distance_to_reach_is_signed():
+    shoulder = np.array([0.25, 0.0, 0.25])
+    above = np.array([0.0, 0.0, 1.0])
+    assert distance_to_reach(UNEQUAL, shoulder + 0.8 * above) == pytest.approx(0.1)
+    assert distance_to_reach(UNEQUAL, shoulder + 0.5 * above) == 0.0
+    assert distance_to_reach(UNEQUAL, shoulder + 0.1 * above) == pytest.approx(-0.2)
+
+
+@settings(max_examples=100, deadline=None)
+@given(places, places, places)
+def test_solutions_keep_the_joint_limits(x, y, z):
+    free = inverse_kinematics(ARM, [x, y, z])
+    kept = inverse_kinematics(LIMITED, [x, y, z])
+    assert len(kept) <= len(free)
+    for angles in kept:
+        for angle, (low, high) in zip(angles, LIMITED.joint_limits, strict=True):
+            assert low <= angle <= high
+    for angles in free:
+        inside = abs(angles[1]) <= 1.0 and 0.0 <= angles[2] <= 2.5
+        assert inside == any(np.allclose(angles, other) for other in kept)
+
+
+def test_an_angle_beyond_its_joint_limits_is_refused_by_name():
+    assert arm_angles(LIMITED, {"arm_shoulder": 1.0})[1] == 1.0
+    with pytest.raises(ModelError, match=r"arm_shoulder.* 1\.1; it must be within -1 to 1 rad"):
+        sweep_path(limited(), LEVEL, [POSE], joint_angles={"arm_shoulder": 1.1})
+
+
+# The query
+
+
+@few
+@given(st.integers(0, 1000), st.floats(-3.0, 3.0), st.floats(0.1, 0.5), st.floats(-1.0, 1.0))
+def test_the_tip_is_at_the_target_in_the_map_frame(seed, yaw, away, side):
+    ground = smooth(seed)
+    standing = sweep_path(LSR1, ground, [[0.1, 0.0, yaw]])
+    R, origin = attitude_of(standing, 0), standing.position[0]
+    target = origin + R @ [0.3 + away * np.cos(side), away * np.sin(side), 0.2]
+    answer = judge_reach(LSR1, ground, [0.1, 0.0, yaw], target)
+    assert answer.reachable
+    angles = arm_angles(ARM, answer.joint_angles)
+    assert origin + R @ link_points(ARM, angles)[3] == pytest.approx(target, abs=1e-6)
+    assert answer.target == pytest.approx(R.T @ (target - origin), abs=1e-9)
+
+
+def test_a_point_before_the_rover_can_be_reached_and_pushed():
+    answer = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], tool_force=[0.0, 0.0, 5.0])
+    assert answer.possible
+    assert (answer.code, answer.reason) == ("", "")
+    assert answer.prediction.wheel_loads.sum() == pytest.approx(LSR1.weight - 5.0)
+
+
+def test_force_and_target_turn_with_the_rover():
+    here = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.1, 0.2], tool_force=[-4.0, 2.0, 3.0])
+    turned = [0.0, 0.0, np.pi / 2]
+    there = judge_reach(LSR1, LEVEL, turned, [-0.1, 0.7, 0.2], tool_force=[-2.0, -4.0, 3.0])
+    assert there.joint_angles == pytest.approx(here.joint_angles)
+    assert there.prediction.wheel_loads == pytest.approx(here.prediction.wheel_loads, abs=1e-4)
+
+
+def test_of_two_ways_the_safer_one_is_chosen():
+    # Far back and high: the elbow hanging low keeps the centre of mass lower.
+    target = [0.55, 0.30, 0.45]
+    answer = judge_reach(LSR1, LEVEL, POSE, target, payload=0.5)
+    margins = []
+    for angles in inverse_kinematics(ARM, answer.target):
+        joints = dict(zip(ARM.joints, angles, strict=True))
+        held = sweep_path(LSR1, LEVEL, [POSE], joint_angles=joints, payload=0.5)
+        margins.append(held.tip_over_ratio[0])
+    assert margins[0] != margins[1]
+    assert answer.prediction.tip_over_ratio[0] == pytest.approx(max(margins))
+
+
+def test_too_far_says_by_how_much():
+    answer = judge_reach(LSR1, LEVEL, POSE, [0.25 + 0.75, 0.0, 0.15 + HEIGHT])
+    assert (answer.possible, answer.reachable, answer.code) == (False, False, "too_far")
+    assert answer.out_of_reach == pytest.approx(0.15, abs=1e-4)
+    assert "0.150 m out of reach" in answer.reason
+    assert "reaches 0.600 m" in answer.reason
+    assert answer.joint_angles is None
+    assert answer.verdict is None
+
+
+def test_too_near_says_by_how_much():
+    rover = replace(LSR1, manipulator=replace(ARM, link_lengths=(0.1, 0.4, 0.2)))
+    answer = judge_reach(rover, LEVEL, POSE, [0.25 + 0.12, 0.0, 0.15 + HEIGHT])
+    assert (answer.reachable, answer.code) == (False, "too_near")
+    assert answer.out_of_reach == pytest.approx(-0.08, abs=1e-4)
+    assert "0.080 m too near" in answer.reason
+
+
+def test_joint_limits_are_told_from_the_length_of_the_arm():
+    answer = judge_reach(limited(), LEVEL, POSE, [0.25, 0.0, 0.15 + HEIGHT + 0.55])
+    assert (answer.reachable, answer.code) == (False, "joint_limits")
+    assert "arm_shoulder at" in answer.reason
+    assert "limits -1.00 to 1.00 rad" in answer.reason
+
+
+def test_a_payload_too_heavy_is_reached_but_not_held():
+    answer = judge_reach(LSR1, LEVEL, POSE, [0.8, 0.0, 0.45], payload=4.0)
+    assert (answer.possible, answer.reachable, answer.code) == (False, True, "tip_over")
+    assert "tip-over ratio" in answer.reason
+
+
+def test_a_push_beyond_friction_is_told_as_such():
+    target, force = [0.7, 0.0, 0.1], [-30.0, 0.0, 0.0]
+    slips = judge_reach(LSR1, LEVEL, POSE, target, tool_force=force, friction=0.3)
+    holds = judge_reach(LSR1, LEVEL, POSE, target, tool_force=force, friction=0.9)
+    assert slips.code == "friction"
+    assert holds.possible
+
+
+def test_a_push_beyond_the_motors_is_told_as_such():
+    force = [-30.0, 0.0, 0.0]
+    answer = judge_reach(
+        LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], tool_force=force, friction=0.9, max_torque=0.4
+    )
+    assert answer.code == "torque"
+
+
+def test_pushing_hard_on_the_ground_lifts_the_rover_off_its_wheels():
+    answer = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], tool_force=[0.0, 0.0, 60.0])
+    assert not answer.possible
+    assert answer.code in ("tip_over", "wheel_lift")
+
+
+def test_a_pose_off_the_map_has_the_verdict_of_a_sweep():
+    answer = judge_reach(LSR1, LEVEL, [50.0, 0.0, 0.0], [50.5, 0.0, 0.1])
+    assert (answer.possible, answer.reachable, answer.code) == (False, False, "off_map")
+    assert np.isnan(answer.out_of_reach)
+
+
+def test_a_rover_without_an_arm_is_refused():
+    with pytest.raises(ModelError, match="m2020.*no manipulator to reach with"):
+        judge_reach(M2020, LEVEL, POSE, [0.5, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("target", [[0.5, 0.0], [np.nan, 0.0, 0.0], "here", 3])
+def test_a_target_that_is_no_point_is_refused(target):
+    with pytest.raises(ModelError, match="target is"):
+        judge_reach(LSR1, LEVEL, POSE, target)
+
+
+def test_a_pose_that_is_none_is_refused():
+    with pytest.raises(PoseError):
+        judge_reach(LSR1, LEVEL, [0.0, np.inf, 0.0], [0.5, 0.0, 0.0])
+    with pytest.raises(PoseError, match="one pose"):
+        judge_reach(LSR1, LEVEL, [[0.0, 0.0, 0.0]] * 2, [0.5, 0.0, 0.0])

@@ -1,0 +1,183 @@
+"""Torque ranges: as wide as linear programmes of their own find them, and consistent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog, minimize
+
+from rover_physics.errors import ModelError
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.torque_ranges import find_torque_ranges
+from rover_physics.traversability.verdict import judge
+from support.reference_cases import reference_ground
+from support.rough_grounds import mirrored, plane, random_poses, rocky, smooth
+from support.rover_geometry import balance_matrix
+
+LSR1 = load_rover("lsr1")
+SIDES = 96
+few = settings(max_examples=15, deadline=None)
+
+
+def range_by_programme(prediction, i, wheel, max_torque, inside: bool) -> np.ndarray:
+    """Return the range [N m] of a wheel's torque by linear programmes in N, T, s0, s1.
+
+    The friction cones are replaced by pyramids around them or inside them.
+    """
+    A, b, along = balance_matrix(LSR1, prediction, i)
+    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    shrink = np.cos(np.pi / SIDES) if inside else 1.0
+    rows = np.zeros((6 * SIDES, 14))
+    for w in range(6):
+        own = slice(w * SIDES, (w + 1) * SIDES)
+        rows[own, w] = -shrink * prediction.friction[i, w]
+        rows[own, 6 + w] = np.cos(turns)
+        rows[own, 12], rows[own, 13] = np.sin(turns), np.sin(turns) * along[w]
+    pull = max_torque / (LSR1.wheel.radius * LSR1.weight)
+    bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + [(None, None)] * 2
+    ends = []
+    for sign in (1.0, -1.0):
+        cost = np.zeros(14)
+        cost[6 + wheel] = sign
+        answer = linprog(cost, rows, np.zeros(len(rows)), A, b, bounds, method="highs")
+        assert answer.status == 0, answer.message
+        ends.append(sign * answer.fun * LSR1.wheel.radius * LSR1.weight)
+    return np.array(ends)
+
+
+@pytest.mark.parametrize(
+    ("ground", "max_torque"), [(smooth(3), 2.0), (rocky(5), 0.8), (plane(0.4, 0.1), 2.0)]
+)
+def test_ranges_lie_between_those_of_linear_programmes(ground, max_torque):
+    poses = random_poses(2, 3, 0.5)
+    ranges = find_torque_ranges(LSR1, ground, poses, max_torque=max_torque)
+    optimal = sweep_path(LSR1, ground, poses, policy="optimal", max_torque=max_torque)
+    compared = 0
+    for i in np.flatnonzero(ranges.feasible):
+        if not has_equal_shares(optimal, i):
+            continue
+        for wheel in range(6):
+            compared += 1
+            widest = range_by_programme(optimal, i, wheel, max_torque, inside=False)
+            within = range_by_programme(optimal, i, wheel, max_torque, inside=True)
+            slack = 1e-4 * max_torque
+            assert widest[0] - slack <= ranges.lowest[i, wheel] <= within[0] + slack
+            assert within[1] - slack <= ranges.highest[i, wheel] <= widest[1] + slack
+    assert compared >= 6
+
+
+def has_equal_shares(prediction, i) -> bool:
+    _, _, along = balance_matrix(LSR1, prediction, i)
+    S = prediction.lateral[i]
+    left = S - np.polyval(np.polyfit(along, S, 1), along)
+    return bool(np.abs(left).max() <= 1e-6 * LSR1.weight)
+
+
+def test_a_general_solver_finds_no_torque_beyond_the_range():
+    ground, pose = plane(0.3, 0.15), [[0.0, 0.0, 0.4]]
+    ranges = find_torque_ranges(LSR1, ground, pose)
+    optimal = sweep_path(LSR1, ground, pose, policy="optimal")
+    A, b, along = balance_matrix(LSR1, optimal, 0)
+    start = np.concatenate([optimal.wheel_loads[0], optimal.tangential[0]]) / LSR1.weight
+    slope, middle = np.polyfit(along, optimal.lateral[0] / LSR1.weight, 1)
+    pull = 2.0 / (LSR1.wheel.radius * LSR1.weight)
+
+    def room(x):
+        S = x[12] + x[13] * along
+        cones = (0.8 * x[:6]) ** 2 - x[6:12] ** 2 - S**2
+        return np.concatenate([cones, x[:6], pull - x[6:12], pull + x[6:12]])
+
+    for wheel in range(6):
+        for sign, end in ((1.0, ranges.lowest), (-1.0, ranges.highest)):
+            answer = minimize(
+                lambda x, s=sign, w=wheel: s * x[6 + w],
+                np.append(start, [middle, slope]),
+                constraints=[
+                    {"type": "eq", "fun": lambda x: A @ x - b},
+                    {"type": "ineq", "fun": room},
+                ],
+                method="SLSQP",
+                options={"maxiter": 500, "ftol": 1e-10},
+            )
+            if answer.success:
+                found = sign * answer.fun * LSR1.wheel.radius * LSR1.weight
+                assert found == pytest.approx(end[0, wheel], abs=2e-3)
+
+
+@few
+@given(st.integers(0, 1000), st.floats(-3.0, 3.0))
+def test_torques_that_a_policy_uses_are_within_the_ranges(seed, yaw):
+    ground, pose = smooth(seed), [[0.1, 0.2, yaw]]
+    ranges = find_torque_ranges(LSR1, ground, pose)
+    for policy in ("equal", "optimal"):
+        prediction = sweep_path(LSR1, ground, pose, policy=policy)
+        if judge(LSR1, prediction).code not in ("", "belly", "tilt"):
+            continue
+        assert ranges.feasible[0]
+        assert (prediction.torque >= ranges.lowest - 1e-4).all()
+        assert (prediction.torque <= ranges.highest + 1e-4).all()
+
+
+def test_ranges_are_empty_where_no_torques_keep_the_constraints():
+    poses = [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]
+    ranges = find_torque_ranges(LSR1, plane(0.45, 0.0), poses, friction=0.4)
+    assert not ranges.feasible.any()
+    assert np.isnan(ranges.lowest).all()
+    assert np.isnan(ranges.highest).all()
+
+
+def test_tighter_limits_leave_narrower_ranges():
+    ground, pose = plane(0.2, 0.0), [[0.0, 0.0, 0.2]]
+    wide = find_torque_ranges(LSR1, ground, pose)
+    careful = replace(
+        LSR1, limits=replace(LSR1.limits, friction_utilisation=0.8, torque_saturation=0.5)
+    )
+    for narrow in (
+        find_torque_ranges(LSR1, ground, pose, friction=0.5),
+        find_torque_ranges(LSR1, ground, pose, max_torque=0.7),
+        find_torque_ranges(careful, ground, pose),
+    ):
+        assert narrow.feasible.all()
+        assert (narrow.lowest >= wide.lowest - 1e-4).all()
+        assert (narrow.highest <= wide.highest + 1e-4).all()
+        assert (narrow.highest - narrow.lowest < wide.highest - wide.lowest - 1e-3).any()
+    assert np.abs(find_torque_ranges(careful, ground, pose).highest).max() <= 1.0
+
+
+def test_mirrored_ground_swaps_the_ranges_of_right_and_left():
+    ground, poses = plane(0.2, 0.1), np.array([[0.0, 0.0, 0.3]])
+    here = find_torque_ranges(LSR1, ground, poses)
+    there = find_torque_ranges(LSR1, *mirrored(ground, poses))
+    assert there.lowest == pytest.approx(here.lowest[:, [3, 4, 5, 0, 1, 2]], abs=2e-3)
+    assert there.highest == pytest.approx(here.highest[:, [3, 4, 5, 0, 1, 2]], abs=2e-3)
+
+
+def test_at_the_foot_of_a_step_ranges_hold_what_optimal_torques_use():
+    case = reference_ground("settled_a/step")
+    ranges = find_torque_ranges(LSR1, case.terrain, case.poses)
+    optimal = sweep_path(LSR1, case.terrain, case.poses, policy="optimal")
+    for i in range(len(case.poses)):
+        within = optimal.friction_utilisation[i].max() < 1.0
+        within &= optimal.torque_saturation[i].max() < 1.0
+        assert ranges.feasible[i] == within
+        if within:
+            assert (optimal.torque[i] >= ranges.lowest[i] - 1e-4).all()
+            assert (optimal.torque[i] <= ranges.highest[i] + 1e-4).all()
+
+
+def test_on_sand_the_ranges_are_narrower_and_hold_the_torques_used():
+    ground, pose = plane(0.1, 0.0), [[0.0, 0.0, 0.0]]
+    firm = find_torque_ranges(LSR1, ground, pose)
+    sand = find_torque_ranges(LSR1, ground, pose, soil="dry_sand")
+    used = sweep_path(LSR1, ground, pose, soil="dry_sand", policy="optimal").torque
+    assert (sand.highest - sand.lowest < firm.highest - firm.lowest).all()
+    assert (sand.lowest <= used).all()
+    assert (used <= sand.highest).all()
+
+
+def test_the_policy_is_not_an_argument():
+    with pytest.raises((TypeError, ModelError)):
+        find_torque_ranges(LSR1, plane(0.0, 0.0), [[0.0, 0.0, 0.0]], policy="equal")

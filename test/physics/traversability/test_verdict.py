@@ -1,0 +1,212 @@
+"""Limits: each broken limit is told with its code, the wheel or joint, the value and the limit."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.prediction.sweep import (
+    NO_EQUILIBRIUM,
+    NOT_SETTLED,
+    OFF_MAP,
+    UNKNOWN_GROUND,
+    sweep_path,
+)
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.limit_checks import tilt_of
+from rover_physics.traversability.verdict import CODES, judge
+from support.rough_grounds import plane
+
+LSR1 = load_rover("lsr1")
+POSES = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
+
+
+@pytest.fixture(scope="module")
+def fine():
+    """Return the prediction of a path over level ground, on which nothing is broken."""
+    return sweep_path(LSR1, plane(0.0, 0.0), POSES)
+
+
+def with_value(prediction, name, row, value, column=()):
+    """Return the prediction with one number changed."""
+    values = getattr(prediction, name).copy()
+    values[(row, *column)] = value
+    return replace(prediction, **{name: values})
+
+
+def with_status(prediction, row, status):
+    """Return the prediction as if one waypoint had not settled."""
+    changes = {}
+    for name, values in vars(prediction).items():
+        if isinstance(values, np.ndarray) and values.dtype == float and name not in (
+            "poses", "distance"
+        ):  # fmt: skip
+            changes[name] = values.copy()
+            changes[name][row] = np.nan
+    changes["status"] = prediction.status.copy()
+    changes["status"][row] = status
+    changes["settled"] = changes["status"] == 0
+    return replace(prediction, **changes)
+
+
+def test_a_path_over_level_ground_is_traversable(fine):
+    verdict = judge(LSR1, fine)
+    assert verdict.traversable
+    assert verdict.first_failure == -1
+    assert (verdict.code, verdict.reason) == ("", "")
+    assert verdict.reasons == verdict.codes == ("",) * 5
+
+
+@pytest.mark.parametrize(
+    ("code", "name", "column", "value", "words"),
+    [
+        ("tilt", "roll", (), 0.53, ["30.4 deg", "29.8 deg"]),
+        ("tilt", "pitch", (), -0.53, ["30.4 deg", "29.8 deg"]),
+        ("tip_over", "tip_over_ratio", (), 0.29, ["0.29", "0.30"]),
+        ("tip_over", "tip_over_ratio", (), -0.5, ["-0.50", "0.30"]),
+        ("wheel_lift", "wheel_loads", (3,), -0.25, ["rear_left", "-0.25 N", "equal"]),
+        ("friction", "friction_utilisation", (2,), 1.25, ["front_right", "1.25", "1.00"]),
+        ("torque", "torque_saturation", (4,), 1.5, ["middle_left", "1.50", "1.00"]),
+        ("belly", "belly_clearance", (), 0.011, ["0.011 m", "0.020 m"]),
+        ("belly", "belly_clearance", (), -0.1, ["-0.100 m", "0.020 m"]),
+        ("suspension", "rocker_angle", (0,), 0.61, ["right rocker", "0.61", "0.60"]),
+        ("suspension", "rocker_angle", (1,), -0.61, ["left rocker", "-0.61", "-0.60"]),
+        ("suspension", "bogie_angle", (1,), 0.95, ["left bogie", "0.95", "0.90"]),
+        ("suspension", "bogie_angle", (0,), -0.95, ["right bogie", "-0.95", "-0.90"]),
+    ],
+)
+def test_a_broken_limit_is_told_at_its_waypoint(fine, code, name, column, value, words):
+    verdict = judge(LSR1, with_value(fine, name, 3, value, column))
+    assert not verdict.traversable
+    assert verdict.first_failure == 3
+    assert verdict.codes == ("", "", "", code, "")
+    assert verdict.code == code
+    assert verdict.reason == verdict.reasons[3]
+    for word in words:
+        assert word in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "value"),
+    [
+        ("roll", (), 0.52),
+        ("tip_over_ratio", (), 0.3),
+        ("friction_utilisation", (1,), 1.0),
+        ("torque_saturation", (1,), 1.0),
+        ("belly_clearance", (), 0.02),
+        ("rocker_angle", (0,), -0.60),
+        ("bogie_angle", (1,), 0.90),
+        ("wheel_loads", (5,), 0.0),
+    ],
+)
+def test_a_value_at_its_limit_is_allowed(fine, name, column, value):
+    assert judge(LSR1, with_value(fine, name, 2, value, column)).traversable
+
+
+def test_the_limits_are_those_of_the_rover(fine):
+    shy = replace(LSR1, limits=replace(LSR1.limits, belly_clearance=0.25))
+    assert judge(LSR1, fine).traversable
+    assert judge(shy, fine).code == "belly"
+
+
+@pytest.mark.parametrize(
+    ("status", "code", "word"),
+    [
+        (OFF_MAP, "off_map", "map"),
+        (UNKNOWN_GROUND, "unknown_ground", "unknown"),
+        (NOT_SETTLED, "not_settled", "six wheels"),
+        (NO_EQUILIBRIUM, "no_equilibrium", "loads"),
+    ],
+)
+def test_a_waypoint_without_a_pose_is_told_by_its_cause(fine, status, code, word):
+    verdict = judge(LSR1, with_status(fine, 1, status))
+    assert not verdict.traversable
+    assert (verdict.first_failure, verdict.code) == (1, code)
+    assert word in verdict.reason
+
+
+def test_the_first_failure_along_the_path_is_the_reason(fine):
+    broken = with_value(fine, "belly_clearance", 1, 0.0)
+    broken = with_value(broken, "tip_over_ratio", 4, 0.0)
+    verdict = judge(LSR1, broken)
+    assert (verdict.first_failure, verdict.code) == (1, "belly")
+    assert verdict.codes == ("", "belly", "", "", "tip_over")
+
+
+def test_of_several_limits_at_one_waypoint_the_first_of_the_codes_is_told(fine):
+    broken = with_value(fine, "belly_clearance", 2, 0.0)
+    broken = with_value(broken, "friction_utilisation", 2, 3.0, (0,))
+    broken = with_value(broken, "tip_over_ratio", 2, 0.1)
+    assert judge(LSR1, broken).code == "tip_over"
+    assert CODES.index("tip_over") < CODES.index("friction") < CODES.index("belly")
+
+
+def test_a_wheel_that_lifts_is_told_as_lifting_not_as_slipping(fine):
+    lifted = with_value(fine, "wheel_loads", 0, -1.0, (0,))
+    lifted = with_value(lifted, "friction_utilisation", 0, np.inf, (0,))
+    assert judge(LSR1, lifted).code == "wheel_lift"
+
+
+def test_margins_are_the_worst_along_the_settled_part(fine):
+    changed = with_status(with_value(fine, "tip_over_ratio", 1, 0.7), 3, NOT_SETTLED)
+    changed = with_value(changed, "friction_utilisation", 2, 0.4, (3,))
+    changed = with_value(changed, "torque_saturation", 2, 0.6, (1,))
+    changed = with_value(changed, "belly_clearance", 0, 0.05)
+    changed = with_value(changed, "pitch", 4, -0.2)
+    verdict = judge(LSR1, changed)
+    assert verdict.min_tip_over_ratio == 0.7
+    assert verdict.max_friction_utilisation == 0.4
+    assert verdict.max_torque_saturation == 0.6
+    assert verdict.min_belly_clearance == 0.05
+    assert verdict.max_tilt == pytest.approx(0.2)
+
+
+def test_margins_of_a_path_that_settles_nowhere_are_nan():
+    nowhere = sweep_path(LSR1, plane(0.0, 0.0), POSES + np.array([50.0, 0.0, 0.0]))
+    verdict = judge(LSR1, nowhere)
+    assert (verdict.code, verdict.first_failure) == ("off_map", 0)
+    assert np.isnan(verdict.min_tip_over_ratio)
+    assert np.isnan(verdict.min_belly_clearance)
+
+
+def test_tilt_joins_roll_and_pitch(fine):
+    tilted = with_value(with_value(fine, "roll", 0, 0.3), "pitch", 0, 0.4)
+    assert tilt_of(tilted)[0] == pytest.approx(np.arccos(np.cos(0.3) * np.cos(0.4)))
+    assert tilt_of(tilted)[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_verdict_is_json_with_none_for_what_is_not_finite(fine):
+    broken = with_value(fine, "friction_utilisation", 2, np.inf, (3,))
+    report = judge(LSR1, broken).to_dict()
+    back = json.loads(json.dumps(report, allow_nan=False))
+    assert back == report
+    assert back["code"] == "friction"
+    assert back["max_friction_utilisation"] is None
+    assert back["codes"] == ["", "", "friction", "", ""]
+
+
+@pytest.mark.parametrize(
+    ("slope", "yaw", "arguments", "code"),
+    [
+        (0.65, 0.0, {}, "tilt"),
+        (0.45, 0.0, {"friction": 0.3}, "friction"),
+        (0.30, 0.0, {"max_torque": 0.3}, "torque"),
+        (0.30, 0.0, {}, ""),
+        (0.45, 0.0, {}, "friction"),
+        (-0.45, 0.0, {"friction": 0.3}, "friction"),
+        (0.45, np.pi / 2, {"friction": 0.3}, "friction"),
+    ],
+)
+def test_slopes_are_refused_for_the_physical_reason(slope, yaw, arguments, code):
+    prediction = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], **arguments)
+    assert judge(LSR1, prediction).code == code
+
+
+def test_a_stone_higher_than_the_belly_is_refused():
+    level = plane(0.0, 0.0)
+    heights = level.elevation.copy()
+    heights[30, 30] = 0.235
+    ground = replace(level, elevation=heights)
+    prediction = sweep_path(LSR1, ground, [[0.0, 0.0, 0.0]])
+    assert judge(LSR1, prediction).code == "belly"

@@ -1,0 +1,143 @@
+"""Candidate paths meet both poses, are evenly sampled, smooth, and never too tight to drive."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rover_planner.errors import PlanningError
+from rover_planner.planning.candidates import (
+    MIN_RADIUS,
+    generate_candidates,
+    lateral_offsets,
+    path_length,
+)
+
+METRES = st.floats(-20.0, 20.0)
+ANGLES = st.floats(-2 * np.pi, 2 * np.pi)
+POSES = st.tuples(METRES, METRES, ANGLES)
+FEW = settings(max_examples=60, deadline=None)
+
+
+def angle_between(a, b):
+    return np.abs(np.angle(np.exp(1j * (np.asarray(a) - np.asarray(b)))))
+
+
+@FEW
+@given(POSES, POSES)
+def test_every_candidate_begins_at_the_start_and_ends_at_the_goal(start, goal):
+    paths = generate_candidates(start, goal)
+    assert 1 <= len(paths) <= 9
+    for path in paths:
+        assert path[-1, :2] == pytest.approx(goal[:2], abs=0)
+        assert angle_between(path[-1, 2], goal[2]) < 1e-9
+        if len(path) > 1:
+            assert path[0, :2] == pytest.approx(start[:2], abs=0)
+            assert angle_between(path[0, 2], start[2]) < 1e-9
+
+
+@FEW
+@given(POSES, POSES, st.sampled_from([0.02, 0.05, 0.13]))
+def test_waypoints_are_equally_far_apart(start, goal, waypoint_spacing):
+    for path in generate_candidates(start, goal, waypoint_spacing=waypoint_spacing):
+        if len(path) < 3:
+            continue
+        gaps = np.hypot(*np.diff(path[:, :2], axis=0).T)
+        # chords of an arc of the smallest radius are shorter than the arc by this much at most
+        shortening = 1 - np.sinc(gaps.max() / 2 / MIN_RADIUS / np.pi)
+        assert gaps.max() <= waypoint_spacing * (1 + 1e-4)
+        assert gaps.max() - gaps.min() <= gaps.max() * (1e-4 + 2 * shortening)
+
+
+@FEW
+@given(POSES, POSES)
+def test_headings_are_continuous_and_no_curve_is_too_tight(start, goal):
+    for path in generate_candidates(start, goal):
+        turned = angle_between(path[1:, 2], path[:-1, 2])
+        gaps = np.hypot(*np.diff(path[:, :2], axis=0).T)
+        assert np.all(turned <= gaps / MIN_RADIUS * 1.01 + 1e-6)
+
+
+@FEW
+@given(POSES, POSES)
+def test_yaw_is_the_direction_of_driving(start, goal):
+    for path in generate_candidates(start, goal):
+        steps = np.diff(path[:, :2], axis=0)
+        far_enough = np.hypot(*steps.T) > 1e-3
+        along = np.arctan2(steps[:, 1], steps[:, 0])
+        half_turn = 0.5 * np.angle(np.exp(1j * np.diff(path[:, 2])))
+        middle = path[:-1, 2] + half_turn
+        # where an arc to the left meets one to the right, half-way in yaw is not half-way in path
+        assert np.all(angle_between(along, middle)[far_enough] < 0.02 / MIN_RADIUS / 3)
+
+
+def test_the_first_candidate_between_aligned_poses_is_the_straight_line():
+    path = generate_candidates((1.0, 2.0, 0.0), (5.0, 2.0, 0.0))[0]
+    assert path[:, 1] == pytest.approx(2.0, abs=1e-12)
+    assert path[:, 2] == pytest.approx(0.0, abs=1e-12)
+    assert len(path) == 201
+
+
+def test_the_fan_spreads_by_the_spacing_to_both_sides():
+    paths = generate_candidates((0, 0, 0), (10, 0, 0), count=7, spacing=0.4)
+    furthest = [path[np.argmax(np.abs(path[:, 1])), 1] for path in paths]
+    assert furthest == pytest.approx([0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2], abs=1e-3)
+    assert lateral_offsets(4, 0.5) == [0.0, 0.5, -0.5, 1.0]
+
+
+def test_curves_too_tight_for_the_rover_are_dropped_but_never_all():
+    wide = generate_candidates((0, 0, 0), (3, 0, 0), count=9, min_radius=0.1)
+    tight = generate_candidates((0, 0, 0), (3, 0, 0), count=9, min_radius=2.0)
+    assert len(wide) == 9
+    assert 1 <= len(tight) < 9
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [(-5, 0, 0), (5, 0, np.pi), (0.3, 0.3, 1.57), (0, 0, np.pi), (0, 0.01, 0), (-1, 0, np.pi)],
+)
+def test_awkward_goals_get_arcs_of_the_smallest_radius(goal):
+    paths = generate_candidates((0, 0, 0), goal, min_radius=0.8)
+    assert paths
+    lengths = [path_length(path) for path in paths]
+    assert lengths[0] == pytest.approx(min(lengths))
+    assert lengths[0] < np.hypot(goal[0], goal[1]) + 4 * np.pi * 0.8
+
+
+def test_a_u_turn_swings_out_instead_of_turning_on_the_spot():
+    path = generate_candidates((0, 0, 0), (0, 4, np.pi))[0]
+    assert path[:, 0].max() > 0.5
+    assert path[:, 0].min() > -1e-9
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -np.pi, 7.0])
+def test_start_equal_to_goal_is_a_single_pose(yaw):
+    paths = generate_candidates((1, 2, yaw), (1, 2, yaw))
+    assert len(paths) == 1
+    assert paths[0].shape == (1, 3)
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"start": (np.nan, 0, 0)}, "start"),
+        ({"goal": (0, np.inf, 0)}, "goal"),
+        ({"goal": (0, 0)}, "goal"),
+        ({"goal": "home"}, "goal"),
+        ({"count": 0}, "count"),
+        ({"count": 2.5}, "count"),
+        ({"count": True}, "count"),
+        ({"spacing": 0.0}, "spacing"),
+        ({"spacing": np.nan}, "spacing"),
+        ({"waypoint_spacing": -0.02}, "waypoint_spacing"),
+        ({"waypoint_spacing": "2 cm"}, "waypoint_spacing"),
+        ({"min_radius": 0}, "min_radius"),
+        ({"goal": (1e9, 0, 0)}, "waypoints"),
+        ({"goal": (1e308, -1e308, 0)}, "waypoints"),
+    ],
+)
+def test_bad_requests_are_refused_by_name(change, names):
+    arguments = {"start": (0, 0, 0), "goal": (4, 1, 0)} | change
+    start, goal = arguments.pop("start"), arguments.pop("goal")
+    with pytest.raises(PlanningError, match=names):
+        generate_candidates(start, goal, **arguments)

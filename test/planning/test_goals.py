@@ -1,0 +1,74 @@
+"""Goals are chosen from the map: known ground to stand on, hard ground, and beyond the edge."""
+
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.planning.goals import choose_mission, footprint_radius
+from rover_planner.worlds.mars_terrain import make_mars_terrain
+
+
+@pytest.fixture(scope="module")
+def rover():
+    return load_rover("lsr1")
+
+
+@pytest.fixture(scope="module")
+def holed():
+    """A Mars-like terrain with a corner that was never seen."""
+    made = make_mars_terrain(2, 16.0, 0.1)
+    elevation = made.elevation.copy()
+    elevation[90:, 90:] = np.nan
+    return Terrain(elevation, made.resolution, made.origin)
+
+
+def by_intent(mission):
+    return {goal.intent: goal.pose for goal in mission.goals}
+
+
+def test_start_and_plain_goals_stand_on_known_ground(rover, holed):
+    mission = choose_mission(holed, rover)
+    plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
+    assert len(plain) >= 2
+    for x, y, _ in [mission.start, *plain]:
+        turn = np.linspace(0, 2 * np.pi, 20)
+        radius = 0.5 * footprint_radius(rover)
+        assert np.isfinite(
+            holed.elevation_at(x + radius * np.cos(turn), y + radius * np.sin(turn))
+        ).all()
+
+
+def test_hard_goals_are_what_they_say(rover, holed):
+    places = by_intent(choose_mission(holed, rover))
+    assert not holed.contains(*places["off the map"][:2])
+    x, y, _ = places["unknown ground"]
+    assert holed.contains(x, y)
+    assert np.isnan(holed.elevation_at(x, y))
+    assert np.isfinite(holed.elevation_at(*places["steep"][:2]))
+
+
+def test_a_map_without_holes_has_no_unknown_goal(rover):
+    places = by_intent(choose_mission(make_mars_terrain(1, 12.0, 0.1), rover))
+    assert "unknown ground" not in places
+    assert "off the map" in places
+
+
+def test_the_same_seed_chooses_the_same_goals(rover, holed):
+    assert choose_mission(holed, rover, 3) == choose_mission(holed, rover, 3)
+
+
+def test_names_are_letters_in_order(rover, holed):
+    names = [goal.name for goal in choose_mission(holed, rover).goals]
+    assert names == [chr(ord("A") + k) for k in range(len(names))]
+
+
+def test_a_map_smaller_than_the_rover_is_refused(rover):
+    with pytest.raises(PlanningError, match="no place"):
+        choose_mission(Terrain(np.zeros((8, 8)), 0.1), rover)
+
+
+def test_a_small_map_still_has_goals(rover):
+    mission = choose_mission(Terrain(np.zeros((40, 40)), 0.05), rover)
+    assert mission.goals

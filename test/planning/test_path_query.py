@@ -1,0 +1,168 @@
+"""The query sweeps the candidates, chooses by risk and then energy, and explains a refusal."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from rover_physics.errors import ModelError, PoseError
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import (
+    PathQueryOptions,
+    answer_path_query,
+    check_path,
+    choose,
+    path_risk,
+    smallest_radius,
+)
+
+COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
+
+
+@pytest.fixture(scope="module")
+def rover():
+    return load_rover("lsr1")
+
+
+def flat(size=10.0, resolution=0.05):
+    cells = int(size / resolution) + 1
+    return Terrain(np.zeros((cells, cells)), resolution, (-size / 2, -size / 2))
+
+
+def with_heights(terrain, heights):
+    """Return the terrain with heights that are a function of x and y."""
+    ny, nx = terrain.elevation.shape
+    x = terrain.origin[0] + terrain.resolution * np.arange(nx)[None, :]
+    y = terrain.origin[1] + terrain.resolution * np.arange(ny)[:, None]
+    return dataclasses.replace(terrain, elevation=np.broadcast_to(heights(x, y), (ny, nx)).copy())
+
+
+def test_level_ground_is_traversable_on_the_straight_connection(rover):
+    answer = answer_path_query(rover, flat(), (-2, 0, 0), (2, 0, 0), COARSE)
+    assert answer.traversable
+    assert len(answer.candidates) == 5
+    # all are equally safe; the straight one needs the least energy
+    assert answer.best == answer.nearest == 0
+    assert answer.chosen.length == pytest.approx(4.0)
+    assert answer.chosen.reach == 1.0
+    assert "5 of 5" in answer.explain()
+
+
+def test_a_rock_in_the_way_is_driven_around(rover):
+    def rock(x, y):
+        return np.where(np.hypot(x, y - 0.3) < 0.15, 0.5, 0.0)
+
+    terrain = with_heights(flat(), rock)
+    answer = answer_path_query(rover, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
+    assert not answer.candidates[0].verdict.traversable
+    assert answer.traversable
+    assert answer.best > 0
+    assert answer.chosen.verdict.traversable
+
+
+def test_a_ridge_across_all_candidates_is_refused_with_its_reason(rover):
+    terrain = with_heights(flat(), lambda x, y: np.where(np.abs(x - 1) < 0.3, 1.0, 0.0))
+    answer = answer_path_query(rover, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
+    assert answer.best == -1
+    assert not answer.traversable
+    assert answer.chosen.verdict.reason
+    assert answer.chosen.verdict.reason in answer.explain()
+    assert answer.chosen.reach == max(candidate.reach for candidate in answer.candidates)
+    assert 0 < answer.chosen.reach < 1
+
+
+def test_leaving_the_map_and_unknown_ground_are_told_apart(rover):
+    beyond = answer_path_query(rover, flat(), (0, 0, 0), (8, 0, 0), COARSE)
+    assert beyond.chosen.verdict.code == "off_map"
+    hole = with_heights(flat(), lambda x, y: np.where(x > 2, np.nan, 0.0))
+    unknown = answer_path_query(rover, hole, (-2, 0, 0), (4, 0, 0), COARSE)
+    assert unknown.chosen.verdict.code == "unknown_ground"
+
+
+def test_the_goal_at_the_start_is_a_single_pose_that_is_judged(rover):
+    answer = answer_path_query(rover, flat(), (1, 1, 0.5), (1, 1, 0.5), COARSE)
+    assert answer.traversable
+    assert answer.chosen.poses.shape == (1, 3)
+    outside = answer_path_query(rover, flat(), (99, 0, 0), (99, 0, 0), COARSE)
+    assert not outside.traversable
+    assert outside.chosen.reach == 0.0
+
+
+def test_options_reach_the_model(rover):
+    slope = with_heights(flat(), lambda x, y: 0.2 * x + 0 * y)
+    grippy = dataclasses.replace(COARSE, friction=1.0, max_torque=100.0)
+    slippery = dataclasses.replace(COARSE, friction=0.05, max_torque=100.0)
+    assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), grippy).traversable
+    refused = answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), slippery)
+    assert refused.chosen.verdict.code == "friction"
+    weak = dataclasses.replace(COARSE, max_torque=0.05)
+    assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), weak).chosen.verdict.code == (
+        "torque"
+    )
+
+
+def test_the_safer_path_wins_and_energy_decides_between_equals(rover):
+    answer = answer_path_query(rover, flat(), (-2, 0, 0), (2, 0, 0), COARSE)
+    first, second, third = answer.candidates[:3]
+    safe = dataclasses.replace(second, cost=(0.3, 90.0))
+    thrifty = dataclasses.replace(third, cost=(0.3, 80.0))
+    risky = dataclasses.replace(first, cost=(0.5, 10.0))
+    assert choose((risky, safe, thrifty)).best == 2
+    refused = dataclasses.replace(
+        thrifty, verdict=dataclasses.replace(thrifty.verdict, traversable=False)
+    )
+    assert choose((risky, safe, refused)).best == 1
+
+
+def test_risk_is_one_at_a_limit(rover):
+    verdict = check_path(rover, flat(), np.array([[0.0, 0.0, 0.0]]), COARSE).verdict
+    limits = rover.limits
+    assert 0 < path_risk(rover, verdict) < 1
+    at_limit = dataclasses.replace(verdict, max_tilt=limits.tilt)
+    assert path_risk(rover, at_limit) == pytest.approx(1.0)
+    at_limit = dataclasses.replace(verdict, min_tip_over_ratio=limits.tip_over_ratio)
+    assert path_risk(rover, at_limit) == pytest.approx(1.0)
+
+
+def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):
+    ground = flat(4.0)
+    uncertain = dataclasses.replace(ground, elevation_std=np.full(ground.elevation.shape, 0.003))
+    pose = np.array([[0.0, 0.0, 0.0]])
+    sure = path_risk(rover, check_path(rover, ground, pose, COARSE).verdict)
+    risks = [
+        path_risk(
+            rover,
+            check_path(
+                rover, uncertain, pose, dataclasses.replace(COARSE, map_sigmas=sigmas)
+            ).verdict,
+        )
+        for sigmas in (0.0, 1.0, 3.0)
+    ]
+    assert risks[0] == sure
+    assert sure < risks[1] < risks[2] < 1.0
+
+
+def test_the_smallest_radius_is_the_wheelbase(rover):
+    assert smallest_radius(rover) == pytest.approx(0.8)
+    assert smallest_radius(load_rover("m2020")) == pytest.approx(2.26)
+
+
+def test_answers_are_frozen(rover):
+    answer = answer_path_query(rover, flat(), (0, 0, 0), (1, 0, 0), COARSE)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        answer.best = 3
+
+
+def test_bad_requests_are_refused(rover):
+    with pytest.raises(PlanningError, match="start"):
+        answer_path_query(rover, flat(), (np.nan, 0, 0), (1, 0, 0))
+    with pytest.raises(PlanningError, match="count"):
+        options = PathQueryOptions(count=0)
+        answer_path_query(rover, flat(), (0, 0, 0), (1, 0, 0), options)
+    with pytest.raises(ModelError, match="policy"):
+        options = dataclasses.replace(COARSE, policy="lucky")
+        answer_path_query(rover, flat(), (0, 0, 0), (1, 0, 0), options)
+    with pytest.raises(PoseError):
+        check_path(rover, flat(), np.zeros((3, 2)), COARSE)

@@ -1,0 +1,230 @@
+"""The simulated rover: it stands where the model says, stops where it must, sees what it can."""
+
+import numpy as np
+import pytest
+
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traction.balance import BalanceWriter
+from rover_planner.errors import PlanningError
+from rover_planner.simulator.driving_forces import find_driving_forces
+from rover_planner.simulator.mujoco_engine import MujocoPlant
+from rover_planner.simulator.path_follower import PathFollower
+from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
+from rover_planner.simulator.range_sensor import RangeSensor
+from support.grounds import make_terrain, waves
+from support.rough_grounds import plane
+
+LSR1 = load_rover("lsr1")
+STEP = 0.02
+
+
+def wavy():
+    return make_terrain(waves, half=3.0)
+
+
+def drive(plant, seconds: float, speed: float = 0.06, yaw_rate: float = 0.0):
+    for _ in range(round(seconds / STEP)):
+        plant.drive(speed, yaw_rate, STEP)
+    return plant.state()
+
+
+def test_the_rover_is_where_the_model_settles_it():
+    ground = wavy()
+    plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
+    state = drive(plant, 5.0)
+    assert plant.pose() == pytest.approx([-1.0 + 5.0 * 0.06, 0.0, 0.0])
+    settled = sweep_path(LSR1, ground, plant.pose()[None])
+    assert state.position == pytest.approx(settled.position[0])
+    angles = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
+    assert angles == pytest.approx([*settled.rocker_angle[0], *settled.bogie_angle[0]])
+    assert state.wheel_torques == pytest.approx(settled.torque[0], abs=0.02)
+
+
+def test_wheels_turn_by_the_way_they_roll():
+    plant = QuasiStaticPlant(LSR1, plane(0.0, 0.0, half=3.0), (-1.0, 0.0, 0.0))
+    state = drive(plant, 10.0)
+    turned = [state.joint_positions[name] for name in WHEEL_JOINTS]
+    assert turned == pytest.approx(np.full(6, 0.6 / LSR1.wheel.radius), rel=1e-3)
+    rates = [state.joint_velocities[name] for name in WHEEL_JOINTS]
+    assert rates == pytest.approx(np.full(6, 0.6), rel=1e-3)
+
+
+def test_it_stops_before_a_wall_and_says_why_and_can_go_back():
+    ground = make_terrain(lambda x, y: waves(x, y) + 0.5 * (x > 1.0), half=3.0)
+    plant = QuasiStaticPlant(LSR1, ground, (0.0, 0.0, 0.0))
+    state = drive(plant, 20.0)
+    assert state.stopped and plant.pose()[0] < 1.0
+    assert not any(state.joint_velocities.values())
+    assert not drive(plant, 1.0, -0.06).stopped
+
+
+def test_on_sand_wheels_turn_farther_than_they_roll_and_need_torque_on_level_ground():
+    ground = plane(0.0, 0.0, half=3.0)
+    firm, sand = (
+        QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0), soil=soil) for soil in (None, "dry_sand")
+    )
+    on_firm, on_sand = drive(firm, 5.0), drive(sand, 5.0)
+    assert sand.pose() == pytest.approx(firm.pose())
+    for wheel in WHEEL_JOINTS:
+        assert on_sand.joint_positions[wheel] > 1.01 * on_firm.joint_positions[wheel]
+    assert on_firm.wheel_torques == pytest.approx(np.zeros(6), abs=1e-6)
+    assert (on_sand.wheel_torques > 0.05).all()
+
+
+def test_servos_with_the_best_torques_climb_where_equal_ones_slip():
+    ground = make_terrain(lambda x, y: 0.07 * (x > 0.0), half=3.0, resolution=0.01)
+    equal, optimal = (
+        QuasiStaticPlant(LSR1, ground, (-0.7, 0.0, 0.0), friction=0.5, policy=policy)
+        for policy in ("equal", "optimal")
+    )
+    assert "slips" in drive(equal, 15.0).stopped
+    assert not drive(optimal, 15.0).stopped
+    assert optimal.pose()[0] > equal.pose()[0] + 0.1
+
+
+def test_a_start_on_which_no_rover_stands_is_refused():
+    with pytest.raises(PlanningError, match="cannot start at"):
+        QuasiStaticPlant(LSR1, wavy(), (9.0, 0.0, 0.0))
+
+
+def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
+    ground = plane(np.tan(np.radians(10.0)), 0.0, half=3.0)
+    plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
+    needed = np.full(6, LSR1.weight * np.sin(np.radians(10.0)) * LSR1.wheel.radius / 6.0)
+    for _ in range(50):
+        plant.pull(needed, 0.0, STEP)
+    assert plant.pose()[0] == pytest.approx(-1.0, abs=1e-3)
+    for _ in range(50):
+        plant.pull(1.3 * needed, 0.0, STEP)
+    assert plant.pose()[0] > -0.99
+    before = plant.pose()[0]
+    for _ in range(300):
+        plant.pull(0.5 * needed, 0.0, STEP)
+    assert plant.pose()[0] < before
+
+
+def test_a_wheel_pulls_no_more_than_its_friction():
+    ground = plane(0.0, 0.0, half=3.0)
+    weak = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0), friction=0.05)
+    strong = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0), friction=0.8)
+    for _ in range(10):
+        for plant in (weak, strong):
+            plant.pull(np.full(6, 1.0), 0.0, STEP)
+    limit = 0.05 * LSR1.gravity * 10 * STEP
+    assert 0.0 < weak.state().velocity[0] <= limit
+    assert strong.state().velocity[0] == pytest.approx(0.1)
+    assert weak.state().joint_velocities[WHEEL_JOINTS[0]] == LSR1.wheel.max_speed
+
+
+def test_both_engines_drive_the_same_way():
+    ground = wavy()
+    start = (-1.0, 0.2, 0.0)
+    still, moving = QuasiStaticPlant(LSR1, ground, start), MujocoPlant(LSR1, ground, start)
+    states = [drive(plant, 10.0) for plant in (still, moving)]
+    assert states[1].position == pytest.approx(states[0].position, abs=0.04)
+    for name in SUSPENSION_JOINTS:
+        angles = [state.joint_positions[name] for state in states]
+        assert angles[1] == pytest.approx(angles[0], abs=0.03)
+    assert states[1].orientation == pytest.approx(states[0].orientation, abs=0.03)
+
+
+def test_a_path_is_followed_to_its_end():
+    s = np.linspace(0.0, 1.0, 50)
+    path = np.column_stack([2.0 * s, 0.4 * np.sin(np.pi * s), np.zeros(50)])
+    follower = PathFollower(path, 0.4)
+    pose = np.array([0.0, 0.1, 0.0])
+    farthest = 0.0
+    for _ in range(3000):
+        speed, yaw_rate = follower.steer(pose, 0.1)
+        if not speed:
+            break
+        pose += 0.05 * np.array([speed * np.cos(pose[2]), speed * np.sin(pose[2]), yaw_rate])
+        if pose[0] > 0.8:
+            farthest = max(farthest, np.abs(path[:, :2] - pose[:2]).sum(axis=1).min())
+    assert follower.has_arrived(pose)
+    assert pose[:2] == pytest.approx([2.0, 0.0], abs=0.15)
+    assert farthest < 0.12
+
+
+def look(ground, **changes):
+    values = {"reach": 2.0, "noise": 0.0, "height": 0.8, "occlusion": True} | changes
+    rng = np.random.default_rng(1)
+    return RangeSensor(**values).look(ground, np.array([0.0, 0.0, 0.3]), rng)
+
+
+def test_the_sensor_sees_the_ground_in_its_range_and_no_farther():
+    ground = make_terrain(waves, half=4.0)
+    seen = look(ground)
+    y, x = np.indices(seen.elevation.shape)
+    away = np.hypot(seen.origin[0] + seen.resolution * x, seen.origin[1] + seen.resolution * y)
+    known = np.isfinite(seen.elevation)
+    assert known[away < 1.9].all()
+    assert not known[away > 2.0].any()
+    there = ground.elevation_at(
+        seen.origin[0] + seen.resolution * x[known], seen.origin[1] + seen.resolution * y[known]
+    )
+    assert seen.elevation[known] == pytest.approx(there)
+
+
+def test_a_wall_hides_what_is_behind_it_unless_nothing_hides():
+    ground = make_terrain(lambda x, y: 2.0 * ((x > 0.8) & (x < 1.0)) + 0.0 * y, half=4.0)
+    seen = look(ground)
+    assert np.isnan(seen.elevation_at(1.5, 0.0))
+    assert np.isfinite(seen.elevation_at(0.5, 0.0))
+    assert np.isfinite(seen.elevation_at(-1.5, 0.0))
+    assert np.isfinite(look(ground, occlusion=False).elevation_at(1.5, 0.0))
+
+
+def test_noise_is_of_the_size_it_says_and_goes_with_the_map():
+    ground = make_terrain(waves, half=4.0)
+    seen, true = look(ground, noise=0.01), look(ground)
+    known = np.isfinite(true.elevation)
+    assert np.std((seen.elevation - true.elevation)[known]) == pytest.approx(0.01, rel=0.1)
+    assert np.all(seen.elevation_std[known] == 0.01)
+
+
+def test_torques_shared_well_carry_the_rover_where_equal_ones_would_slip():
+    ground = make_terrain(lambda x, y: 0.15 * np.clip(x / 0.1, 0.0, 1.0) + 0.0 * y, half=2.0)
+    way = np.linspace(-0.6, 0.2, 81)
+    poses = np.column_stack([way, np.zeros_like(way), np.zeros_like(way)])
+    needed = {
+        policy: sweep_path(LSR1, ground, poses, friction=0.4, policy=policy)
+        for policy in ("equal", "optimal")
+    }
+    assert np.nanmax(needed["equal"].friction_utilisation) > 1.05
+    assert np.nanmax(needed["optimal"].friction_utilisation) < 1.0
+    plant = QuasiStaticPlant(LSR1, ground, (-0.5, 0.0, 0.0), friction=0.4)
+    for _ in range(round(12.0 / STEP)):
+        here = sweep_path(LSR1, ground, plant.pose()[None], friction=0.4, policy="optimal")
+        push = 6.0 * (0.08 - plant.state().velocity[0]) * LSR1.total_mass
+        plant.pull(here.torque[0] + push * LSR1.wheel.radius / 6.0, 0.0, STEP)
+    assert plant.pose()[0] > 0.1
+
+
+def test_a_rover_whose_wheels_spin_says_so():
+    ground = make_terrain(lambda x, y: 0.3 * np.maximum(x, 0.0) + 0.0 * y, half=3.0)
+    plant = QuasiStaticPlant(LSR1, ground, (-0.6, 0.0, 0.0), friction=0.1)
+    for _ in range(1000):
+        plant.pull(np.full(6, 1.0), 0.0, STEP)
+        if plant.state().stopped:
+            break
+    assert "wheels slip and the rover stays: rear_right" in plant.state().stopped
+
+
+def test_driving_forces_are_those_of_the_model_where_the_torques_are():
+    ground = wavy()
+    here = sweep_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), policy="optimal")
+    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, here.torque[0], 0.0)
+    assert forces.push == pytest.approx(0.0, abs=0.01)
+    assert forces.loads == pytest.approx(here.wheel_loads[0], abs=0.05)
+    assert not forces.sliding.any()
+
+
+def test_more_torque_pushes_by_as_much_and_loads_the_rear_wheels():
+    here = sweep_path(LSR1, plane(0.0, 0.0, half=2.0), np.zeros((1, 3)))
+    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, np.full(6, 0.3), 0.0)
+    assert forces.push == pytest.approx(18.0, rel=1e-6)
+    assert forces.loads.sum() == pytest.approx(LSR1.weight)
+    assert forces.loads[0] > here.wheel_loads[0, 0]

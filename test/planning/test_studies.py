@@ -1,0 +1,193 @@
+"""Studies find what is best, say what cannot be, and read their files as strictly as others."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from rover_physics.errors import RoverFileError
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.cli import main
+from rover_planner.studies.objectives import climbs, tallest_step
+from rover_planner.studies.rover_keys import find_key, vary
+from rover_planner.studies.rover_values import rover_to_dict
+from rover_planner.studies.runner import run_study
+from rover_planner.studies.study_file import study_from_dict
+
+LSR1 = load_rover("lsr1")
+PIVOT_X = {"name": "suspension.bogie_pivot.x", "from": 0.10, "to": 0.30, "count": 9}
+
+
+def study(**changes):
+    data = {"rover": "lsr1", "objective": "load_imbalance", "parameters": [dict(PIVOT_X)]}
+    return study_from_dict(data | changes, "study")
+
+
+def test_loads_are_even_where_the_bogie_hangs_midway_between_its_wheels():
+    best = run_study(study()).best
+    assert best.values[0] == pytest.approx(0.2)
+    assert best.objective == pytest.approx(1.0, abs=0.02)
+
+
+def test_equal_load_shares_need_the_least_friction_on_nearly_level_ground():
+    drives = [{"slope": 0.05, "length": 0.1}, {"slope": -0.05, "length": 0.1}]
+    best = run_study(study(objective="worst_utilisation", drives=drives)).best
+    assert best.values[0] == pytest.approx(0.2, abs=0.026)
+
+
+def test_an_optimisation_finds_what_a_sweep_finds():
+    found = run_study(study(method="optimise", evaluations=40))
+    assert len(found.trials) <= 40
+    assert found.best.values[0] == pytest.approx(0.2, abs=0.02)
+
+
+def test_the_tallest_step_is_climbed_and_a_little_more_is_not():
+    height = tallest_step(LSR1, "equal", 0.6)
+    assert 0.02 < height < 0.3
+    assert climbs(LSR1, height, "equal", 0.6)
+    assert not climbs(LSR1, height + 0.004, "equal", 0.6)
+
+
+def test_best_torques_climb_at_least_as_high_as_equal_ones():
+    assert tallest_step(LSR1, "optimal", 0.6) >= tallest_step(LSR1, "equal", 0.6)
+
+
+def test_a_rover_that_cannot_be_is_a_trial_with_a_note_and_no_value():
+    parameters = [{"name": "suspension.wheels.rear.x", "from": -0.4, "to": 0.4, "count": 3}]
+    result = run_study(study(parameters=parameters))
+    assert [bool(trial.note) for trial in result.trials] == [False, True, True]
+    assert np.isnan(result.trials[-1].load_shares).all()
+    assert np.isnan(result.trials[-1].objective)
+    assert "wheels" in result.trials[-1].note
+
+
+def test_on_level_sand_equal_load_shares_need_the_least_energy():
+    parameters = [
+        {"name": "masses.body.com.x", "from": -0.1, "to": 0.1},
+        {"name": "suspension.bogie_pivot.x", "from": 0.1, "to": 0.3},
+    ]
+    found = run_study(
+        study(
+            objective="drive_energy", soil="dry_sand", method="optimise", evaluations=80,
+            parameters=parameters, drives=[{"slope": 0.0, "length": 0.04}],
+        )
+    )  # fmt: skip
+    assert found.best.load_shares == pytest.approx([1 / 6] * 6, abs=0.004)
+    uneven = max(found.trials, key=lambda trial: max(trial.load_shares))
+    assert uneven.objective > 1.01 * found.best.objective
+
+
+def test_a_drive_that_breaks_another_limit_gives_no_value_but_the_reason():
+    parameters = [{"name": "belly.z", "from": -0.285, "to": -0.1, "count": 2}]
+    drives = [{"slope": 0.1, "length": 0.1}]
+    low, high = run_study(
+        study(objective="worst_utilisation", drives=drives, parameters=parameters)
+    ).trials
+    assert np.isnan(low.objective) and "drive 1: belly clearance" in low.note
+    assert high.objective > 0.0
+
+
+def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones():
+    parameters = [
+        {
+            "name": "suspension.wheels.rear.y", "from": 0.25, "to": 0.4, "count": 2,
+            "also": ["suspension.wheels.middle.y", "suspension.wheels.front.y"],
+        }
+    ]  # fmt: skip
+    drives = [{"slope": 0.2, "length": 0.1, "start": [0.0, 0.0, 1.5708]}]
+    task = study(objective="tip_over_margin", drives=drives, parameters=parameters)
+    narrow, wide = run_study(task).trials
+    height = LSR1.masses.body.com[2] - LSR1.suspension.wheels["rear"][2] + LSR1.wheel.radius
+    assert narrow.objective < wide.objective < np.arctan(0.4 / height) + 0.5
+    assert run_study(task).baseline.values == (0.31,)
+
+
+def test_what_stops_the_rover_at_a_taller_step_is_noted():
+    [first, _] = run_study(
+        study(
+            objective="tallest_step", friction=0.5,
+            parameters=[{"name": "wheel.max_torque", "from": 0.5, "to": 2.0, "count": 2}],
+        )
+    ).trials  # fmt: skip
+    taller = float(first.note.split(" m:")[0])
+    assert taller == pytest.approx(first.objective + 0.002, abs=6e-4)
+    assert "limit" in first.note
+
+
+def test_files_are_looked_for_beside_the_study(tmp_path):
+    from rover_physics.terrain.grid import Terrain, save_terrain
+
+    save_terrain(tmp_path / "flat.npz", Terrain(np.zeros((60, 60)), 0.05, (-1.5, -1.5)))
+    data = {
+        "rover": "lsr1", "objective": "drive_energy", "parameters": [PIVOT_X | {"count": 2}],
+        "drives": [{"file": "flat.npz", "length": 0.1}],
+    }  # fmt: skip
+    task = study_from_dict(data, "study", tmp_path)
+    assert np.isfinite([trial.objective for trial in run_study(task).trials]).all()
+
+
+def test_two_parameters_are_tried_in_all_combinations():
+    parameters = [
+        PIVOT_X | {"count": 2},
+        {"name": "masses.body.mass", "from": 4.0, "to": 6.0, "count": 3},
+    ]
+    result = run_study(study(parameters=parameters))
+    assert len({trial.values for trial in result.trials}) == 6
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"objective": "fastest"}, "objective is 'fastest'"),
+        ({"objective": "worst_utilisation"}, "drives is missing"),
+        ({"parameters": []}, "a list of one mapping or more"),
+        ({"parameters": [PIVOT_X | {"name": "wheel.radios"}]}, "wheel.radius"),
+        ({"parameters": [PIVOT_X | {"to": 0.0}]}, "above from"),
+        ({"parameters": [PIVOT_X | {"steps": 3}]}, "steps"),
+        ({"parameters": [PIVOT_X, PIVOT_X]}, "no other parameter varies"),
+        ({"parameters": [PIVOT_X | {"also": ["wheel.mass"]}]}, "names of numbers in m"),
+        ({"parameters": [PIVOT_X | {"count": 2.5}]}, "count is 2.5; it must be a whole number"),
+        ({"soil": "dry_sand"}, "left out"),
+        ({"colour": "red"}, "a study file has"),
+        ({"method": "guess"}, "method is 'guess'"),
+        ({"objective": "tip_over_margin", "drives": [{"length": 1.0}]}, "one of slope"),
+    ],
+)
+def test_what_a_study_file_must_not_say_is_refused_by_name(changes, text):
+    with pytest.raises(RoverFileError, match=r".*".join(text.split())):
+        study(**changes)
+
+
+def test_every_number_of_a_rover_has_a_name_and_a_unit():
+    contents = rover_to_dict(LSR1)
+    for name, unit, value in (
+        ("wheel.radius", "m", 0.1),
+        ("suspension.wheels.front.x", "m", 0.4),
+        ("masses.body.mass", "kg", 5.0),
+        ("manipulator.stowed.1", "rad", -0.2),
+        ("friction", "", 0.8),
+    ):
+        key, found = find_key(contents, name, "study")
+        assert found == unit
+        inner = contents
+        for part in key:
+            inner = inner[part]
+        assert inner == value
+        assert vary(LSR1, {key: value}) == LSR1
+
+
+def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):
+    file = tmp_path / "loads.yaml"
+    file.write_text(
+        "rover: lsr1\nobjective: load_imbalance\nparameters:\n"
+        "  - {name: suspension.bogie_pivot.x, from: 0.1, to: 0.3, count: 5}\n"
+    )
+    assert main(["study", str(file), "--output", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "suspension.bogie_pivot.x = 0.2 m" in said
+    assert "suspension.bogie_pivot.x: 0.1 to 0.3 m, now 0.2" in said
+    with (tmp_path / "out" / "loads.csv").open() as table:
+        rows = list(csv.reader(table))
+    assert rows[0][0] == "suspension.bogie_pivot.x [m]" and len(rows) == 6
+    assert (tmp_path / "out" / "loads.png").read_bytes()[:4] == b"\x89PNG"
+    assert main(["study", str(tmp_path / "none.yaml")]) == 2

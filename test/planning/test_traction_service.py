@@ -1,0 +1,246 @@
+"""Torques from measurements: zero at once when anything is missing, back when it is there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
+from rover_planner.traction.input_monitor import InputWatch
+from rover_planner.traction.loops import PushLoop, StallWatch, limit_rate, rolling_rates
+from rover_planner.traction.traction_service import TractionService, settings_from_parameters
+from support.rough_grounds import plane
+
+JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+PERIOD = 0.02
+
+
+def settings(**values):
+    defaults = {spec.name: spec.default for spec in TRACTION_CONTROLLER}
+    return settings_from_parameters(defaults | values)
+
+
+class Rig:
+    """A service and the measurements of a rover that creeps over level ground."""
+
+    def __init__(self, **values):
+        self.service = TractionService(settings(**values))
+        self.now = 0.0
+        self.positions = dict.fromkeys(SUSPENSION_JOINTS, 0.0)
+        self.velocities = dict.fromkeys(JOINTS, 0.0) | dict.fromkeys(WHEEL_JOINTS, 0.2)
+        self.pitch = 0.0
+        self.rates = np.zeros(3)
+
+    def send(self, *names):
+        for name in names or ("joint_states", "imu", "cmd_vel"):
+            if name == "joint_states":
+                self.service.take_joints(self.positions, self.velocities, self.now)
+            elif name == "imu":
+                self.service.take_attitude(0.0, self.pitch, self.rates, self.now)
+            else:
+                self.service.take_command(0.03, 0.0, self.now)
+
+    def run(self, count=30, *names):
+        for _ in range(count):
+            self.now += PERIOD
+            self.send(*names)
+            update = self.service.update(self.now)
+        return update
+
+
+def test_nothing_moves_before_all_inputs_are_there():
+    rig = Rig()
+    update = rig.run(3, "imu")
+    assert update.fault == "waiting for joint_states, cmd_vel" and not update.torques.any()
+    assert rig.run().torques.any()
+
+
+@pytest.mark.parametrize("silent", ["joint_states", "imu", "cmd_vel"])
+def test_a_silent_input_stops_the_wheels_within_a_tenth_of_a_second_and_its_return_starts_them(
+    silent,
+):
+    rig = Rig()
+    assert rig.run().torques.any()
+    others = [name for name in ("joint_states", "imu", "cmd_vel") if name != silent]
+    update = rig.run(5, *others)
+    assert not update.torques.any() and update.fault.startswith(f"{silent} stale")
+    update = rig.run(3)
+    assert update.fault == "" and update.torques.any()
+
+
+@pytest.mark.parametrize(
+    ("lost", "text"),
+    [
+        ("rocker_left", "no position of rocker_left"),
+        ("rear_left_wheel", "no velocity of rear_left_wheel"),
+    ],
+)
+def test_a_missing_joint_stops_the_wheels_at_once(lost, text):
+    rig = Rig()
+    rig.run()
+    whole = dict(rig.positions), dict(rig.velocities)
+    rig.positions.pop(lost, None)
+    rig.velocities.pop(lost, None)
+    update = rig.run(1)
+    assert not update.torques.any() and text in update.fault
+    rig.positions, rig.velocities = whole
+    assert rig.run(2).fault == ""
+
+
+def test_a_refused_input_stops_the_wheels_until_a_good_one_comes():
+    rig = Rig()
+    rig.run()
+    rig.service.refuse("imu", "imu has orientation [nan]")
+    assert rig.service.update(rig.now + 0.001).fault == "imu has orientation [nan]"
+    assert rig.run(2).fault == ""
+
+
+def test_what_the_loops_added_up_is_forgotten_in_a_fault():
+    rig = Rig()
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.0)
+    wound = np.abs(rig.run(60).torques).max()
+    rig.now += 1.0
+    assert not rig.service.update(rig.now).torques.any()
+    assert np.abs(rig.run(3).torques).max() < 0.5 * wound
+
+
+def test_torques_change_no_faster_than_allowed():
+    rig = Rig(torque_rate=1.0, travel_gain=200.0)
+    last = rig.run(1).torques
+    for _ in range(50):
+        torques = rig.run(1).torques
+        assert np.abs(torques - last).max() <= 1.0 * PERIOD + 1e-9
+        last = torques
+    assert np.abs(last).max() > 0.1
+
+
+def test_torques_stay_within_the_limit():
+    rig = Rig(max_torque=0.05)
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.0)
+    assert np.abs(rig.run(200).torques).max() <= 0.05
+
+
+def test_it_pushes_up_a_slope_with_the_weight_along_it():
+    rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0, slip_gain=0.0)
+    rig.pitch = -0.2
+    rover = rig.service.settings.rover
+    terrain = plane(np.tan(0.2), 0.0, half=2.0)
+    rig.service.take_terrain(terrain)
+    for _ in range(60):
+        rig.service.take_odometry(np.array([0.0, 0.0, 0.31, 0.0]), 0.0, rig.now)
+        update = rig.run(1)
+    assert update.estimate.source == "map"
+    wanted = rover.weight * np.sin(0.2) * rover.wheel.radius
+    assert update.torques.sum() == pytest.approx(wanted, rel=0.01)
+
+
+def test_slow_wheels_are_pushed_and_fast_ones_held():
+    rig = Rig()
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.1)
+    assert rig.run().torques.sum() > 0.0
+    rig = Rig()
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.6)
+    assert rig.run().torques.sum() < 0.0
+
+
+def test_a_wheel_that_runs_away_gets_less_torque_than_the_others():
+    rig = Rig()
+    rig.velocities["front_right_wheel"] = 0.6
+    torques = rig.run(5).torques
+    assert torques[2] < torques[[0, 1, 3, 4, 5]].min()
+
+
+def test_turning_right_is_answered_by_the_right_wheels():
+    rig = Rig()
+    rig.rates = np.array([0.0, 0.0, -0.1])
+    torques = rig.run().torques
+    assert torques[:3].mean() > torques[3:].mean()
+
+
+def test_the_source_of_contact_angles_is_the_best_there_is():
+    rig = Rig()
+    assert rig.run().estimate.source == "motion"
+    rig.service.take_terrain(plane(0.0, 0.0, half=2.0))
+    rig.service.take_odometry(np.array([0.0, 0.0, 0.3, 0.0]), 0.01, rig.now)
+    assert rig.run(1).estimate.source == "map"
+    rig.now += 1.0
+    assert rig.run(2).estimate.source == "motion"
+    rig.rates = None
+    update = rig.run(2)
+    assert update.estimate.source == "zero" and "angular velocity" in update.warning
+    assert update.torques.any()
+
+
+def test_beyond_the_map_motion_takes_over_and_it_is_said():
+    rig = Rig()
+    rig.service.take_terrain(plane(0.0, 0.0, half=1.0))
+    rig.service.take_odometry(np.array([5.0, 0.0, 0.3, 0.0]), 0.01, rig.now)
+    update = rig.run(1)
+    assert update.estimate.source == "motion" and "map does not have" in update.warning
+
+
+def test_equal_torques_are_equal():
+    rig = Rig(policy="equal")
+    rig.velocities["front_right_wheel"] = 0.5
+    assert np.ptp(rig.run().torques) < 1e-9
+
+
+def test_new_settings_are_taken_over_at_once():
+    rig = Rig()
+    rig.run()
+    rig.service.settings = replace(rig.service.settings, max_torque=0.01)
+    assert np.abs(rig.run().torques).max() <= 0.01
+
+
+def test_a_watch_tells_what_is_missing_then_wrong_then_stale():
+    watch = InputWatch(("a", "b"), 0.1)
+    assert watch.find_fault(0.0) == "waiting for a, b"
+    watch.take("a", 0.0)
+    watch.refuse("b", "b is nan")
+    assert watch.find_fault(0.0) == "b is nan"
+    watch.take("b", 0.05)
+    assert watch.find_fault(0.1) == ""
+    assert watch.find_fault(0.12) == "a stale: none for 100 ms"
+
+
+def test_a_push_that_cannot_be_given_does_not_add_up():
+    free, held = PushLoop(1.0, 10.0, 5.0), PushLoop(1.0, 10.0, 5.0)
+    for k in range(100):
+        free.update(0.1, 0.02, False)
+        held.update(0.1, 0.02, k > 10)
+    assert free.update(0.0, 0.0, False) > 2.0 * held.update(0.0, 0.0, False)
+    assert held.update(-0.1, 0.02, True) < held.update(0.0, 0.0, True) + 0.1
+
+
+def test_all_changes_are_limited_alike():
+    limited = limit_rate(np.array([2.0, 1.0, 0.0, 0.0, 0.0, -1.0]), np.zeros(6), 0.5)
+    assert limited == pytest.approx([0.5, 0.25, 0.0, 0.0, 0.0, -0.25])
+
+
+def test_rolling_goes_with_the_wheels_but_not_with_those_that_spin():
+    ratios = np.array([1.0, 1.2, 0.8, 1.0, 1.0, 1.0])
+    rates = 0.3 * ratios
+    assert rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
+    rates[[2, 5]] = 9.0
+    assert rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
+    assert rolling_rates(np.full(6, 9.0), ratios, 0.3) == pytest.approx(0.39 * ratios)
+
+
+def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():
+    rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.0)
+    rig.velocities |= dict.fromkeys(("front_right_wheel", "front_left_wheel"), 1.0)
+    standing = [0, 1, 3, 4]
+    before, after = rig.run(10).torques, rig.run(200).torques
+    assert after[standing].min() > 2.0 * before[standing].max() > 0.0
+
+
+def test_servos_take_over_only_where_the_rover_does_not_get_on():
+    watch = StallWatch()
+    assert watch.update(0.3, 0.3, 5.0) == 0.0
+    assert watch.update(0.0, 0.3, 0.4) == 0.0
+    for _ in range(20):
+        share = watch.update(0.0, 0.3, 0.1)
+    assert share == 1.0
+    assert watch.update(0.3, 0.3, 0.3) < 1.0

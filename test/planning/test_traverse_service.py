@@ -1,0 +1,294 @@
+"""The service knows a map, a path and joint angles, and answers from them without ROS."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rover_planner.planning.traverse_service as traverse_service_module
+from rover_physics.errors import RoverFileError
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.errors import PlanningError
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
+from rover_planner.planning.traverse_service import (
+    TraverseService,
+    densify,
+    settings_from_parameters,
+)
+from support.grounds import make_terrain, rocky, wall_at, waves
+
+DEFAULTS = {spec.name: spec.default for spec in TRAVERSE_SERVER}
+
+
+def make_service(terrain=None, **parameters):
+    service = TraverseService(settings_from_parameters(DEFAULTS | parameters))
+    if terrain is not None:
+        service.take_terrain(terrain)
+    return service
+
+
+def test_the_module_imports_no_ros():
+    assert "rclpy" not in Path(traverse_service_module.__file__).read_text()
+
+
+def test_zero_takes_the_rovers_own_friction_and_torque():
+    query = settings_from_parameters(DEFAULTS).query
+    assert query.friction is None and query.max_torque is None
+    query = settings_from_parameters(DEFAULTS | {"friction": 0.4, "max_torque": 1.5}).query
+    assert query.friction == 0.4 and query.max_torque == 1.5
+
+
+def test_a_rover_that_cannot_be_loaded_is_an_error():
+    with pytest.raises(RoverFileError):
+        settings_from_parameters(DEFAULTS | {"rover": "lsr9"})
+
+
+def test_settings_change_the_answer():
+    service = make_service(make_terrain(waves))
+    start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
+    assert service.answer(start, goal).traversable
+    service.settings = settings_from_parameters(DEFAULTS | {"friction": 0.01})
+    refused = service.answer(start, goal)
+    assert not refused.traversable and refused.verdict["code"] == "friction"
+
+
+def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
+    certain = make_terrain(waves)
+    uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
+    start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
+    service = make_service(uncertain)
+    refused = service.answer(start, goal).verdict
+    assert not refused["traversable"]
+    assert refused["reason"].endswith("at worst within 3 sigma of the map")
+    assert refused["map_sigmas"] == 3.0
+    assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
+    service.settings = settings_from_parameters(DEFAULTS | {"map_sigmas": 0.0})
+    passed = service.answer(start, goal).verdict
+    assert passed["traversable"]
+    assert passed["map_sigmas"] == 0.0
+    assert passed["friction_utilisation_bound"] is None
+    assert passed == make_service(certain).answer(start, goal).verdict
+
+
+def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
+    terrain = make_terrain(waves)
+    terrain.elevation[80, 80] = np.nan
+    service = make_service(terrain)
+    assert np.isnan(service.terrain.elevation[80, 80])
+    service.settings = settings_from_parameters(DEFAULTS | {"unknown_cells": "interpolate"})
+    assert np.isfinite(service.terrain.elevation[80, 80])
+    service.settings = settings_from_parameters(DEFAULTS)
+    assert np.isnan(service.terrain.elevation[80, 80])
+
+
+def test_the_exact_goal_is_preferred_to_its_neighbours():
+    service = make_service(make_terrain(waves))
+    verdict = service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=1.0).verdict
+    assert verdict["goal_offset"] == 0.0 and verdict["alternative_goals_tried"] == 0
+
+
+@pytest.mark.parametrize("tolerance", [0.05, 0.3, 0.9])
+def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
+    wall = make_terrain(wall_at(2.0))
+    goal = np.array([1.9, 0.0, 0.0])
+    judgement = make_service(wall).answer((-2.0, 0.0, 0.0), goal, tolerance)
+    if judgement.traversable:
+        end = judgement.candidate.poses[-1]
+        assert np.hypot(*(end - goal)[:2]) <= tolerance and end[2] == 0.0
+    assert judgement.traversable == (tolerance == 0.9)
+
+
+def test_the_nearest_ring_that_can_be_reached_is_taken():
+    wall = make_terrain(wall_at(2.0))
+    offset = (
+        make_service(wall)
+        .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=0.6)
+        .verdict["goal_offset"]
+    )
+    wide = (
+        make_service(wall)
+        .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=3.0)
+        .verdict["goal_offset"]
+    )
+    assert 0.3 < offset <= 0.6 and offset <= wide <= 1.0
+
+
+def test_where_the_start_fails_no_other_goal_is_tried():
+    service = make_service(make_terrain(waves))
+    verdict = service.answer((-9.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=0.5).verdict
+    assert verdict["code"] == "off_map" and verdict["alternative_goals_tried"] == 0
+    assert verdict["first_failure"] == 0
+
+
+@pytest.mark.parametrize("tolerance", [-0.1, math.nan, math.inf])
+def test_an_impossible_tolerance_is_refused(tolerance):
+    with pytest.raises(PlanningError, match="tolerance is"):
+        make_service(make_terrain(waves)).answer((0, 0, 0), (1, 0, 0), tolerance)
+
+
+def test_a_refused_path_is_forgotten():
+    service = make_service(make_terrain(waves))
+    service.take_path(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    assert service.check_last_path().traversable
+    service.refuse_path("bad quaternion")
+    judgement = service.check_last_path()
+    assert judgement.verdict["code"] == "no_path"
+    assert judgement.verdict["reason"] == "the last path was refused: bad quaternion"
+
+
+def test_a_pose_alone_is_a_path():
+    service = make_service(make_terrain(waves))
+    service.take_path(np.array([[0.5, 0.2, 1.0]]))
+    verdict = service.check_last_path().verdict
+    assert verdict["traversable"] and verdict["waypoints"] == 1 and verdict["length"] == 0.0
+
+
+def test_the_measured_suspension_is_compared_with_the_predicted_one():
+    service = make_service(make_terrain(rocky))
+    service.take_path(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]))
+    free = service.check_last_path()
+    assert "suspension_mismatch" not in free.verdict
+    prediction = free.candidate.prediction
+    predicted = dict(
+        zip(
+            SUSPENSION_JOINTS,
+            [*prediction.rocker_angle[0], *prediction.bogie_angle[0]],
+            strict=True,
+        )
+    )
+    assert abs(predicted["rocker_left"]) > 0.001
+    service.take_joints(predicted)
+    verdict = service.check_last_path().verdict
+    assert verdict["suspension_agrees"]
+    assert verdict["suspension_mismatch"] == dict.fromkeys(SUSPENSION_JOINTS, 0.0)
+    service.take_joints({"bogie_left": predicted["bogie_left"] + 0.2})
+    verdict = service.check_last_path().verdict
+    assert not verdict["suspension_agrees"] and verdict["traversable"]
+    assert verdict["suspension_mismatch"]["bogie_left"] == pytest.approx(0.2)
+
+
+def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
+    service = make_service(make_terrain(waves))
+    service.take_path(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    stowed = service.check_last_path().candidate.prediction.wheel_loads
+    manipulator = service.settings.rover.manipulator
+    stretched = dict(zip(manipulator.joints, (0.0, 0.0, 0.0), strict=True))
+    first = manipulator.joints[0]
+    service.take_joints({first: stretched[first]})
+    np.testing.assert_array_equal(
+        service.check_last_path().candidate.prediction.wheel_loads, stowed
+    )
+    service.take_joints(stretched)
+    moved = service.check_last_path().candidate.prediction.wheel_loads
+    assert np.abs(moved - stowed).max() > 0.05
+    assert moved[:, [2, 5]].sum() > stowed[:, [2, 5]].sum()
+
+
+def test_a_rover_without_an_arm_wants_no_arm_joints():
+    assert make_service(rover="m2020").joint_names == SUSPENSION_JOINTS
+
+
+def test_terrain_and_request_turned_together_give_the_same_answer():
+    terrain = make_terrain(rocky)
+    turned = Terrain(np.ascontiguousarray(terrain.elevation.T[:, ::-1]), 0.05, terrain.origin)
+    start, goal = np.array([-2.0, 0.1, 0.1]), np.array([2.0, 0.0, -0.1])
+
+    def turn(pose):
+        return np.array([-pose[1], pose[0], pose[2] + math.pi / 2])
+
+    straight = make_service(terrain).answer(start, goal)
+    sideways = make_service(turned).answer(turn(start), turn(goal))
+    assert sideways.verdict["chosen_candidate"] == straight.verdict["chosen_candidate"]
+    for name in ("energy", "min_tip_over_ratio", "max_friction_utilisation"):
+        assert sideways.verdict[name] == pytest.approx(straight.verdict[name], abs=1e-6)
+    np.testing.assert_allclose(
+        sideways.candidate.prediction.wheel_loads,
+        straight.candidate.prediction.wheel_loads,
+        atol=1e-5,
+    )
+
+
+def test_mirrored_terrain_and_request_swap_right_and_left():
+    terrain = make_terrain(rocky)
+    mirrored = Terrain(np.ascontiguousarray(terrain.elevation[::-1]), 0.05, terrain.origin)
+    poses = np.array([[-2.0, 0.1, 0.1], [2.0, 0.3, 0.1]])
+
+    def loads(ground, path):
+        service = make_service(ground)
+        service.take_path(path)
+        return service.check_last_path().candidate.prediction.wheel_loads
+
+    np.testing.assert_allclose(
+        loads(mirrored, poses * [1, -1, -1])[:, [3, 4, 5, 0, 1, 2]],
+        loads(terrain, poses),
+        atol=1e-5,
+    )
+
+
+def test_densify_keeps_the_given_poses_and_the_spacing():
+    poses = np.array([[0.0, 0.0, 3.0], [0.1, 0.0, -3.0], [0.1, 0.0, 0.0], [0.1, 0.05, 0.0]])
+    dense = densify(poses, 0.02)
+    assert len(dense) == 5 + 1 + 3 + 1
+    assert np.hypot(*np.diff(dense[:, :2], axis=0).T).max() <= 0.02 + 1e-12
+    for pose in poses:
+        assert np.isclose(dense, pose).all(axis=1).any()
+    turned = np.abs(np.diff(np.unwrap(dense[:6, 2])))
+    np.testing.assert_allclose(turned, (2 * math.pi - 6.0) / 5)
+
+
+def test_densify_refuses_an_endless_path():
+    with pytest.raises(PlanningError, match="more than 100000 waypoints"):
+        densify(np.array([[0.0, 0.0, 0.0], [1e300, 0.0, 0.0]]), 0.02)
+
+
+PHYSICAL = {
+    "tilt",
+    "tip_over",
+    "wheel_lift",
+    "friction",
+    "torque",
+    "belly",
+    "suspension",
+    "wheel_drop",
+    "not_settled",
+    "no_equilibrium",
+}
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "codes"),
+    [
+        ((-4.0, 0.0, 0.0), (6.0, 1.0, 0.0), {""}),
+        ((-4.0, 8.0, 0.0), (2.0, 8.0, 0.0), {""}),
+        ((-3.5, -7.0, 0.0), (3.0, -7.0, 0.0), PHYSICAL),
+        ((4.0, 4.0, 0.8), (15.0, 12.0, 0.8), PHYSICAL),
+        ((18.0, 0.0, 0.0), (24.0, 0.0, 0.0), {"off_map"}),
+    ],
+    ids=["plain", "another plain", "crater rim", "hill", "off the map"],
+)
+def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
+    terrain_dir,
+    start,
+    goal,
+    codes,
+):
+    service = make_service(load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz"))
+    verdict = service.answer(start, goal).verdict
+    assert verdict["code"] in codes, verdict["reason"]
+    assert verdict["traversable"] == (not verdict["reason"]) == (codes == {""})
+
+
+def test_the_real_martian_ground_is_passed_where_it_is_known(terrain_dir):
+    terrain = load_terrain(terrain_dir / "mer_spirit_sol1352_hazcam_3cm.npz")
+    north = math.pi / 2
+    start, goal = (-48.5, -20.5, north), (-48.5, -18.0, north)
+    strict = make_service(terrain).answer(start, goal).verdict
+    assert not strict["traversable"] and strict["code"] == "unknown_ground"
+    lenient = make_service(terrain, unknown_cells="interpolate", max_gap=0.3)
+    assert lenient.answer(start, goal).traversable
+    shadow = lenient.answer((-48.0, -20.0, 0.0), (-40.0, -20.0, 0.0)).verdict
+    assert shadow["code"] == "unknown_ground"
+    assert -46.0 < shadow["failure_pose"][0] < -42.0

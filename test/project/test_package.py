@@ -1,0 +1,177 @@
+"""The package as a whole: one version, entry points that exist, imports one way only."""
+
+import ast
+import re
+import runpy
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pytest
+
+import rover_physics
+
+TOP = Path(__file__).resolve().parents[2]
+ROS_FREE = {
+    "numpy",
+    "scipy",
+    "numba",
+    "osqp",
+    "yaml",
+    "rover_physics",
+}
+
+
+@pytest.fixture(scope="module")
+def setup_arguments() -> dict[str, Any]:
+    """Run setup.py and return what it hands to setuptools."""
+    with mock.patch("setuptools.setup") as setup:
+        runpy.run_path(str(TOP / "setup.py"))
+    return setup.call_args.kwargs
+
+
+def imported_modules(path: Path) -> Iterator[str]:
+    """Yield the modules that a file imports, wherever in the file."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield node.module or ""
+
+
+def sources(package: str) -> list[Path]:
+    return sorted((TOP / package).rglob("*.py"))
+
+
+def package_xml() -> ElementTree.Element:
+    return ElementTree.parse(TOP / "package.xml").getroot()
+
+
+def test_manifest_and_setup_have_the_version_of_the_code(setup_arguments):
+    assert setup_arguments["version"] == rover_physics.__version__
+    assert package_xml().findtext("version") == rover_physics.__version__
+
+
+def test_the_latest_release_in_the_changelog_is_this_version():
+    text = (TOP / "CHANGELOG.md").read_text(encoding="utf-8")
+    released = re.findall(r"^## \[(\d+\.\d+\.\d+)\] - \d{4}-\d{2}-\d{2}$", text, re.MULTILINE)
+    assert released[0] == rover_physics.__version__
+
+
+def test_manifest_and_setup_agree_on_name_and_licence(setup_arguments):
+    assert package_xml().findtext("name") == setup_arguments["name"] == "rover_planner"
+    assert package_xml().findtext("license") == setup_arguments["license"] == "Apache-2.0"
+    assert package_xml().findtext("export/build_type") == "ament_python"
+
+
+def test_the_manifest_depends_on_every_ros_package_that_is_imported():
+    declared = {element.text for element in package_xml().iter("exec_depend")}
+    used = {
+        module.split(".")[0]
+        for package in ("msg_adapters", "rover_planner")
+        for path in sources(package)
+        for module in imported_modules(path)
+    }
+    ros = {name for name in used if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
+    ros |= used & {"rcl_interfaces", "builtin_interfaces"}
+    assert ros - {"grid_map_msgs"} <= declared
+
+
+def test_every_console_script_is_a_function_that_exists(setup_arguments):
+    scripts = setup_arguments["entry_points"]["console_scripts"]
+    assert {line.split(" = ")[0] for line in scripts} == {
+        "rover_planner",
+        "traverse_server",
+        "mission_planner",
+        "traction_controller",
+        "rover_simulator",
+    }
+    for line in scripts:
+        module, function = line.split(" = ")[1].split(":")
+        tree = ast.parse((TOP / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8"))
+        assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_the_launch_file_starts_nodes_and_sets_parameters_that_exist(setup_arguments):
+    from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
+
+    text = (TOP / "launch" / "simulation.launch.py").read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    values = {
+        node.targets[0].id: node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    }
+    arguments = ast.literal_eval(values["ARGUMENTS"])
+    specs = {spec.name: spec for spec in ROVER_SIMULATOR}
+    for name, (default, meaning) in arguments.items():
+        assert type(specs[name].default)(default) == specs[name].default
+        assert meaning
+        is_number = name in ast.literal_eval(values["NUMBERS"])
+        assert is_number == isinstance(specs[name].default, float)
+    scripts = setup_arguments["entry_points"]["console_scripts"]
+    assert isinstance(values["nodes"], ast.Dict)
+    started = {ast.literal_eval(key) for key in values["nodes"].keys if key is not None}
+    assert started <= {line.split(" = ")[0] for line in scripts}
+    assert "launch/simulation.launch.py" in dict(setup_arguments["data_files"]).get(
+        "share/rover_planner/launch", ()
+    )
+
+
+def test_every_package_is_installed(setup_arguments):
+    there = {path.parent.relative_to(TOP) for path in TOP.glob("[rm]*/**/__init__.py")}
+    assert setup_arguments["packages"] == sorted(
+        (".".join(path.parts) for path in there), key=setup_arguments["packages"].index
+    )
+
+
+def test_every_configuration_file_is_installed_with_the_ament_marker(setup_arguments):
+    installed = dict(setup_arguments["data_files"])
+    assert installed["share/ament_index/resource_index/packages"] == ["resource/rover_planner"]
+    for path in (TOP / "config").rglob("*"):
+        if path.is_file():
+            relative = path.relative_to(TOP)
+            assert relative.as_posix() in installed[f"share/rover_planner/{relative.parent}"]
+
+
+def test_every_requirement_is_bounded_on_both_sides_and_locked(setup_arguments):
+    extras = setup_arguments["extras_require"]
+    assert extras["all"] == extras["ros"] + extras["plots"] + extras["view"] + extras["test"]
+    locked = (TOP / "constraints.txt").read_text(encoding="utf-8")
+    names = set(re.findall(r"^([a-z0-9.-]+)==", locked, re.MULTILINE))
+    asked_for = [extras[name] for name in ("all", "bench", "dev")]
+    for requirement in sum(asked_for, setup_arguments["install_requires"]):
+        match = re.fullmatch(r"([\w.-]+)>=[\d.]+,<\d+", requirement)
+        assert match, requirement
+        assert match[1].lower() in names
+
+
+@pytest.mark.parametrize("path", sources("rover_physics"), ids=lambda path: path.name)
+def test_rover_physics_imports_nothing_of_ros_or_above_it(path):
+    for module in imported_modules(path):
+        top = module.split(".")[0]
+        assert top in ROS_FREE or top in sys.stdlib_module_names, f"{path.name} imports {module}"
+
+
+@pytest.mark.parametrize("path", sources("msg_adapters"), ids=lambda path: path.name)
+def test_msg_adapters_imports_nothing_above_it(path):
+    tops = {module.split(".")[0] for module in imported_modules(path)}
+    assert not tops & {"rover_planner", "rclpy"}
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        path
+        for name in ("rover_physics", "msg_adapters", "rover_planner")
+        for path in sources(name)
+    ],
+    ids=lambda path: f"{path.parent.name}/{path.name}",
+)
+def test_every_file_opens_with_a_sentence_that_says_what_it_holds(path):
+    docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    assert docstring.split("\n\n")[0].rstrip().endswith(".")

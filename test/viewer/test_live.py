@@ -1,0 +1,244 @@
+"""The page follows a live graph: what a rover publishes is what a visitor sees."""
+
+import threading
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from msg_adapters.commands import wheel_values
+from msg_adapters.predictions import waypoint_array
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics.warm_up import warm_up
+from rover_planner.nodes.mission_planner import MissionPlanner
+from rover_planner.nodes.rover_simulator import RoverSimulator
+from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.ros.qos import result_qos, sensor_qos, topic_qos
+from rover_planner.viewer.live.listener import LiveLink, LiveListener
+from rover_planner.viewer.live.live_frame import LiveFigure, LiveState
+from support.grounds import make_terrain, wall_at, waves
+from support.ros_fixtures import wait_until
+
+LSR1 = load_rover("lsr1")
+
+
+@pytest.fixture
+def listener(ros) -> LiveListener:
+    return ros.spin(LiveListener(context=ros.context))
+
+
+class Talker(Node):
+    """Publishes what a rover, its server and its controller would."""
+
+    def __init__(self, ros):
+        super().__init__("talker", context=ros.context)
+        self.joints = self.create_publisher(JointState, "joint_states", sensor_qos())
+        self.odometry = self.create_publisher(Odometry, "odometry", sensor_qos())
+        self.verdict = self.create_publisher(
+            DiagnosticArray, "/traverse_server/verdict", result_qos()
+        )
+        self.predicted = self.create_publisher(
+            Float64MultiArray, "/traverse_server/wheel_loads", result_qos()
+        )
+        self.estimated = self.create_publisher(
+            Float64MultiArray, "/traction_controller/wheel_loads", topic_qos()
+        )
+        ros.spin(self)
+
+
+@pytest.fixture
+def talker(ros, listener) -> Talker:
+    talker = Talker(ros)
+    wait_until(lambda: talker.odometry.get_subscription_count() == 1, "the listener")
+    return talker
+
+
+def send_until(publish, condition, what):
+    """Publish until it was heard: best effort may lose a message."""
+
+    def heard():
+        publish()
+        return condition()
+
+    wait_until(heard, what)
+
+
+def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
+    message = Odometry()
+    place = message.pose.pose.position
+    place.x, place.y, place.z = x, y, z
+    message.twist.twist.linear.x = speed
+    return message
+
+
+def test_nothing_is_shown_before_it_is_known_where_the_rover_is(listener):
+    heard = listener.latest()
+    assert LiveFigure(LSR1).frame(heard.state) is None
+    assert heard.terrain is None and heard.plan is None and heard.verdict is None
+
+
+def test_the_figure_has_the_measured_joints(listener, talker):
+    angles = {"rocker_right": 0.1, "rocker_left": -0.1, "bogie_right": 0.2, "bogie_left": -0.05}
+    state = JointState(name=[*angles, *WHEEL_JOINTS])
+    state.position = [*angles.values(), *np.arange(6.0).tolist()]
+    send_until(
+        lambda: (talker.joints.publish(state), talker.odometry.publish(odometry())),
+        lambda: len(listener.latest().state.joints) == 10 and listener.latest().state.speed,
+        "joints and odometry",
+    )
+    frame = LiveFigure(LSR1).frame(listener.latest().state)
+    assert frame is not None
+    np.testing.assert_allclose(frame.position, [1.0, 2.0, 0.3])
+    np.testing.assert_allclose(frame.rocker_angle, [0.1, -0.1])
+    np.testing.assert_allclose(frame.bogie_angle, [0.2, -0.05])
+    np.testing.assert_allclose(frame.spin, np.arange(6.0))
+    assert frame.speed == 0.05
+
+
+def test_what_nothing_tells_of_is_not_known(listener, talker):
+    send_until(
+        lambda: talker.odometry.publish(odometry()),
+        lambda: listener.latest().state.position is not None,
+        "odometry",
+    )
+    frame = LiveFigure(LSR1).frame(listener.latest().state)
+    assert frame is not None
+    for values in (frame.wheel_loads, frame.friction_utilisation, frame.torque_saturation):
+        assert np.isnan(values).all()
+    assert np.isnan(frame.tip_over_ratio)
+    assert listener.latest().state.forces_from == ""
+
+
+def test_torques_and_rates_add_up_to_the_energy(listener, talker):
+    def state(second: int) -> JointState:
+        message = JointState(name=list(WHEEL_JOINTS))
+        message.position = [0.0] * 6
+        message.velocity, message.effort = [0.5] * 6, [1.0] * 6
+        message.header.stamp.sec = second
+        return message
+
+    send_until(
+        lambda: talker.joints.publish(state(10)),
+        lambda: listener.latest().state.efforts,
+        "the first state",
+    )
+    send_until(
+        lambda: talker.joints.publish(state(12)),
+        lambda: listener.latest().state.time == 2.0,
+        "two seconds",
+    )
+    assert listener.latest().state.energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
+
+
+def test_what_the_controller_estimates_counts_more_than_what_was_predicted(listener, talker):
+    loads = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
+    talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
+    talker.odometry.publish(odometry())
+    send_until(
+        lambda: talker.estimated.publish(wheel_values(loads)),
+        lambda: "controller" in listener.latest().state.forces_from,
+        "the controller",
+    )
+    np.testing.assert_allclose(listener.latest().state.wheel_loads, loads)
+
+
+def test_a_refusal_of_the_server_is_told_with_its_reason(listener, talker):
+    status = DiagnosticStatus(level=DiagnosticStatus.ERROR, message="a wall")
+    talker.verdict.publish(DiagnosticArray(status=[status]))
+    verdict = wait_until(lambda: listener.latest().verdict, "the verdict")
+    assert not verdict.traversable and verdict.reason == "a wall"
+
+
+def test_messages_that_make_no_sense_are_passed_over(ros, listener, talker):
+    broken = JointState(name=["rocker_right"], position=[float("nan")])
+    talker.joints.publish(broken)
+    talker.odometry.publish(odometry(x=float("inf")))
+    talker.estimated.publish(Float64MultiArray(data=[1.0]))
+    send_until(
+        lambda: talker.odometry.publish(odometry()),
+        lambda: listener.latest().state.position is not None,
+        "good odometry",
+    )
+    assert ros.is_alive(listener)
+    assert "rocker_right" not in listener.latest().state.joints
+
+
+def test_it_cannot_be_asked_for_a_plan_before_there_is_a_server(listener, talker):
+    assert "odometry" in listener.ask_for(np.zeros(2))
+    send_until(
+        lambda: talker.odometry.publish(odometry()),
+        lambda: listener.latest().state.position is not None,
+        "odometry",
+    )
+    assert "can_traverse" in listener.ask_for(np.zeros(2))
+
+
+def test_a_copy_of_the_state_is_not_changed_by_later_messages():
+    state = LiveState(joints={"rocker_right": 0.1})
+    copy = state.copy()
+    state.joints["rocker_right"] = 0.2
+    assert copy.joints == {"rocker_right": 0.1}
+
+
+def test_a_link_ends_what_it_started():
+    before = set(threading.enumerate())
+    link = LiveLink()
+    assert link.listener.context.ok()
+    assert set(threading.enumerate()) > before
+    link.close()
+    assert not link.listener.context.ok()
+    wait_until(lambda: set(threading.enumerate()) <= before, "the threads to end")
+
+
+def start_graph(ros, tmp_path, terrain: Terrain) -> tuple[RoverSimulator, TraverseServer]:
+    """Start a simulator and a server on a terrain, and wait until the server has its map."""
+    warm_up()
+    save_terrain(tmp_path / "terrain.npz", terrain)
+    values = {"terrain_file": str(tmp_path / "terrain.npz"), "start_x": -1.0, "speed": 0.08}
+    parameters = [Parameter(name, value=value) for name, value in values.items()]
+    simulator = ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
+    server = ros.spin(TraverseServer(context=ros.context))
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    return simulator, server
+
+
+def test_it_shows_the_rover_where_it_is_with_what_was_predicted_there(ros, listener, tmp_path):
+    simulator, _ = start_graph(ros, tmp_path, make_terrain(waves))
+    planner = ros.spin(MissionPlanner(context=ros.context))
+    planner.wait_for_server()
+    answer = planner.ask([-1.0, 0.0, 0.0], [0.5, 0.0, 0.0])
+    assert answer["traversable"], answer["reason"]
+    wait_until(lambda: listener.latest().plan is not None, "the plan")
+    wait_until(lambda: listener.latest().verdict is not None, "the verdict")
+    wait_until(lambda: np.isfinite(listener.latest().state.wheel_loads).all(), "the loads")
+    heard = listener.latest()
+    assert heard.terrain is not None and len(heard.plan) > 5 and heard.verdict.traversable
+    assert set(SUSPENSION_JOINTS) <= set(heard.state.joints)
+    frame = LiveFigure(LSR1).frame(heard.state)
+    assert frame is not None
+    plant = simulator.simulation.plant
+    assert frame.position == pytest.approx(plant.state().position, abs=1e-6)
+    assert frame.wheel_loads.sum() == pytest.approx(LSR1.weight, rel=0.05)
+    x, y, z = frame.contact_points.T
+    assert np.abs(z - heard.terrain.elevation_at(x, y)).max() < 0.02
+
+
+def test_a_goal_that_is_asked_for_is_planned_by_the_server(ros, listener, tmp_path):
+    start_graph(ros, tmp_path, make_terrain(wall_at(1.5)))
+    wait_until(lambda: listener.latest().state.position is not None, "odometry")
+    wait_until(lambda: listener.ask_for(np.array([0.5, 0.2])) == "", "the server")
+    wait_until(lambda: listener.latest().plan is not None, "the plan")
+    np.testing.assert_allclose(listener.latest().plan[-1, :2], [0.5, 0.2], atol=1e-6)
+    assert listener.ask_for(np.array([3.0, 0.0])) == ""
+    wait_until(
+        lambda: listener.latest().verdict and not listener.latest().verdict.traversable,
+        "the refusal",
+    )
+    assert listener.latest().plan is None

@@ -1,0 +1,76 @@
+"""The page of a live rover in a real browser: a graph of nodes behind it, a visitor before it."""
+
+import time
+
+import numpy as np
+import pytest
+from rclpy.parameter import Parameter
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics.warm_up import warm_up
+from rover_planner.nodes.rover_simulator import RoverSimulator
+from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.viewer.live.listener import LiveLink
+from rover_planner.viewer.pages.live_page import LivePage
+from rover_planner.viewer.state.session import ViewSession
+from support.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
+from support.grounds import make_terrain, waves
+
+pytestmark = needs_browser
+
+LSR1 = load_rover("lsr1")
+AHEAD = (640, 400)
+"""A place on the screen where the ground ahead of the rover is [px]."""
+ASK_AGAIN = 5.0
+"""Time after which an unanswered question is asked again [s]."""
+
+
+@pytest.fixture
+def page(ros):
+    """A page that follows the graph of the test."""
+    warm_up()
+    level = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
+    session = ViewSession(LSR1, level, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    link = LiveLink(context=ros.context)
+    served = LivePage(session, link.listener, port=0)
+    yield served
+    served.close()
+    link.close()
+
+
+@pytest.fixture
+def visitor(page):
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+        yield Visitor(chromium, page.url)
+        chromium.close()
+
+
+def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, visitor, tmp_path):
+    visitor.wait_for("waiting for odometry")
+    assert "no verdict" in visitor.text("#verdict")
+    empty = visitor.picture()
+    save_terrain(tmp_path / "waves.npz", make_terrain(waves))
+    values = {"terrain_file": str(tmp_path / "waves.npz"), "start_x": -1.0}
+    parameters = [Parameter(name, value=value) for name, value in values.items()]
+    ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
+    ros.spin(TraverseServer(context=ros.context))
+    visitor.wait_for("live; nothing tells of the forces")
+    wait_until(lambda: visitor.picture() != empty, "rover and ground in the scene")
+
+    def ask() -> bool:
+        """Click anew every few seconds: before the server is found a click is refused."""
+        if time.monotonic() - asked[-1] > ASK_AGAIN:
+            asked.append(time.monotonic())
+            visitor.click_scene(*AHEAD)
+        return "traversable" in visitor.text("#verdict")
+
+    asked = [-ASK_AGAIN]
+    wait_until(ask, "the server's verdict")
+    visitor.wait_for("live; forces as the server predicted them")
+    wait_until(lambda: "? N" not in visitor.text("#board"), "the loads on the board")
+    lines = visitor.text("#board").splitlines()
+    loads = [float(line.removesuffix(" N")) for line in lines if line.endswith(" N")]
+    assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
+    assert visitor.faults == []

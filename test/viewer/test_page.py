@@ -1,0 +1,272 @@
+"""The page in a real browser: what its buttons, sliders and clicks do, as a visitor sees it."""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.studies.rover_values import read_rover
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.state.session import ViewSession
+from support.browser import (
+    ARGUMENTS,
+    PROGRAM,
+    WAIT,
+    Visitor,
+    needs_browser,
+    sync_api,
+    wait_until,
+)
+from support.grounds import make_terrain, waves
+
+pytestmark = needs_browser
+
+LSR1 = load_rover("lsr1")
+MIDDLE = (600, 420)
+"""A place on the screen where the ground is [px]."""
+
+
+def walled() -> Terrain:
+    """Return waves with a wall right across that no rover climbs."""
+    return make_terrain(lambda x, y: waves(x, y) + 0.5 * ((x > 2.2) & (x < 2.6)))
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    session = ViewSession(LSR1, walled(), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    served = Page(session, port=0)
+    yield served
+    served.close()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def opened(page, browser) -> Visitor:
+    return Visitor(browser, page.url)
+
+
+@pytest.fixture
+def visitor(opened, page) -> Visitor:
+    """A visitor at the start of the path from (-2, 0) to (1, 0), with the preset lsr1."""
+
+    def start_anew() -> None:
+        page.session.start = (-2.0, 0.0, 0.0)
+        if page.session.rover != LSR1:
+            page.session.rover = LSR1
+            page.rover_tab.show_values(LSR1)
+            page.scene.draw_rover(LSR1, {})
+        page.plan(np.array([1.0, 0.0]))
+        done.append(True)
+
+    done: list[bool] = []
+    page.wishes.ask(start_anew)
+    wait_until(lambda: done, "the start")
+    opened.open_tab("Drive")
+    opened.wait_for("paused")
+    wait_until(lambda: opened.number("Time") == 0.0, "the board to show the start")
+    return opened
+
+
+def test_the_page_shows_the_rover_its_loads_and_the_verdict(visitor):
+    assert "traversable" in visitor.text("#verdict")
+    board = visitor.text("#board")
+    assert board.count(" N\n") + board.endswith(" N") >= 6
+    loads = [float(part.split()[-1]) for part in board.split(" N")[:6]]
+    assert sum(loads) == pytest.approx(LSR1.weight, rel=0.1)
+    for name in ("Time", "Distance", "Energy", "Speed", "stability margin", "slip ratio"):
+        assert name in board
+    assert not visitor.faults
+
+
+def test_all_of_the_drive_panel_is_on_a_laptop_screen(visitor):
+    for selector in ("#verdict", "#board", "#state", "#plots-legend"):
+        box = visitor.tab.locator(selector).bounding_box()
+        assert box["y"] >= 0.0 and box["y"] + box["height"] <= 720.0, selector
+
+
+def test_play_moves_the_rover_and_pause_stops_it(visitor, page):
+    before = visitor.picture()
+    visitor.press("Play")
+    visitor.wait_for("playing")
+    wait_until(lambda: visitor.number("Distance") > 5.0, "the rover to drive")
+    visitor.press("Pause")
+    visitor.wait_for("paused")
+    stopped = page.playback.time
+    assert 0.0 < stopped < page.playback.duration
+    wait_until(lambda: visitor.number("Time") == pytest.approx(stopped, abs=0.1), "the board")
+    assert visitor.picture() != before
+    assert page.playback.time == stopped
+
+
+def test_fast_forward_is_faster_than_play_and_rewind_goes_back(visitor, page):
+    visitor.press("Fast forward")
+    visitor.wait_for("fast forward, 40 times as fast")
+    wait_until(lambda: page.playback.time > 0.5 * page.playback.duration, "half of the way")
+    visitor.press("Rewind")
+    visitor.wait_for("rewinding")
+    wait_until(lambda: page.playback.time == 0.0, "the start")
+    wait_until(lambda: visitor.number("Time") == 0.0, "the board to show it")
+
+
+def test_step_goes_to_the_next_waypoint_and_back(visitor, page):
+    times = page.session.shown.journey.times
+    for press, row in (("Step", 1), ("Step", 2), ("Step back", 1)):
+        visitor.press(press)
+        there = times[row]
+        wait_until(lambda there=there: page.playback.time == pytest.approx(there), f"row {row}")
+    wait_until(lambda: visitor.number("Time") == pytest.approx(times[1], abs=0.06), "the board")
+
+
+def test_the_scrubber_goes_to_any_time_and_the_cursor_of_the_plots_with_it(visitor, page):
+    assert visitor.tab.locator(".uplot canvas").count() == 3
+    visitor.set_slider("Time [s]", "50")
+    wait_until(lambda: page.playback.time == pytest.approx(50.0), "50 s")
+    wait_until(lambda: visitor.number("Time") == 50.0, "the board to show it")
+    assert visitor.number("Distance") == pytest.approx(150.0, rel=0.05)
+    distance = page.session.shown.journey.frame(50.0).distance
+    data = page.charts.plots["wheel_loads"]
+    wait_until(lambda: np.any(np.isclose(data.data[0], distance)), "the cursor to be there")
+    assert all(np.isfinite(column).all() for column in data.data)
+
+
+def test_every_time_that_is_typed_takes_effect_though_the_page_moves_the_scrubber_too(
+    visitor, page
+):
+    for typed in ("50", "50", "7.5", "61.2"):
+        visitor.set_slider("Time [s]", typed)
+        wait_until(lambda typed=typed: page.playback.time == float(typed), f"{typed} s")
+        visitor.press("To the start")
+        wait_until(lambda: visitor.slider_value("Time [s]") == 0.0, "the start")
+
+
+def test_a_time_counts_that_is_typed_just_before_the_page_shows_another(visitor, page):
+    scrubber = page.drive_tab._player._scrubber
+
+    def show_late(typed: float) -> None:
+        """Keep the page's thread from looking until the visitor's time is there."""
+        ready.append(typed)
+        end = time.monotonic() + WAIT
+        while scrubber.value != typed and time.monotonic() < end:
+            pass
+        page.drive_tab.show_time()
+
+    for typed in range(1, 10):
+        ready: list[float] = []
+        wait_until(lambda: page.drive_tab._hand_on_until is None, "the last time to be shown")
+        page.wishes.ask(lambda typed=typed: show_late(typed))
+        wait_until(lambda ready=ready: ready, "the page's thread")
+        visitor.set_slider("Time [s]", f"{typed}")
+        wait_until(lambda typed=typed: page.playback.time == typed, f"{typed} s")
+        wait_until(
+            lambda typed=typed: visitor.slider_value("Time [s]") == typed, "the box to show it"
+        )
+
+
+def test_a_slider_changes_the_rover_and_the_path_is_judged_again(visitor, page):
+    used = page.session.shown.verdict.max_friction_utilisation
+    visitor.open_tab("Rover")
+    visitor.set_slider("friction [-]", "0.4")
+    wait_until(lambda: page.session.rover.friction == 0.4, "the friction")
+    visitor.wait_for("judged again in")
+    now = page.session.shown.verdict.max_friction_utilisation
+    assert now == pytest.approx(2.0 * used, rel=0.01)
+
+
+def test_a_dragged_slider_ends_at_its_last_value(visitor, page):
+    visitor.open_tab("Rover")
+    visitor.drag_slider("friction [-]", 0.25)
+    shown = visitor.slider_value("friction [-]")
+    assert shown != 0.8
+    wait_until(lambda: page.session.rover.friction == pytest.approx(shown), "the last value")
+
+
+def test_a_link_length_changes_the_rover_in_the_scene(visitor, page):
+    visitor.open_tab("Rover")
+    before = visitor.picture()
+    visitor.set_slider("front wheel x [m]", "0.6")
+    wait_until(lambda: page.session.rover.suspension.wheels["front"][0] == 0.6, "the wheel")
+    wait_until(lambda: visitor.picture() != before, "another figure")
+
+
+def test_a_value_that_makes_no_rover_is_refused_with_the_reason(visitor, page):
+    good = page.session.rover
+    visitor.open_tab("Rover")
+    visitor.set_slider("middle wheel x [m]", "0.4")
+    visitor.wait_for("refused: ")
+    assert "suspension.wheels.front" in visitor.text("#refusal")
+    assert page.session.rover == good
+    wait_until(lambda: visitor.slider_value("middle wheel x [m]") == 0.0, "the last good value")
+
+
+def test_a_rover_file_can_be_saved_and_loaded(visitor, page, tmp_path):
+    visitor.open_tab("Rover")
+    visitor.set_slider("friction [-]", "0.5")
+    wait_until(lambda: page.session.rover.friction == 0.5, "the friction")
+    with visitor.tab.expect_download() as download:
+        visitor.press("Save as rover file")
+    file = tmp_path / "rover.yaml"
+    download.value.save_as(file)
+    assert read_rover(file.read_text(), "saved") == page.session.rover
+    file.write_text(file.read_text().replace("name: lsr1", "name: mine"))
+    with visitor.tab.expect_file_chooser() as chooser:
+        visitor.press("Load a rover file")
+    chooser.value.set_files(file)
+    wait_until(lambda: page.session.rover.name == "mine", "the loaded rover")
+
+
+def test_a_click_on_the_ground_sets_the_goal_and_is_judged_at_once(visitor, page):
+    goal, start = page.session.goal, page.session.start
+    visitor.click_scene(*MIDDLE)
+    wait_until(lambda: page.session.goal != goal, "another goal")
+    x, y, _ = page.session.goal
+    assert abs(x) < 4.0 and abs(y) < 4.0
+    assert page.session.start == start
+    assert "candidate paths" in visitor.text("#verdict")
+
+
+def test_a_click_with_shift_sets_the_start(visitor, page):
+    goal, start = page.session.goal, page.session.start
+    visitor.click_scene(*MIDDLE, shift=True)
+    wait_until(lambda: page.session.start != start, "another start")
+    assert page.session.goal[:2] == goal[:2]
+
+
+def test_a_path_through_a_wall_is_refused_and_its_reason_is_shown(visitor, page):
+    before = visitor.picture()
+    page.wishes.ask(lambda: page.plan(np.array([3.4, 0.0])))
+    visitor.wait_for("not traversable")
+    assert page.session.shown.verdict.reason in visitor.text("#verdict")
+    assert not page.session.answer.traversable
+    wait_until(lambda: visitor.picture() != before, "ghosts in the scene")
+
+
+def test_the_ground_can_be_coloured_by_what_is_predicted(visitor):
+    visitor.open_tab("Ground and path")
+    before = visitor.picture()
+    visitor.choose("Colour by", "tilt")
+    visitor.wait_for("29.79 deg")
+    wait_until(lambda: visitor.picture() != before, "other colours")
+    visitor.choose("Colour by", "height")
+
+
+def test_a_soil_changes_the_verdict_on_slip(visitor, page):
+    visitor.open_tab("Ground and path")
+    assert page.session.shown.verdict.max_sinkage == 0.0
+    visitor.choose("Soil", "dry_sand")
+    wait_until(lambda: page.session.shown.verdict.max_sinkage > 0.0, "wheels that sink")
+    visitor.choose("Soil", "none (Coulomb)")
+    wait_until(lambda: page.session.options.soil is None, "hard ground")
+
+
+def test_the_browser_meets_no_fault_in_all_of_this(visitor):
+    assert visitor.faults == []
