@@ -10,7 +10,7 @@ from benchmarks.measure import Figure, median_times
 from rover_physics.contact.contact_record import AGAIN, COARSE, FULL, NEAR, QUICK
 from rover_physics.contact.rim_scan import scan_rim
 from rover_physics.contact.settling import SETTLED, SLOPED, settle, write_gap_rates
-from rover_physics.contact.wheel import find_contact, find_touch
+from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.prediction.evaluation import WORK, evaluate, new_work
 from rover_physics.prediction.model_setup import set_up
 from rover_physics.rover.linkage import place
@@ -30,28 +30,28 @@ def do_nothing(ground, linkage, samples, work):
 def guess(ground, linkage, samples, work):
     """Make the first guess."""
     for wheel in range(6):
-        find_touch(ground, samples, work.placement, wheel, COARSE, work.touch)
+        find_contact(ground, samples, work.placement, wheel, COARSE, work.contacts)
 
 
 @compiled
 def sample(ground, linkage, samples, work):
     """Hold all samples of the rims against the ground."""
     for wheel in range(6):
-        scan_rim(ground, samples, work.placement, wheel, QUICK, work.touch)
+        scan_rim(ground, samples, work.placement, wheel, QUICK, work.contacts)
 
 
 @compiled
 def look(ground, linkage, samples, work):
     """Hold all samples against the ground, and search around the nearest."""
     for wheel in range(6):
-        find_touch(ground, samples, work.placement, wheel, QUICK, work.touch)
+        find_contact(ground, samples, work.placement, wheel, QUICK, work.contacts)
 
 
 @compiled
 def look_and_step(ground, linkage, samples, work):
     """Work out a step of Newton's method, too, but for its solution."""
     look(ground, linkage, samples, work)
-    write_gap_rates(linkage, work.placement, work.touch, SLOPED, work.J)
+    write_gap_rates(linkage, work.placement, work.contacts, SLOPED, work.J)
 
 
 @compiled
@@ -59,7 +59,7 @@ def look_near(ground, linkage, samples, work):
     """Search around the nearest places once more, as after a step."""
     look(ground, linkage, samples, work)
     for wheel in range(6):
-        find_touch(ground, samples, work.placement, wheel, NEAR, work.touch)
+        find_contact(ground, samples, work.placement, wheel, NEAR, work.contacts)
 
 
 @compiled
@@ -67,7 +67,7 @@ def verify(ground, linkage, samples, work):
     """Verify that no other place of the rims is nearer."""
     look(ground, linkage, samples, work)
     for wheel in range(6):
-        find_touch(ground, samples, work.placement, wheel, FULL, work.touch)
+        find_contact(ground, samples, work.placement, wheel, FULL, work.contacts)
 
 
 @compiled
@@ -75,7 +75,7 @@ def verify_again(ground, linkage, samples, work):
     """Verify it once more at the circles that came near."""
     verify(ground, linkage, samples, work)
     for wheel in range(6):
-        find_touch(ground, samples, work.placement, wheel, AGAIN, work.touch)
+        find_contact(ground, samples, work.placement, wheel, AGAIN, work.contacts)
 
 
 @compiled
@@ -83,7 +83,7 @@ def share_load(ground, linkage, samples, work):
     """Find the mean contacts."""
     verify(ground, linkage, samples, work)
     for wheel in range(6):
-        find_contact(samples, work.placement, wheel, work.touch)
+        blend_contact(samples, work.placement, wheel, work.contacts)
 
 
 PARTS = {
@@ -120,7 +120,7 @@ def settle_all(grounds, linkages, samplings, poses, q, works):
     for i in range(len(poses)):
         settle(
             grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-            q[i], work.placement, work.touch, work.J, work.step,
+            q[i], work.placement, work.contacts, work.J, work.step,
         )  # fmt: skip
 
 

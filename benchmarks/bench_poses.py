@@ -11,7 +11,7 @@ from rover_physics.prediction.model_setup import Setup, set_up
 from rover_physics.rover.linkage import place
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.terrain.ground import find_roof, height_inside
+from rover_physics.terrain.ground import find_block_max, height_inside
 
 POSES = 4_000
 FLOOR_POSES = 400
@@ -31,7 +31,7 @@ def settle_all(grounds, linkages, samplings, poses, works, results):
     for i in range(len(poses)):
         results[i].status = settle(
             grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-            results[i].q, work.placement, work.touch, work.J, work.step,
+            results[i].q, work.placement, work.contacts, work.J, work.step,
         )  # fmt: skip
 
 
@@ -45,12 +45,12 @@ def settle_along(grounds, linkages, samplings, poses, works, results):
             q[:] = results[i - 1].q
             results[i].status = settle_from(
                 grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-                q, work.placement, work.touch, work.J, work.step,
+                q, work.placement, work.contacts, work.J, work.step,
             )  # fmt: skip
         else:
             results[i].status = settle(
                 grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-                q, work.placement, work.touch, work.J, work.step,
+                q, work.placement, work.contacts, work.J, work.step,
             )  # fmt: skip
 
 
@@ -96,9 +96,9 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
             points = centre + rim[:, None] + laterals[:, None] * axis
             at = (points[..., :2] - corner) * scale
             middle, reach = (centre[:2] - corner) * scale, samples.reach * scale
-            roof = find_roof(ground, middle[0], middle[1], reach, reach)
-            if np.isfinite(roof):
-                cells.append(at[points[..., 2] <= roof])
+            block_max = find_block_max(ground, middle[0], middle[1], reach, reach)
+            if np.isfinite(block_max):
+                cells.append(at[points[..., 2] <= block_max])
     return np.concatenate(cells), len(settled)
 
 

@@ -1,4 +1,4 @@
-"""Wheel torques in closed loop: speed servos, equal torques and the programme, in MuJoCo.
+"""Wheel torques in closed loop: speed servos, equal torques and the program, in MuJoCo.
 
 Run from the repository: python -m benchmarks.traction [--quick] [--out FOLDER]
 It needs the extra `bench`. docs/traction.md has what it says.

@@ -1,4 +1,4 @@
-"""Markers for a viewer: the path coloured by grade, where it fails, the wheels' contacts."""
+"""Markers for a viewer: the path coloured by class, where it fails, the wheels' contacts."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.paths import quaternions
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.traversability import traversability_class as grades
+from rover_physics.traversability import classification
 
 PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
 WITH_TRACTION_CONTROL = ColorRGBA(r=0.95, g=0.65, b=0.10, a=1.0)
@@ -18,9 +18,9 @@ IMPASSABLE = ColorRGBA(r=0.85, g=0.15, b=0.10, a=1.0)
 CONTACT = ColorRGBA(r=0.15, g=0.35, b=0.85, a=0.8)
 
 _COLOURS = {
-    grades.PASSABLE: PASSABLE,
-    grades.WITH_TRACTION_CONTROL: WITH_TRACTION_CONTROL,
-    grades.IMPASSABLE: IMPASSABLE,
+    classification.PASSABLE: PASSABLE,
+    classification.WITH_TRACTION_CONTROL: WITH_TRACTION_CONTROL,
+    classification.IMPASSABLE: IMPASSABLE,
 }
 _LINE_WIDTH = 0.05
 _CONTACT_SIZE = 0.04
@@ -34,7 +34,7 @@ def path_markers(
     rows: NDArray[np.intp],
     frame_id: str,
     stamp,
-    waypoint_grades: Sequence[str] = (),
+    waypoint_classes: Sequence[str] = (),
 ) -> MarkerArray:
     """Draw a judged path; the first marker clears what was drawn before.
 
@@ -44,15 +44,15 @@ def path_markers(
         rows: Waypoints to draw; the first that fails is always drawn.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
-        waypoint_grades: (n,) grades, for the colours; without them the reasons count.
+        waypoint_classes: (n,) classes, for the colours; without them the reasons count.
     """
     markers = cleared_markers(frame_id, stamp)
     positions = _drawable_positions(prediction)
     failures = [i for i, reason in enumerate(reasons) if reason]
     rows = np.unique(np.concatenate([rows, failures[:1]]).astype(np.intp))
     settled = rows[prediction.settled[rows]]
-    told = [(reasons[i], waypoint_grades[i] if waypoint_grades else "") for i in rows]
-    colours = [_colour(reason, grade) for reason, grade in told]
+    told = [(reasons[i], waypoint_classes[i] if waypoint_classes else "") for i in rows]
+    colours = [_colour(reason, traversability_class) for reason, traversability_class in told]
     markers.markers.append(_path_line(positions[rows], colours, frame_id, stamp))
     markers.markers.append(_contact_points(prediction.contact_points[settled], frame_id, stamp))
     if failures:
@@ -63,9 +63,15 @@ def path_markers(
     return markers
 
 
-def _colour(reason: str, grade: str) -> ColorRGBA:
-    """Return the colour of a waypoint, by its grade where that is known."""
-    return _COLOURS[grade] if grade else IMPASSABLE if reason else PASSABLE
+def _colour(reason: str, traversability_class: str) -> ColorRGBA:
+    """Return the colour of a waypoint, by its class where that is known."""
+    return (
+        _COLOURS[traversability_class]
+        if traversability_class
+        else IMPASSABLE
+        if reason
+        else PASSABLE
+    )
 
 
 def cleared_markers(frame_id: str, stamp) -> MarkerArray:

@@ -16,7 +16,7 @@ from rover_physics.prediction.path_prediction import PathPrediction
 _NORM_TOLERANCE = 0.01
 """How far the squared length of a quaternion may be from 1, as in tf2."""
 
-_LEAST_LEVEL = 1e-3
+_MIN_LEVEL = 1e-3
 """Least horizontal share of the forward axis for which a heading is defined."""
 
 
@@ -38,7 +38,7 @@ def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> fl
         )
     forward_x = w * w + x * x - y * y - z * z
     forward_y = 2.0 * (x * y + w * z)
-    if math.hypot(forward_x, forward_y) < _LEAST_LEVEL:
+    if math.hypot(forward_x, forward_y) < _MIN_LEVEL:
         raise MessageError(f"{text} points forward straight up or down; it has no heading")
     return math.atan2(forward_y, forward_x)
 

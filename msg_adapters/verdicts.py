@@ -12,10 +12,10 @@ STATUS_NAME = "traverse_server: can the rover traverse"
 PER_WAYPOINT = (
     "reasons",
     "codes",
-    "grades",
-    "grade_constraints",
-    "grade_wheels",
-    "grade_margins",
+    "traversability_classes",
+    "class_constraints",
+    "class_wheels",
+    "class_margins",
 )
 """Entries of a verdict with a value for each waypoint; only in JSON."""
 

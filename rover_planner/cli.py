@@ -79,9 +79,12 @@ def predict(
             help="Standard deviations to allow for where the map has elevation_std; 0: none.",
         ),
     ] = 3.0,
-    grade: Annotated[
+    classes: Annotated[
         bool,
-        typer.Option("--grade", help="Add the grade of each waypoint, by both torque policies."),
+        typer.Option(
+            "--classes",
+            help="Add the class of each waypoint, by both torque policies.",
+        ),
     ] = False,
     torque_ranges: Annotated[
         bool,
@@ -94,9 +97,9 @@ def predict(
     """
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
+    from rover_physics.traversability.classification import classify_judged
     from rover_physics.traversability.judge_path import judge_path
     from rover_physics.traversability.torque_ranges import find_torque_ranges
-    from rover_physics.traversability.traversability_class import grade_judged
     from rover_planner.command.arm_options import read_arm_angles
     from rover_planner.command.prediction_files import read_poses, write_prediction
     from rover_planner.progress import show_progress
@@ -116,14 +119,16 @@ def predict(
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
         judged = judge_path(model, ground, path, policy=policy, sigmas=sigmas, **options)
-        if grade:
-            progress("grade the waypoints")
-        grades = grade_judged(model, ground, *judged, sigmas=sigmas, **options) if grade else None
+        if classes:
+            progress("classify the waypoints")
+        found = (
+            classify_judged(model, ground, *judged, sigmas=sigmas, **options) if classes else None
+        )
         if torque_ranges:
             progress("find the ranges of the torques")
         ranges = find_torque_ranges(model, ground, path, **options) if torque_ranges else None
     on_soil = soil is not None or bool(ground.soil_names)
-    write_prediction(out, *judged, on_soil=on_soil, grades=grades, ranges=ranges)
+    write_prediction(out, *judged, on_soil=on_soil, classes=found, ranges=ranges)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that -1.5 is a number

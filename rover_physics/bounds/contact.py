@@ -10,30 +10,30 @@ import numpy as np
 
 from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.wheel import COMPLIANCE
-from rover_physics.contact.wheel_samples import MOST_ANGLES, MOST_CIRCLES
+from rover_physics.contact.wheel_samples import MAX_ANGLES, MAX_CIRCLES
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 from rover_physics.terrain.ground import elevation_of, height_at_cell, is_cell_on_map
 
 RUNGS = 4
 """Places between a point and the nearest one that it is held against."""
-STEEPEST = np.radians(70.0)
+MAX_CONTACT_ANGLE = np.radians(70.0)
 """Contact angle from which on steeper ones count as that steep, where the wheel moves along."""
 SQRT2 = np.sqrt(2.0)
 HALVINGS = 5
 """How often the way from the last sample that may touch to the first that can't is halved."""
 
 RIM = record_type(
-    ("gap", float, (MOST_CIRCLES, MOST_ANGLES)),  # vertical gap of each sample [m]
-    ("lowest", float, (MOST_CIRCLES, MOST_ANGLES)),  # angle of a smallest gap near, NaN if none
+    ("gap", float, (MAX_CIRCLES, MAX_ANGLES)),  # vertical gap of each sample [m]
+    ("lowest", float, (MAX_CIRCLES, MAX_ANGLES)),  # angle of a smallest gap near, NaN if none
     ("largest_error", float),  # of the ground anywhere near [m]
     ("reach", float),  # how far the wheel may move forward or back [m]
-    ("nearest", float, (MOST_CIRCLES,)),  # smallest gap of each circle [m]
-    ("nearest_angle", float, (MOST_CIRCLES,)),  # contact angle there [rad]
+    ("nearest", float, (MAX_CIRCLES,)),  # smallest gap of each circle [m]
+    ("nearest_angle", float, (MAX_CIRCLES,)),  # contact angle there [rad]
 )
 """The gaps all around a wheel."""
 
-CONTACTS = record_type(
+CONTACT_BOUNDS = record_type(
     ("rim", RIM),
     ("angle", float, (6,)),  # nominal contact angle [rad]
     ("angle_low", float, (6,)),  # smallest possible [rad]
@@ -46,27 +46,29 @@ CONTACTS = record_type(
 
 
 @kernel
-def bound_contacts(ground, error, samples, placement, angles, points, reach, contacts):
-    """Write the possible contacts of all wheels of a placed rover into `contacts`.
+def bound_contacts(ground, error, samples, placement, angles, points, reach, contact_bounds):
+    """Write the possible contact_bounds of all wheels of a placed rover into `contact_bounds`.
 
     `error` is a GROUND whose elevation bounds the error of each cell's height [m]; angles (6,)
     [rad] and points (6, 3) [m] are the nominal contacts; reach (6,) bounds how far the wheels move
     along [m].
     """
-    R, rim = placement.R, contacts.rim
+    R, rim = placement.R, contact_bounds.rim
     for wheel in range(6):
         lateral = 0.0
         for i in range(3):
             lateral += R[i, 1] * (points[wheel, i] - placement.centres[wheel, i])
         angle = angles[wheel]
-        contacts.angle[wheel] = contacts.angle_low[wheel] = contacts.angle_high[wheel] = angle
-        contacts.lateral[wheel] = lateral
-        contacts.lateral_low[wheel] = contacts.lateral_high[wheel] = lateral
+        contact_bounds.angle[wheel] = contact_bounds.angle_low[wheel] = contact_bounds.angle_high[
+            wheel
+        ] = angle
+        contact_bounds.lateral[wheel] = lateral
+        contact_bounds.lateral_low[wheel] = contact_bounds.lateral_high[wheel] = lateral
         rim.reach = reach[wheel]
         rim.largest_error = _find_largest_error(ground, error, samples, placement, wheel)
         if max(rim.largest_error, rim.reach) > 0.0:
             _look_around(ground, samples, placement, wheel, angle, rim)
-            _widen(ground, error, samples, placement, wheel, contacts)
+            _widen(ground, error, samples, placement, wheel, contact_bounds)
 
 
 @kernel
@@ -173,26 +175,26 @@ def _angle_of_row(samples, k):
 
 
 @kernel
-def _widen(ground, error, samples, placement, wheel, contacts):
+def _widen(ground, error, samples, placement, wheel, contact_bounds):
     """Widen the contact of a wheel to all points of its rim that may touch."""
-    rim = contacts.rim
+    rim = contact_bounds.rim
     best = 0
     for m in range(samples.circles):
         if rim.nearest[m] < rim.nearest[best]:
             best = m
     give = COMPLIANCE * samples.radius
-    first, last, largest = contacts.lateral[wheel], contacts.lateral[wheel], 0.0
+    first, last, largest = contact_bounds.lateral[wheel], contact_bounds.lateral[wheel], 0.0
     for m in range(samples.circles):
         reach = _error_to_circle(ground, error, samples, placement, wheel, m, best, rim)
         largest = max(largest, reach)
         if rim.nearest[m] - rim.nearest[best] <= reach + give:
             first, last = min(first, samples.laterals[m]), max(last, samples.laterals[m])
-            _widen_angles(ground, error, samples, placement, wheel, m, contacts)
+            _widen_angles(ground, error, samples, placement, wheel, m, contact_bounds)
     # Circles closer to each other than the give share the load: small errors shift it a little.
     share = min(1.0, largest / give)
-    middle = contacts.lateral[wheel]
-    contacts.lateral_low[wheel] = middle + share * (first - middle)
-    contacts.lateral_high[wheel] = middle + share * (last - middle)
+    middle = contact_bounds.lateral[wheel]
+    contact_bounds.lateral_low[wheel] = middle + share * (first - middle)
+    contact_bounds.lateral_high[wheel] = middle + share * (last - middle)
 
 
 @kernel
@@ -206,22 +208,22 @@ def _error_to_circle(ground, error, samples, placement, wheel, m, best, rim):
 
 @kernel
 def _shift_between(rim, angle, other):
-    """Return how much the gaps at two contacts change apart [m] as the wheel moves along."""
-    angle = min(max(angle, -STEEPEST), STEEPEST)
-    other = min(max(other, -STEEPEST), STEEPEST)
+    """Return how much the gaps at two contact_bounds change apart [m] as the wheel moves along."""
+    angle = min(max(angle, -MAX_CONTACT_ANGLE), MAX_CONTACT_ANGLE)
+    other = min(max(other, -MAX_CONTACT_ANGLE), MAX_CONTACT_ANGLE)
     return rim.reach * abs(np.tan(angle) - np.tan(other))
 
 
 @kernel
-def _widen_angles(ground, error, samples, placement, wheel, m, contacts):
+def _widen_angles(ground, error, samples, placement, wheel, m, contact_bounds):
     """Widen the angles of a wheel to those at which circle m may touch."""
-    rim = contacts.rim
+    rim = contact_bounds.rim
     nearest = rim.nearest_angle[m]
-    contacts.angle_low[wheel] = min(contacts.angle_low[wheel], nearest)
-    contacts.angle_high[wheel] = max(contacts.angle_high[wheel], nearest)
+    contact_bounds.angle_low[wheel] = min(contact_bounds.angle_low[wheel], nearest)
+    contact_bounds.angle_high[wheel] = max(contact_bounds.angle_high[wheel], nearest)
     for side in range(2):
         inside, outside = _find_farthest(ground, error, samples, placement, wheel, m, side, rim)
-        if contacts.angle_low[wheel] <= outside <= contacts.angle_high[wheel]:
+        if contact_bounds.angle_low[wheel] <= outside <= contact_bounds.angle_high[wheel]:
             continue
         for _ in range(HALVINGS):
             middle = 0.5 * (inside + outside)
@@ -229,8 +231,8 @@ def _widen_angles(ground, error, samples, placement, wheel, m, contacts):
                 inside = middle
             else:
                 outside = middle
-        contacts.angle_low[wheel] = min(contacts.angle_low[wheel], outside)
-        contacts.angle_high[wheel] = max(contacts.angle_high[wheel], outside)
+        contact_bounds.angle_low[wheel] = min(contact_bounds.angle_low[wheel], outside)
+        contact_bounds.angle_high[wheel] = max(contact_bounds.angle_high[wheel], outside)
 
 
 @kernel

@@ -36,13 +36,13 @@ LOAD, PULL, SIDE, USE, TIP = 0, 6, 12, 18, 24
 """Where loads, tractions, lateral forces (all in weights), utilisations and tip-over angles [rad]
 begin among the outputs."""
 OUTPUTS = 24 + CORNERS
-LEAST_LOAD = 1e-6
+MIN_LOAD = 1e-6
 """Load, in weights, that counts where there is less, so that one may divide by it."""
 TOGETHER = 2.0
 """Sum of the squares of the contact angles' deviations, in their intervals: the errors under
 different wheels are taken as independent, so that the probability of a sum of them is that of one
 deviation at the square root of this, not that of all angles at their ends at once."""
-MOST_SOILS = 32
+MAX_SOILS = 32
 """Largest number of soils on a map, the default included."""
 
 BOX = record_type(
@@ -58,7 +58,7 @@ BOX = record_type(
     ("largest", float, (OUTPUTS,)),  # largest outputs
     ("mu_low", float, (6,)),  # smallest friction coefficient that a wheel may touch
     ("mu_high", float, (6,)),  # largest one
-    ("soils", np.int64, (6, MOST_SOILS)),  # rows of the soils that it may touch
+    ("soils", np.int64, (6, MAX_SOILS)),  # rows of the soils that it may touch
     ("soil_count", np.int64, (6,)),  # number of these
     ("soil", float, (SOIL_NUMBERS,)),  # one of them
     ("aim", float, (OUTPUTS,)),  # weights of the outputs in the sum that is taken to its extreme
@@ -70,16 +70,16 @@ BOX = record_type(
 
 
 @kernel
-def bound_forces(ground, linkage, samples, settings, pose, spread, contacts, box):
+def bound_forces(ground, linkage, samples, settings, pose, spread, contact_bounds, box):
     """Write smallest and largest outputs into `box`; False where the balance is singular.
 
     Under policy optimal the differences of the torques are those that are best for the nominal
     rover, the common pull makes up for the rest: the best torques of any other rover need
     no more friction than these. On soil they need no more than equal ones.
     """
-    _fill_box(spread, contacts, box)
+    _fill_box(spread, contact_bounds, box)
     place(linkage, pose[0], pose[1], pose[2], spread.q, spread.model.placement)
-    _find_grounds(ground, samples, settings, spread.model.placement, contacts, box)
+    _find_grounds(ground, samples, settings, spread.model.placement, contact_bounds, box)
     box.columns = 1 if settings.policy == EQUAL or settings.on_soil else 1 + FREE_FORCES
     if not _choose_torques(ground, linkage, settings, pose, spread, box):
         return False
@@ -101,25 +101,25 @@ def bound_forces(ground, linkage, samples, settings, pose, spread, contacts, box
 
 
 @kernel
-def _fill_box(spread, contacts, box):
+def _fill_box(spread, contact_bounds, box):
     for wheel in range(6):
         box.base[HEIGHT + wheel] = 0.0
         box.low[HEIGHT + wheel], box.high[HEIGHT + wheel] = spread.low[wheel], spread.high[wheel]
-        box.base[ANGLE + wheel] = contacts.angle[wheel]
-        box.low[ANGLE + wheel] = contacts.angle_low[wheel]
-        box.high[ANGLE + wheel] = contacts.angle_high[wheel]
-        box.base[PLACE + wheel] = contacts.lateral[wheel]
-        box.low[PLACE + wheel] = contacts.lateral_low[wheel]
-        box.high[PLACE + wheel] = contacts.lateral_high[wheel]
+        box.base[ANGLE + wheel] = contact_bounds.angle[wheel]
+        box.low[ANGLE + wheel] = contact_bounds.angle_low[wheel]
+        box.high[ANGLE + wheel] = contact_bounds.angle_high[wheel]
+        box.base[PLACE + wheel] = contact_bounds.lateral[wheel]
+        box.low[PLACE + wheel] = contact_bounds.lateral_low[wheel]
+        box.high[PLACE + wheel] = contact_bounds.lateral_high[wheel]
 
 
 @kernel
-def _find_grounds(ground, samples, settings, placement, contacts, box):
+def _find_grounds(ground, samples, settings, placement, contact_bounds, box):
     """Write friction and soils of all cells that each wheel of a placed rover may touch."""
     cell = 1.0 / ground.inverse_resolution
     layered = ground.friction != 0 or ground.soil != 0
     for wheel in range(6):
-        left, right, near, far = _find_footprint(samples, placement, wheel, contacts)
+        left, right, near, far = _find_footprint(samples, placement, wheel, contact_bounds)
         box.mu_low[wheel], box.mu_high[wheel] = np.inf, 0.0
         box.soil_count[wheel] = 0
         columns = int((right - left) / cell) + 2 if layered else 1
@@ -134,17 +134,17 @@ def _find_grounds(ground, samples, settings, placement, contacts, box):
 
 
 @kernel
-def _find_footprint(samples, placement, wheel, contacts):
+def _find_footprint(samples, placement, wheel, contact_bounds):
     """Return smallest and largest x and y [m] of the points of a wheel that may touch."""
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     left = near = np.inf
     right = far = -np.inf
     for corner in range(4):
-        angle, across = contacts.angle_low[wheel], contacts.lateral_low[wheel]
+        angle, across = contact_bounds.angle_low[wheel], contact_bounds.lateral_low[wheel]
         if corner > 1:
-            angle = contacts.angle_high[wheel]
+            angle = contact_bounds.angle_high[wheel]
         if corner % 2 == 1:
-            across = contacts.lateral_high[wheel]
+            across = contact_bounds.lateral_high[wheel]
         s, c = samples.radius * np.sin(angle), samples.radius * np.cos(angle)
         x = centres[wheel, 0] + across * R[0, 1] + s * forward[0] - c * up[0]
         y = centres[wheel, 1] + across * R[1, 1] + s * forward[1] - c * up[1]
@@ -186,7 +186,7 @@ def _choose_torques(ground, linkage, settings, pose, spread, box):
 def _evaluate(ground, linkage, settings, pose, spread, box):
     """Write the outputs at the inputs `box.at`; False where the balance is singular."""
     work, q = spread.model, spread.trial
-    placement, touch, search = work.placement, work.touch, work.search
+    placement, contacts, search = work.placement, work.contacts, work.search
     for i in range(6):
         q[i] = spread.q[i]
         for wheel in range(6):
@@ -195,12 +195,12 @@ def _evaluate(ground, linkage, settings, pose, spread, box):
     place_masses(linkage, q, placement)
     for wheel in range(6):
         s, c = np.sin(box.at[ANGLE + wheel]), np.cos(box.at[ANGLE + wheel])
-        touch.sine[wheel], touch.cosine[wheel] = s, c
+        contacts.sine[wheel], contacts.cosine[wheel] = s, c
         for i in range(3):
             radial = linkage.radius * (s * placement.forward[i] - c * placement.up[i])
             aside = box.at[PLACE + wheel] * placement.R[i, 1]
-            touch.point[wheel, i] = placement.centres[wheel, i] + aside + radial
-    if not balance_forces(linkage, placement, touch, box.columns, work.balance):
+            contacts.point[wheel, i] = placement.centres[wheel, i] + aside + radial
+    if not balance_forces(linkage, placement, contacts, box.columns, work.balance):
         return False
     if box.columns == 1:
         take_equal_torques(work.balance, search)
@@ -222,7 +222,7 @@ def _evaluate(ground, linkage, settings, pose, spread, box):
 @kernel
 def _worst_use(ground, linkage, settings, wheel, N, T, S, box):
     """Return the largest utilisation of a wheel on any of the grounds it may touch."""
-    N = max(N, LEAST_LOAD)
+    N = max(N, MIN_LOAD)
     if not settings.on_soil:
         return np.sqrt(T * T + S * S) / (box.mu_low[wheel] * N)
     weight = linkage.mass * linkage.gravity

@@ -6,7 +6,7 @@ import numpy as np
 from numba import prange
 
 from rover_physics.bounds.belly import bound_clearance
-from rover_physics.bounds.contact import CONTACTS, bound_contacts
+from rover_physics.bounds.contact import CONTACT_BOUNDS, bound_contacts
 from rover_physics.bounds.forces import BOX, LOAD, PULL, TIP, USE, bound_forces
 from rover_physics.bounds.pose import (
     BOUNDED,
@@ -21,8 +21,8 @@ from rover_physics.forces.stability import CORNERS
 from rover_physics.forces.torques import EQUAL
 from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.records import new_record, record_type
-from rover_physics.numerics.threads import threads_worth
-from rover_physics.prediction.evaluation import CHUNK, MOST_CHUNKS
+from rover_physics.numerics.threads import limit_threads
+from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS
 from rover_physics.rover.linkage import place
 from rover_physics.terrain.ground import copy_soil
 
@@ -52,7 +52,7 @@ BOUNDS = record_type(
 )
 """Smallest and largest values at one pose; all are as in `PathBounds`."""
 
-BOUNDS_WORK = record_type(("spread", SPREAD), ("contacts", CONTACTS), ("box", BOX))
+BOUNDS_WORK = record_type(("spread", SPREAD), ("contact_bounds", CONTACT_BOUNDS), ("box", BOX))
 """Work space of one thread."""
 
 
@@ -76,12 +76,12 @@ def find_bounds(setup, low, high, error, poses, nominal) -> Any:
         nominal: (n,) NOMINAL, what was predicted on the ground in between.
     """
     bounds = new_bounds(len(poses))
-    works = np.zeros(min(MOST_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
+    works = np.zeros(min(MAX_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
     for name in ("held_height", "held_angle"):
-        works["spread"]["model"]["touch"][name] = np.nan
+        works["spread"]["model"]["contacts"][name] = np.nan
     records = (np.array([record]) for record in setup[1:])
     grounds = (ground.records for ground in (low, high, error))
-    with threads_worth(BOUNDS_EFFORT * len(poses)):
+    with limit_threads(BOUNDS_EFFORT * len(poses)):
         bound_poses(setup.ground.records, *grounds, *records, poses, nominal, works, bounds)
     return bounds
 
@@ -103,7 +103,7 @@ def bound_poses(
 @kernel
 def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nominal, work, result):
     """Bound one pose into `result`; return BOUNDED or what keeps it from being bounded."""
-    spread, contacts, box = work.spread, work.contacts, work.box
+    spread, contact_bounds, box = work.spread, work.contact_bounds, work.box
     if not nominal.settled:
         return NOT_SETTLED
     for k in range(6):
@@ -115,10 +115,10 @@ def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nomin
     place(linkage, pose[0], pose[1], pose[2], spread.q, placement)
     bound_contacts(
         ground, error, samples, placement, nominal.contact_angle, nominal.contact_points,
-        spread.reach, contacts,
+        spread.reach, contact_bounds,
     )  # fmt: skip
     bound_clearance(ground, error, linkage, spread, result.belly_clearance)
-    if not bound_forces(ground, linkage, samples, settings, pose, spread, contacts, box):
+    if not bound_forces(ground, linkage, samples, settings, pose, spread, contact_bounds, box):
         return SINGULAR
     _write_configuration(spread, result)
     _write_tip_over(settings, box, result)

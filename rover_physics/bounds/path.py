@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.bounds.forces import MOST_SOILS
+from rover_physics.bounds.forces import MAX_SOILS
 from rover_physics.bounds.kernel import NOMINAL, find_bounds
 from rover_physics.errors import ModelError
 from rover_physics.prediction.model_setup import set_up
 from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import Floats, PathPrediction
-from rover_physics.prediction.sweep import one_sweep_at_a_time
+from rover_physics.prediction.sweep import sweep_lock
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import Ground, pack_ground
@@ -80,14 +80,14 @@ def bound_path(
     allowed = check_sigmas(sigmas)
     if terrain.elevation_std is None or allowed == 0.0:
         return None
-    if len(terrain.soil_names) >= MOST_SOILS:
+    if len(terrain.soil_names) >= MAX_SOILS:
         raise ModelError(
             f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
-            f"most {MOST_SOILS - 1}"
+            f"most {MAX_SOILS - 1}"
         )
     low, high, error = _spread(terrain, allowed)
     setup = set_up(rover, terrain, **arguments)
-    with one_sweep_at_a_time:
+    with sweep_lock:
         found = find_bounds(setup, low, high, error, prediction.poses, _pack_nominal(prediction))
     values = {name: _include(found[name], prediction, name) for name in BOUNDED_VALUES}
     return PathBounds(sigmas=allowed, status=found.status.copy(), **values)

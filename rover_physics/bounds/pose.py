@@ -13,9 +13,9 @@ Robotics 37(5), 2020.
 
 import numpy as np
 
-from rover_physics.contact.contact_record import FULL, OFF_MAP, QUICK, TOUCHING
+from rover_physics.contact.contact_record import FULL, IN_CONTACT, OFF_MAP, QUICK
 from rover_physics.contact.settling import LEVEL, SLOPED, write_gap_rates
-from rover_physics.contact.wheel import find_touch
+from rover_physics.contact.wheel import find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
@@ -31,7 +31,7 @@ a search may miss the nearest point by so much; bounds are then widened by it.""
 EXTREME_GAP = 3e-4
 """Largest gap, in wheel radii, at which a wheel counts as standing without further doubt."""
 EXTREME_STEPS = 8
-LARGEST_LEFT = 0.2
+MAX_GAP_LEFT = 0.2
 """Gap, in wheel radii, from which on a wheel that finds no place counts as on an edge."""
 JUMP = 0.3
 """Rise or fall, in wheel radii, beyond what the slope makes of it, within reach of a wheel from
@@ -39,7 +39,7 @@ which on it counts as on an edge."""
 LEVELS = (0.8, 0.95, 1.1, 1.3)
 """Rises and falls, in wheel radii, at which a wheel is looked for another place to stand. Where a
 face is higher than the wheel can roll over, there are two: at its foot and on top."""
-LARGEST_TURN = 0.3
+MAX_TURN = 0.3
 """Largest turn of a step [rad]."""
 
 SPREAD = record_type(
@@ -87,23 +87,25 @@ def bound_configuration(ground, low, high, linkage, samples, pose, spread):
 def _find_heights(ground, low, high, linkage, samples, pose, spread):
     """Write the response and the interval of each wheel's height; leave the nominal touch."""
     work = spread.model
-    placement, touch = work.placement, work.touch
+    placement, contacts = work.placement, work.contacts
     place(linkage, pose[0], pose[1], pose[2], spread.q, placement)
     spread.low[:] = 0.0
     spread.high[:] = 0.0
     for wheel in range(6):
         for surface in range(2):
-            outcome = _touch_on(low if surface == 0 else high, samples, placement, wheel, touch)
+            outcome = _find_contact_on(
+                low if surface == 0 else high, samples, placement, wheel, contacts
+            )
             if outcome != BOUNDED:
                 return outcome
             if surface == 0:
-                spread.low[wheel] = -touch.gap[wheel]
+                spread.low[wheel] = -contacts.gap[wheel]
             else:
-                spread.high[wheel] = -touch.gap[wheel]
-        outcome = _touch_on(ground, samples, placement, wheel, touch)
+                spread.high[wheel] = -contacts.gap[wheel]
+        outcome = _find_contact_on(ground, samples, placement, wheel, contacts)
         if outcome != BOUNDED:
             return outcome
-        gap = touch.gap[wheel]
+        gap = contacts.gap[wheel]
         if abs(gap) > NOMINAL_GAP * linkage.radius:
             return ON_EDGE
         spread.low[wheel] = min(spread.low[wheel] + gap, 0.0)
@@ -112,10 +114,10 @@ def _find_heights(ground, low, high, linkage, samples, pose, spread):
         if in_doubt and abs(gap) > EXTREME_GAP * linkage.radius:
             spread.low[wheel] -= abs(gap)
             spread.high[wheel] += abs(gap)
-    write_gap_rates(linkage, placement, touch, LEVEL, spread.rates)
+    write_gap_rates(linkage, placement, contacts, LEVEL, spread.rates)
     if not _invert(spread.rates, work.J, spread.lift):
         return ON_EDGE
-    write_gap_rates(linkage, placement, touch, SLOPED, spread.rates)
+    write_gap_rates(linkage, placement, contacts, SLOPED, spread.rates)
     return BOUNDED if _invert(spread.rates, work.J, spread.response) else ON_EDGE
 
 
@@ -132,10 +134,10 @@ def _invert(matrix, copy, inverse):
 @kernel
 def _may_change_level(low, high, linkage, samples, spread):
     """Tell whether any wheel of the placed rover may climb or fall to another level."""
-    placement, touch = spread.model.placement, spread.model.touch
+    placement, contacts = spread.model.placement, spread.model.contacts
     fx, fy = placement.forward[0], placement.forward[1]
     for wheel in range(6):
-        slope = -touch.normal[wheel, 0] * fx - touch.normal[wheel, 1] * fy
+        slope = -contacts.normal[wheel, 0] * fx - contacts.normal[wheel, 1] * fy
         along, reach = _find_moves(linkage, wheel, spread)
         spread.reach[wheel] = reach
         ahead, arm = _find_arm(linkage, wheel, placement)
@@ -144,7 +146,7 @@ def _may_change_level(low, high, linkage, samples, spread):
             margin = spread.high[wheel] if way == 0 else -spread.low[wheel]
             for side in range(2):
                 shift = reach * (1.0 - 2.0 * side)
-                rise = sign * _rise_at(surface, samples, placement, wheel, shift, touch)
+                rise = sign * _rise_at(surface, samples, placement, wheel, shift, contacts)
                 if rise - sign * slope * shift - margin > JUMP * linkage.radius:
                     return True
                 for level in LEVELS:
@@ -152,7 +154,7 @@ def _may_change_level(low, high, linkage, samples, spread):
                     move = along * sign * needed + shift
                     if ahead * shift <= 0.0:
                         move -= np.copysign(0.5 * needed * needed / arm, ahead)
-                    rise = sign * _rise_at(surface, samples, placement, wheel, move, touch)
+                    rise = sign * _rise_at(surface, samples, placement, wheel, move, contacts)
                     if rise - margin > needed:
                         return True
     return False
@@ -175,14 +177,14 @@ def _find_arm(linkage, wheel, placement):
 
 
 @kernel
-def _rise_at(surface, samples, placement, wheel, move, touch):
+def _rise_at(surface, samples, placement, wheel, move, contacts):
     """Return how much higher than now a wheel is where it is moved forward [m]."""
     x, y = placement.centres[wheel, 0], placement.centres[wheel, 1]
     placement.centres[wheel, 0] += move * placement.forward[0]
     placement.centres[wheel, 1] += move * placement.forward[1]
-    find_touch(surface, samples, placement, wheel, QUICK, touch)
+    find_contact(surface, samples, placement, wheel, QUICK, contacts)
     placement.centres[wheel, 0], placement.centres[wheel, 1] = x, y
-    return -touch.gap[wheel]
+    return -contacts.gap[wheel]
 
 
 @kernel
@@ -223,12 +225,12 @@ def _shift(ax, ay, az, point, pivot, forward):
 
 
 @kernel
-def _touch_on(ground, samples, placement, wheel, touch):
+def _find_contact_on(ground, samples, placement, wheel, contacts):
     """Find the touch of a wheel on one surface."""
-    outcome = find_touch(ground, samples, placement, wheel, QUICK, touch)
-    if outcome != TOUCHING or touch.gap[wheel] != touch.gap[wheel]:
+    outcome = find_contact(ground, samples, placement, wheel, QUICK, contacts)
+    if outcome != IN_CONTACT or contacts.gap[wheel] != contacts.gap[wheel]:
         return OFF_MAP_NEAR if outcome == OFF_MAP else UNKNOWN_NEAR
-    find_touch(ground, samples, placement, wheel, FULL, touch)
+    find_contact(ground, samples, placement, wheel, FULL, contacts)
     return BOUNDED
 
 
@@ -251,7 +253,7 @@ def _settle_extreme(low, high, linkage, samples, pose, angle, sign, spread):
     outcome, worst = _approach(low, high, linkage, samples, pose, spread)
     if outcome != BOUNDED:
         return outcome
-    if worst > LARGEST_LEFT * linkage.radius:
+    if worst > MAX_GAP_LEFT * linkage.radius:
         return ON_EDGE
     _include_trial(linkage, worst > EXTREME_GAP * linkage.radius, spread)
     return BOUNDED
@@ -263,20 +265,20 @@ def _approach(low, high, linkage, samples, pose, spread):
     work, q = spread.model, spread.trial
     worst = 0.0
     for attempt in range(EXTREME_STEPS):
-        outcome, worst = _touch_trial(low, high, linkage, samples, pose, spread)
+        outcome, worst = _find_trial_contacts(low, high, linkage, samples, pose, spread)
         if outcome != BOUNDED or worst <= EXTREME_GAP * linkage.radius:
             return outcome, worst
         if attempt == EXTREME_STEPS - 1:
             break
-        write_gap_rates(linkage, work.placement, work.touch, SLOPED, work.J)
+        write_gap_rates(linkage, work.placement, work.contacts, SLOPED, work.J)
         for wheel in range(6):
-            work.step[wheel, 0] = work.touch.gap[wheel]
+            work.step[wheel, 0] = work.contacts.gap[wheel]
         if not solve_in_place(work.J, work.step, 6, 1):
             return np.int64(ON_EDGE), worst
         turn = 0.0
         for i in range(1, 6):
             turn = max(turn, abs(work.step[i, 0]))
-        share = min(1.0, LARGEST_TURN / turn) if turn > 0.0 else 1.0
+        share = min(1.0, MAX_TURN / turn) if turn > 0.0 else 1.0
         if attempt > 3:
             share *= 0.5
         for i in range(6):
@@ -285,24 +287,24 @@ def _approach(low, high, linkage, samples, pose, spread):
 
 
 @kernel
-def _touch_trial(low, high, linkage, samples, pose, spread):
+def _find_trial_contacts(low, high, linkage, samples, pose, spread):
     """Touch with each wheel of the trial on its surface; return outcome and largest gap [m]."""
     work = spread.model
     place(linkage, pose[0], pose[1], pose[2], spread.trial, work.placement)
     worst = 0.0
     for wheel in range(6):
         surface = high if spread.raised[wheel] == 1 else low
-        outcome = _touch_on(surface, samples, work.placement, wheel, work.touch)
+        outcome = _find_contact_on(surface, samples, work.placement, wheel, work.contacts)
         if outcome != BOUNDED:
             return np.int64(outcome), np.inf
-        worst = max(worst, abs(work.touch.gap[wheel]))
+        worst = max(worst, abs(work.contacts.gap[wheel]))
     return np.int64(BOUNDED), worst
 
 
 @kernel
 def _include_trial(linkage, unsettled, spread):
     """Widen the bounds on q and on the wheels' heights to the trial and what is left of gaps."""
-    q, gap = spread.trial, spread.model.touch.gap
+    q, gap = spread.trial, spread.model.contacts.gap
     for i in range(6):
         left = 0.0
         for wheel in range(6 if unsettled else 0):

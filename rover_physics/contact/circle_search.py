@@ -87,61 +87,61 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
 
 
 @kernel
-def refine_from(ground, samples, placement, wheel, m, s, c, touch):
+def refine_from(ground, samples, placement, wheel, m, s, c, contacts):
     """Search circle m near (s, c), keep what is nearer than before, and return the gap found."""
     gap, s, c, slope_x, slope_y = search_circle(
         ground, samples, placement, wheel, samples.laterals[m], s, c
     )
-    if gap < touch.circle_gap[wheel, m]:
-        touch.circle_gap[wheel, m] = gap
-        touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m] = s, c
-        touch.circle_slope[wheel, m, 0], touch.circle_slope[wheel, m, 1] = slope_x, slope_y
+    if gap < contacts.circle_gap[wheel, m]:
+        contacts.circle_gap[wheel, m] = gap
+        contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m] = s, c
+        contacts.circle_slope[wheel, m, 0], contacts.circle_slope[wheel, m, 1] = slope_x, slope_y
     return gap
 
 
 @kernel
-def refine_circle(ground, samples, placement, wheel, m, touch):
+def refine_circle(ground, samples, placement, wheel, m, contacts):
     """Search circle m anew from where it was nearest."""
-    s, c = touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
-    touch.circle_gap[wheel, m] = np.inf
-    refine_from(ground, samples, placement, wheel, m, s, c, touch)
-    if touch.circle_gap[wheel, m] == np.inf:
-        touch.circle_gap[wheel, m] = np.nan
+    s, c = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
+    contacts.circle_gap[wheel, m] = np.inf
+    refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+    if contacts.circle_gap[wheel, m] == np.inf:
+        contacts.circle_gap[wheel, m] = np.nan
 
 
 @kernel
-def refine_others(ground, samples, placement, wheel, touch):
+def refine_others(ground, samples, placement, wheel, contacts):
     """Look closer at the circles with samples that come near to the smallest gap."""
-    reach = touch.noted_gap[wheel] + CIRCLE_REACH * samples.radius
-    nearest = touch.nearest[wheel]
-    s0, c0 = touch.circle_sine[wheel, nearest], touch.circle_cosine[wheel, nearest]
+    reach = contacts.noted_gap[wheel] + CIRCLE_REACH * samples.radius
+    nearest = contacts.nearest[wheel]
+    s0, c0 = contacts.circle_sine[wheel, nearest], contacts.circle_cosine[wheel, nearest]
     for m in range(samples.circles):
         if m != nearest:
-            touch.circle_gap[wheel, m] = np.inf
-        if touch.first_gap[wheel, m] <= reach:
-            k = touch.first_row[wheel, m]
+            contacts.circle_gap[wheel, m] = np.inf
+        if contacts.first_gap[wheel, m] <= reach:
+            k = contacts.first_row[wheel, m]
             s, c = samples.sines[k], samples.cosines[k]
-            lower = m == nearest and touch.first_gap[wheel, m] < touch.circle_gap[wheel, m]
+            lower = m == nearest and contacts.first_gap[wheel, m] < contacts.circle_gap[wheel, m]
             if abs(s * c0 - c * s0) < samples.spacing_sine and not lower:
                 s, c = s0, c0
             if m != nearest or s != s0:
-                refine_from(ground, samples, placement, wheel, m, s, c, touch)
-        if touch.second_gap[wheel, m] <= reach:
-            k = touch.second_row[wheel, m]
+                refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+        if contacts.second_gap[wheel, m] <= reach:
+            k = contacts.second_row[wheel, m]
             s, c = samples.sines[k], samples.cosines[k]
-            refine_from(ground, samples, placement, wheel, m, s, c, touch)
-        if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
-            touch.nearest[wheel] = m
-    reach = touch.circle_gap[wheel, touch.nearest[wheel]] + BESIDE_REACH * samples.radius
+            refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+        if contacts.circle_gap[wheel, m] < contacts.circle_gap[wheel, contacts.nearest[wheel]]:
+            contacts.nearest[wheel] = m
+    reach = contacts.circle_gap[wheel, contacts.nearest[wheel]] + BESIDE_REACH * samples.radius
     for m in range(samples.circles):
-        if touch.circle_gap[wheel, m] <= reach:
-            _look_beside(ground, samples, placement, wheel, m, touch)
-            if touch.circle_gap[wheel, m] < touch.circle_gap[wheel, touch.nearest[wheel]]:
-                touch.nearest[wheel] = m
+        if contacts.circle_gap[wheel, m] <= reach:
+            _look_beside(ground, samples, placement, wheel, m, contacts)
+            if contacts.circle_gap[wheel, m] < contacts.circle_gap[wheel, contacts.nearest[wheel]]:
+                contacts.nearest[wheel] = m
 
 
 @kernel
-def _look_beside(ground, samples, placement, wheel, m, touch):
+def _look_beside(ground, samples, placement, wheel, m, contacts):
     """Search circle m from between the samples, too, where the ground comes nearer there.
 
     Over a plane the gap grows away from the smallest with the rise of the circle; where it grows
@@ -150,7 +150,8 @@ def _look_beside(ground, samples, placement, wheel, m, touch):
     R, forward, up = placement.R, placement.forward, placement.up
     centres, radius, across = placement.centres, samples.radius, samples.laterals[m]
     gap, s0, c0 = (
-        touch.circle_gap[wheel, m], touch.circle_sine[wheel, m], touch.circle_cosine[wheel, m]
+        contacts.circle_gap[wheel, m], contacts.circle_sine[wheel, m],
+        contacts.circle_cosine[wheel, m],
     )  # fmt: skip
     limit = gap + BESIDE_SHARE * radius * (1.0 - samples.beside_cosine)
     z = centres[wheel, 2] + across * R[2, 1]
@@ -158,9 +159,9 @@ def _look_beside(ground, samples, placement, wheel, m, touch):
         turn = side * samples.beside_sine
         s, c = s0 * samples.beside_cosine + c0 * turn, c0 * samples.beside_cosine - s0 * turn
         lowest = z - radius * c * up[2]
-        if c < 0.0 or lowest - touch.roof[wheel] >= limit:
+        if c < 0.0 or lowest - contacts.block_max[wheel] >= limit:
             continue
         x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
         y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
         if lowest - look_up(ground, x, y)[0] < limit:
-            refine_from(ground, samples, placement, wheel, m, s, c, touch)
+            refine_from(ground, samples, placement, wheel, m, s, c, contacts)

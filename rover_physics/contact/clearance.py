@@ -54,7 +54,7 @@ def belly_clearance(ground, linkage, placement):
     nearest, nearest_i, nearest_j = np.inf, low_i, low_j
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
-            bound = _lowest_above(plane, bi, bj) - _ceiling_of(ground, bi, bj)
+            bound = _lowest_above(plane, bi, bj) - _known_max_of(ground, bi, bj)
             if bound < nearest and _is_below(plane, belly, bi, bj):
                 nearest, nearest_i, nearest_j = bound, bi, bj
     smallest = np.inf
@@ -62,17 +62,17 @@ def belly_clearance(ground, linkage, placement):
         smallest = _clear_block(ground, plane, belly, nearest_i, nearest_j, np.inf)
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
-            if _lowest_above(plane, bi, bj) - _ceiling_of(ground, bi, bj) < smallest and _is_below(
-                plane, belly, bi, bj
-            ):
+            if _lowest_above(plane, bi, bj) - _known_max_of(
+                ground, bi, bj
+            ) < smallest and _is_below(plane, belly, bi, bj):
                 smallest = _clear_block(ground, plane, belly, bi, bj, smallest)
     return smallest if smallest < np.inf else _clear_points(ground, R, origin, belly)
 
 
 @kernel
-def _ceiling_of(ground, bi, bj):
+def _known_max_of(ground, bi, bj):
     """Return the highest known ground [m] of a block, -inf where none is known."""
-    return read_float(ground.ceiling, bi * ground.block_columns + bj)
+    return read_float(ground.known_block_max, bi * ground.block_columns + bj)
 
 
 @kernel

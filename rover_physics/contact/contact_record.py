@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.contact.wheel_samples import MOST_CIRCLES
+from rover_physics.contact.wheel_samples import MAX_CIRCLES
 from rover_physics.numerics.records import new_record, record_type
 
-TOUCHING, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
+IN_CONTACT, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
 COARSE, QUICK, NEAR, FULL, AGAIN, EXACT = np.arange(6)
 """Scopes of `find_touch`. Not plain integers, or each value would be compiled apart."""
 CIRCLE_REACH = 2e-2
@@ -15,7 +15,7 @@ CIRCLE_REACH = 2e-2
 FAR_ROW = -9
 """Row of a sample that there is none of."""
 
-TOUCH = record_type(
+CONTACTS = record_type(
     ("gap", float, (6,)),  # smallest vertical gap, negative inside the ground [m]
     ("sine", float, (6,)),  # sine of the contact angle
     ("cosine", float, (6,)),  # cosine of the contact angle
@@ -24,21 +24,25 @@ TOUCH = record_type(
     ("held_height", float, (6,)),  # height [m] at which a wheel that climbs a face is held, or NaN
     ("held_angle", float, (6,)),  # contact angle with the face of a held wheel [rad]
     ("nearest", np.int64, (6,)),  # index of the circle that touches
-    ("circle_gap", float, (6, MOST_CIRCLES)),  # smallest gap on each circle [m]
-    ("circle_sine", float, (6, MOST_CIRCLES)),  # sine of the angle where it is
-    ("circle_cosine", float, (6, MOST_CIRCLES)),  # cosine of the angle where it is
-    ("circle_slope", float, (6, MOST_CIRCLES, 2)),  # slope of the ground there along x and y
-    ("roof", float, (6,)),  # highest ground below the wheel [m], infinite where some is unknown
+    ("circle_gap", float, (6, MAX_CIRCLES)),  # smallest gap on each circle [m]
+    ("circle_sine", float, (6, MAX_CIRCLES)),  # sine of the angle where it is
+    ("circle_cosine", float, (6, MAX_CIRCLES)),  # cosine of the angle where it is
+    ("circle_slope", float, (6, MAX_CIRCLES, 2)),  # slope of the ground there along x and y
+    (
+        "block_max",
+        float,
+        (6,),
+    ),  # highest ground below the wheel [m], infinite where some is unknown
     ("noted_gap", float, (6,)),  # smallest sampled gap of the last scan [m]
     ("noted_circle", np.int64, (6,)),  # the circle of that
-    ("first_gap", float, (6, MOST_CIRCLES)),  # smallest sampled gap of each circle then [m]
-    ("first_row", np.int64, (6, MOST_CIRCLES)),  # the row of that
-    ("second_gap", float, (6, MOST_CIRCLES)),  # smallest sampled gap away from that [m]
-    ("second_row", np.int64, (6, MOST_CIRCLES)),  # the row of that
+    ("first_gap", float, (6, MAX_CIRCLES)),  # smallest sampled gap of each circle then [m]
+    ("first_row", np.int64, (6, MAX_CIRCLES)),  # the row of that
+    ("second_gap", float, (6, MAX_CIRCLES)),  # smallest sampled gap away from that [m]
+    ("second_row", np.int64, (6, MAX_CIRCLES)),  # the row of that
 )
 """Where the six wheels touch; written by `find_touch` and `find_contact`."""
 
 
-def new_touch() -> Any:
+def new_contacts() -> Any:
     """Return an empty TOUCH, no wheel held."""
-    return new_record(TOUCH, held_height=np.nan, held_angle=np.nan)
+    return new_record(CONTACTS, held_height=np.nan, held_angle=np.nan)

@@ -9,14 +9,14 @@ from rover_physics.contact.contact_record import (
     EXACT,
     FAR_ROW,
     FULL,
+    IN_CONTACT,
     OFF_MAP,
-    TOUCHING,
     UNKNOWN_GROUND,
 )
 from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import (
     elevation_of,
-    find_roof,
+    find_block_max,
     height_at_cell,
     height_inside,
     is_cell_on_map,
@@ -28,32 +28,34 @@ a face much can lie between two samples."""
 
 
 @kernel
-def scan_rim(ground, samples, placement, wheel, scope, touch):
+def scan_rim(ground, samples, placement, wheel, scope, contacts):
     """Sample the rim; write the nearest samples into `touch` and return the worst status."""
     start = samples.rows // 2
     if scope == FULL:
-        start = touch.first_row[wheel, touch.noted_circle[wheel]]
+        start = contacts.first_row[wheel, contacts.noted_circle[wheel]]
     for m in range(samples.circles):
-        touch.first_row[wheel, m] = touch.second_row[wheel, m] = FAR_ROW
-        touch.first_gap[wheel, m] = touch.second_gap[wheel, m] = np.inf
-    touch.roof[wheel] = np.inf
+        contacts.first_row[wheel, m] = contacts.second_row[wheel, m] = FAR_ROW
+        contacts.first_gap[wheel, m] = contacts.second_gap[wheel, m] = np.inf
+    contacts.block_max[wheel] = np.inf
     if scope == COARSE:
         middle = samples.circles // 2
-        return _scan_carefully(ground, samples, placement, wheel, False, middle, middle, 2, touch)
+        return _scan_carefully(
+            ground, samples, placement, wheel, False, middle, middle, 2, contacts
+        )
     if scope != EXACT:
-        rear = _find_roof_of_half(ground, samples, placement, wheel, -0.5)
-        front = _find_roof_of_half(ground, samples, placement, wheel, 0.5)
+        rear = _find_max_below_half(ground, samples, placement, wheel, -0.5)
+        front = _find_max_below_half(ground, samples, placement, wheel, 0.5)
         if rear < np.inf and front < np.inf:
-            touch.roof[wheel] = max(rear, front)
+            contacts.block_max[wheel] = max(rear, front)
             reach = CIRCLE_REACH * samples.radius if scope == FULL else 0.0
-            _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, touch)
-            return TOUCHING
+            _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, contacts)
+            return IN_CONTACT
     last = samples.circles - 1
-    return _scan_carefully(ground, samples, placement, wheel, scope == EXACT, 0, last, 1, touch)
+    return _scan_carefully(ground, samples, placement, wheel, scope == EXACT, 0, last, 1, contacts)
 
 
 @kernel
-def _find_roof_of_half(ground, samples, placement, wheel, half):
+def _find_max_below_half(ground, samples, placement, wheel, half):
     """Return the highest ground [m] below the rear (half -0.5) or front (0.5) half of a rim.
 
     Infinite where any ground there is unknown.
@@ -66,20 +68,20 @@ def _find_roof_of_half(ground, samples, placement, wheel, half):
     gx = centres[wheel, 0] - ground.x0 + samples.radius * (half * forward[0] - 0.5 * up[0])
     gy = centres[wheel, 1] - ground.y0 + samples.radius * (half * forward[1] - 0.5 * up[1])
     ahead_x, ahead_y = abs(forward[0]), abs(forward[1])
-    return find_roof(
+    return find_block_max(
         ground, gx * scale, gy * scale,
         (along * ahead_x + aside * ahead_y) * scale, (along * ahead_y + aside * ahead_x) * scale,
     )  # fmt: skip
 
 
 @kernel
-def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, touch):
+def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, contacts):
     """Sample a rim over known ground, none of it higher than `rear` and `front` [m].
 
     Rows of samples at one angle are visited: `start`, where the wheel was nearest before, then
-    from the lowest one to the rear and to the front, until even the roof is farther below than the
-    nearest sample by `reach` [m]. What the loop reads is in local variables: the compiler must
-    take it that anything written may lie anywhere.
+    from the lowest one to the rear and to the front, until even the highest ground
+    is farther below than the nearest sample, by `reach` [m]. What the loop reads is in local
+    variables: the compiler must take it that anything written may lie anywhere.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     scale, radius, circles = ground.inverse_resolution, samples.radius, samples.circles
@@ -93,15 +95,15 @@ def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, t
     lowest = centres[wheel, 2] - abs(samples.half_width * R[2, 1])
     best, best_m = np.inf, 0
     middle = samples.rows // 2
-    k, end, turn, roof = start, start + 1, 1, max(rear, front)
+    k, end, turn, block_max = start, start + 1, 1, max(rear, front)
     for stretch in range(3):
         if stretch == 1:
-            k, end, turn, roof = middle, -1, -1, rear
+            k, end, turn, block_max = middle, -1, -1, rear
         elif stretch == 2:
-            k, end, turn, roof = middle + 1, samples.rows, 1, front
+            k, end, turn, block_max = middle + 1, samples.rows, 1, front
         while k != end:
             s, c = samples.sines[k], samples.cosines[k]
-            if lowest - c * down_z - roof > best + reach:
+            if lowest - c * down_z - block_max > best + reach:
                 break
             if stretch > 0 and k == start:
                 k += turn
@@ -115,36 +117,36 @@ def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, t
                 gy += step_y
                 gz += step_z
                 if gap < best + reach:
-                    _note_sample(wheel, m, k, 1, gap, touch)
+                    _note_sample(wheel, m, k, 1, gap, contacts)
                     if gap < best:
                         best, best_m = gap, m
             k += turn
-    touch.noted_gap[wheel], touch.noted_circle[wheel] = best, best_m
+    contacts.noted_gap[wheel], contacts.noted_circle[wheel] = best, best_m
 
 
 @kernel
-def _note_sample(wheel, m, k, stride, gap, touch):
+def _note_sample(wheel, m, k, stride, gap, contacts):
     """Note a near sample of row k on circle m: the nearest, or the nearest away from that."""
-    if gap < touch.first_gap[wheel, m]:
-        if abs(k - touch.first_row[wheel, m]) > stride:
-            touch.second_gap[wheel, m] = touch.first_gap[wheel, m]
-            touch.second_row[wheel, m] = touch.first_row[wheel, m]
-        touch.first_gap[wheel, m], touch.first_row[wheel, m] = gap, k
-    elif gap < touch.second_gap[wheel, m] and abs(k - touch.first_row[wheel, m]) > stride:
-        touch.second_gap[wheel, m], touch.second_row[wheel, m] = gap, k
+    if gap < contacts.first_gap[wheel, m]:
+        if abs(k - contacts.first_row[wheel, m]) > stride:
+            contacts.second_gap[wheel, m] = contacts.first_gap[wheel, m]
+            contacts.second_row[wheel, m] = contacts.first_row[wheel, m]
+        contacts.first_gap[wheel, m], contacts.first_row[wheel, m] = gap, k
+    elif gap < contacts.second_gap[wheel, m] and abs(k - contacts.first_row[wheel, m]) > stride:
+        contacts.second_gap[wheel, m], contacts.second_row[wheel, m] = gap, k
 
 
 @kernel
-def _scan_carefully(ground, samples, placement, wheel, exact, first, last, stride, touch):
+def _scan_carefully(ground, samples, placement, wheel, exact, first, last, stride, contacts):
     """Sample a rim that may be over unknown ground, beyond the map or beside a face.
 
     Where `exact`, each sample that may be near is refined at once. Returns the worst status.
     """
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
-    status, best, best_m = TOUCHING, np.inf, first
+    status, best, best_m = IN_CONTACT, np.inf, first
     if exact:
-        touch.circle_gap[wheel, :] = np.inf
+        contacts.circle_gap[wheel, :] = np.inf
     middle = samples.rows // 2
     for visit in range((samples.rows - 1) // stride + 1):
         k = middle + stride * ((visit + 1) // 2) * (1 - 2 * (visit % 2))
@@ -160,20 +162,20 @@ def _scan_carefully(ground, samples, placement, wheel, exact, first, last, strid
             gap = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
             gap -= height_at_cell(ground, gx, gy)
             if gap != gap:
-                if status == TOUCHING:
+                if status == IN_CONTACT:
                     status = UNKNOWN_GROUND
                 continue
-            _note_sample(wheel, m, k, stride, gap, touch)
+            _note_sample(wheel, m, k, stride, gap, contacts)
             if exact and gap < best + EXACT_REACH * radius and _may_come_near(
                 ground, samples, forward, up, gx, gy,
                 centres[wheel, 2] + across * R[2, 1], s, c, best,
             ):  # fmt: skip
-                gap = refine_from(ground, samples, placement, wheel, m, s, c, touch)
+                gap = refine_from(ground, samples, placement, wheel, m, s, c, contacts)
             if gap < best:
                 best, best_m = gap, m
-    touch.noted_gap[wheel], touch.noted_circle[wheel] = best, best_m
+    contacts.noted_gap[wheel], contacts.noted_circle[wheel] = best, best_m
     if exact:
-        touch.nearest[wheel] = best_m
+        contacts.nearest[wheel] = best_m
     return status
 
 

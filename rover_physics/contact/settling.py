@@ -7,8 +7,16 @@ small angles.
 
 import numpy as np
 
-from rover_physics.contact.contact_record import AGAIN, COARSE, EXACT, FULL, NEAR, QUICK, TOUCHING
-from rover_physics.contact.wheel import find_contact, find_touch
+from rover_physics.contact.contact_record import (
+    AGAIN,
+    COARSE,
+    EXACT,
+    FULL,
+    IN_CONTACT,
+    NEAR,
+    QUICK,
+)
+from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.rover.linkage import place, rocker_sign
@@ -35,7 +43,7 @@ TURNED_OVER = 1.45
 
 
 @kernel
-def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def settle(ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step):
     """Settle the rover with its body origin at (x, y) [m] heading `yaw` [rad]; q (6,) is written.
 
     Starts from the suspension at rest, so the answer depends on nothing but the pose. J (6, 6) and
@@ -43,64 +51,64 @@ def settle(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
     """
     q[:] = 0.0
     place(linkage, x, y, yaw, q, placement)
-    status, worst = _touch_all(ground, samples, placement, COARSE, touch)
+    status, worst = _find_contacts(ground, samples, placement, COARSE, contacts)
     if np.isnan(worst):
         return status
-    _descend(linkage, placement, touch, q, 1.0, J, step)
-    return settle_from(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step)
+    _descend(linkage, placement, contacts, q, 1.0, J, step)
+    return settle_from(ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step)
 
 
 @kernel
-def settle_from(ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def settle_from(ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step):
     """Settle the rover as `settle` does, but from the q that is given, such as a neighbour's.
 
     Faster than from rest, but over edges it depends on q which of several poses is found.
     """
     place(linkage, x, y, yaw, q, placement)
-    status, worst = _touch_all(ground, samples, placement, QUICK, touch)
-    if status != TOUCHING:
+    status, worst = _find_contacts(ground, samples, placement, QUICK, contacts)
+    if status != IN_CONTACT:
         return status
     worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
         scope = AGAIN if worst <= NOTES_HOLD * linkage.radius else FULL
-        _newton(ground, linkage, samples, x, y, yaw, q, placement, NEAR, touch, J, step)
-        status, worst = _touch_all(ground, samples, placement, scope, touch)
+        _newton(ground, linkage, samples, x, y, yaw, q, placement, NEAR, contacts, J, step)
+        status, worst = _find_contacts(ground, samples, placement, scope, contacts)
         if worst <= GAP_TOLERANCE or np.isnan(worst):
             break
     for attempt in range(RECOVERIES):
-        if worst <= GAP_TOLERANCE or np.isnan(worst) or status != TOUCHING:
+        if worst <= GAP_TOLERANCE or np.isnan(worst) or status != IN_CONTACT:
             break
-        _touch_all(ground, samples, placement, EXACT, touch)
+        _find_contacts(ground, samples, placement, EXACT, contacts)
         if attempt > 0:
             relaxed = RELAXED * linkage.radius * RELAXED_FURTHER ** (attempt - 1)
             scope = EXACT if attempt == RECOVERIES - 1 else QUICK
             _relax(
                 relaxed, scope, ground, linkage, samples, x, y, yaw,
-                q, placement, touch, J, step,
+                q, placement, contacts, J, step,
             )  # fmt: skip
-        _newton(ground, linkage, samples, x, y, yaw, q, placement, EXACT, touch, J, step)
-        status, worst = _touch_all(ground, samples, placement, EXACT, touch)
+        _newton(ground, linkage, samples, x, y, yaw, q, placement, EXACT, contacts, J, step)
+        status, worst = _find_contacts(ground, samples, placement, EXACT, contacts)
         if _has_turned_over(q):
             return NOT_SETTLED
-    if status != TOUCHING:
+    if status != IN_CONTACT:
         return status
     if not worst <= GAP_TOLERANCE or _has_turned_over(q):
         return NOT_SETTLED
     for wheel in range(6):
-        find_contact(samples, placement, wheel, touch)
+        blend_contact(samples, placement, wheel, contacts)
     return SETTLED
 
 
 @kernel
-def _touch_all(ground, samples, placement, scope, touch):
+def _find_contacts(ground, samples, placement, scope, contacts):
     """Return the status of the worst wheel and the largest absolute gap [m]."""
     worst = 0.0
-    status = TOUCHING
+    status = IN_CONTACT
     for wheel in range(6):
-        of_wheel = find_touch(ground, samples, placement, wheel, scope, touch)
-        if of_wheel == OFF_MAP or status == TOUCHING:
+        of_wheel = find_contact(ground, samples, placement, wheel, scope, contacts)
+        if of_wheel == OFF_MAP or status == IN_CONTACT:
             status = of_wheel
-        gap = abs(touch.gap[wheel])
+        gap = abs(contacts.gap[wheel])
         if gap > worst or gap != gap:
             worst = gap
         if worst != worst:
@@ -109,15 +117,15 @@ def _touch_all(ground, samples, placement, scope, touch):
 
 
 @kernel
-def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, step):
+def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, contacts, J, step):
     """Newton's method on the gaps with a halving line search; returns the largest left."""
     worst = 0.0
     for wheel in range(6):
-        worst = max(worst, abs(touch.gap[wheel]))
+        worst = max(worst, abs(contacts.gap[wheel]))
     for _ in range(NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE or np.isnan(worst):
             return worst
-        if not _find_step(linkage, placement, touch, SLOPED, J, step):
+        if not _find_step(linkage, placement, contacts, SLOPED, J, step):
             return worst
         fraction = _limit_step(step)
         improved = np.inf
@@ -127,7 +135,7 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
                 q[i] -= (fraction - taken) * step[i, 0]
             taken = fraction
             place(linkage, x, y, yaw, q, placement)
-            status, improved = _touch_all(ground, samples, placement, scope, touch)
+            status, improved = _find_contacts(ground, samples, placement, scope, contacts)
             if improved < (1.0 - 0.1 * fraction) * worst:
                 break
             fraction *= 0.5
@@ -138,19 +146,19 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, touch, J, 
 
 
 @kernel
-def _relax(relaxed, scope, ground, linkage, samples, x, y, yaw, q, placement, touch, J, step):
+def _relax(relaxed, scope, ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step):
     """Let the wheels fall or rise by part of their gaps until none is above `relaxed` [m].
 
     Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
     its top, as it would on the ground.
     """
     for _ in range(RELAXATION_STEPS):
-        _descend(linkage, placement, touch, q, RELAXATION, J, step)
+        _descend(linkage, placement, contacts, q, RELAXATION, J, step)
         place(linkage, x, y, yaw, q, placement)
-        status, worst = _touch_all(ground, samples, placement, scope, touch)
+        status, worst = _find_contacts(ground, samples, placement, scope, contacts)
         if not worst > relaxed or _has_turned_over(q):
             break
-    _touch_all(ground, samples, placement, EXACT, touch)
+    _find_contacts(ground, samples, placement, EXACT, contacts)
 
 
 @kernel
@@ -159,9 +167,9 @@ def _has_turned_over(q):
 
 
 @kernel
-def _descend(linkage, placement, touch, q, fraction, J, step):
+def _descend(linkage, placement, contacts, q, fraction, J, step):
     """Take a fraction of the step that closes the gaps if the ground is level under each wheel."""
-    if _find_step(linkage, placement, touch, LEVEL, J, step):
+    if _find_step(linkage, placement, contacts, LEVEL, J, step):
         fraction *= _limit_step(step)
         for i in range(6):
             q[i] -= fraction * step[i, 0]
@@ -177,21 +185,21 @@ def _limit_step(step):
 
 
 @kernel
-def _find_step(linkage, placement, touch, ground_is, J, step):
+def _find_step(linkage, placement, contacts, ground_is, J, step):
     """Solve J step = gaps; the ground counts as SLOPED as it is, or as LEVEL under each wheel."""
-    write_gap_rates(linkage, placement, touch, ground_is, J)
+    write_gap_rates(linkage, placement, contacts, ground_is, J)
     for i in range(6):
-        step[i, 0] = touch.gap[i]
+        step[i, 0] = contacts.gap[i]
     return solve_in_place(J, step, 6, 1)
 
 
 @kernel
-def write_gap_rates(linkage, placement, touch, ground_is, J):
+def write_gap_rates(linkage, placement, contacts, ground_is, J):
     """Write the derivatives of the gaps by q into J (6, 6); the ground is as in `_find_step`."""
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
     rocker_pivots, bogie_pivots = placement.rocker_pivots, placement.bogie_pivots
-    point, normal = touch.point, touch.normal
+    point, normal = contacts.point, contacts.normal
     length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
     cos_yaw, sin_yaw = R[0, 0] / length, R[1, 0] / length
     nx, ny = 0.0, 0.0

@@ -7,21 +7,21 @@ import numpy as np
 from rover_physics.numerics.records import new_record, record_type
 from rover_physics.rover.model import Rover
 
-MOST_ANGLES, MOST_CIRCLES = 49, 9
+MAX_ANGLES, MAX_CIRCLES = 49, 9
 WHEEL_SAMPLES = record_type(
     ("radius", float),  # wheel radius [m]
     ("reach", float),  # farthest a sample can be from the wheel's centre in the plane [m]
     ("rows", np.int64),  # number k of contact angles
     ("circles", np.int64),  # number m of circles
-    ("sines", float, (MOST_ANGLES,)),  # (k,) sines of the contact angles, ascending
-    ("cosines", float, (MOST_ANGLES,)),  # (k,) their cosines
+    ("sines", float, (MAX_ANGLES,)),  # (k,) sines of the contact angles, ascending
+    ("cosines", float, (MAX_ANGLES,)),  # (k,) their cosines
     ("spacing_sine", float),  # sine of the angle between neighbouring samples
     ("spacing_cosine", float),  # cosine of the angle between neighbouring samples
     ("beside_sine", float),  # sine of half that angle
     ("beside_cosine", float),  # cosine of half that angle
     ("half_width", float),  # distance of the outer circles from the middle plane [m]
     ("lateral_spacing", float),  # distance between neighbouring circles [m]
-    ("laterals", float, (MOST_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
+    ("laterals", float, (MAX_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
 )
 """Where the cylinder of a wheel is sampled: at k angles of m circles."""
 

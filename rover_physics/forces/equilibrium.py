@@ -42,13 +42,13 @@ wheel FREE_LATERAL[k] is pushed one unit more along its axis and the lateral sha
 
 
 @kernel
-def balance_forces(linkage, placement, touch, columns, balance):
+def balance_forces(linkage, placement, contacts, columns, balance):
     """Solve the balance of a settled rover into `balance`; False where the equations are singular.
 
     `columns` is 1 for the common pull alone, 6 with the changes by torques, 10 with all.
     """
-    _write_frames(placement, touch, balance.frames)
-    _write_equations(linkage, placement, touch, columns, balance)
+    _write_frames(placement, contacts, balance.frames)
+    _write_equations(linkage, placement, contacts, columns, balance)
     B = balance.B
     if not solve_in_place(balance.A, B, UNKNOWNS, columns):
         return False
@@ -75,10 +75,10 @@ def _axle(linkage, placement, wheel):
 
 
 @kernel
-def _write_frames(placement, touch, frames):
+def _write_frames(placement, contacts, frames):
     R, forward, up = placement.R, placement.forward, placement.up
     for wheel in range(6):
-        s, c = touch.sine[wheel], touch.cosine[wheel]
+        s, c = contacts.sine[wheel], contacts.cosine[wheel]
         for i in range(3):
             frames[wheel, 0, i] = c * up[i] - s * forward[i]
             frames[wheel, 1, i] = s * up[i] + c * forward[i]
@@ -86,13 +86,13 @@ def _write_frames(placement, touch, frames):
 
 
 @kernel
-def _write_equations(linkage, placement, touch, columns, balance):
+def _write_equations(linkage, placement, contacts, columns, balance):
     """Write the nine equations: forces, moments about the origin, bogies, differential."""
     A, B, frames = balance.A, balance.B, balance.frames
     A[:, :] = 0.0
     B[:, :] = 0.0
     origin, length = placement.origin, linkage.length
-    R, point = placement.R, touch.point
+    R, point = placement.R, contacts.point
     bogie_pivots, rocker_pivots = placement.bogie_pivots, placement.rocker_pivots
     for wheel in range(6):
         side = wheel // 3

@@ -19,7 +19,7 @@ MODEL, FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(
 """Columns of a packed soil."""
 COULOMB, BEKKER_WONG = 0.0, 1.0
 """Values of the column MODEL."""
-LEAST_FRICTION = 1e-3
+MIN_FRICTION = 1e-3
 """Effective friction of a wheel that cannot even pull itself, so that one may divide by it."""
 MODERATE_SINKAGE = 1.0 / 6.0
 """Largest sinkage, in wheel diameters, at which Wong takes the sinkage formula to hold."""
@@ -116,7 +116,7 @@ def solve_wheel(soil, mu, radius, width, N, T, S):
 
 @kernel
 def effective_friction(soil, mu, radius, width, N):
-    """Return the largest drawbar pull over the load N [N], at least LEAST_FRICTION.
+    """Return the largest drawbar pull over the load N [N], at least MIN_FRICTION.
 
     All forces with sqrt(T^2 + S^2) up to this coefficient times N are within the soil's strength.
     For Bekker-Wong it depends on the load.
@@ -124,12 +124,12 @@ def effective_friction(soil, mu, radius, width, N):
     if soil[MODEL] == COULOMB:
         return _own_friction(soil, mu)
     if not N > 0.0:
-        return LEAST_FRICTION
+        return MIN_FRICTION
     sinkage = find_sinkage(soil, radius, width, N)
     length = contact_length(radius, sinkage)
     strength = shear_strength(soil, width * length, N)
     thrust = _largest_thrust(soil, radius, sinkage, length, strength)
-    return max((thrust - motion_resistance(soil, width, sinkage)) / N, LEAST_FRICTION)
+    return max((thrust - motion_resistance(soil, width, sinkage)) / N, MIN_FRICTION)
 
 
 @kernel

@@ -19,7 +19,7 @@ def share_forces_on_soil(ground, linkage, settings, work):
     search, best = work.search, work.best
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
-        x, y = work.touch.point[wheel, 0], work.touch.point[wheel, 1]
+        x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         copy_soil(ground, soil_row_at(ground, x, y), work.soils[wheel])
     take_equal_torques(work.balance, search)
     if settings.policy == EQUAL:

@@ -18,16 +18,16 @@ CORNERS = 4
 
 
 @kernel
-def find_support(linkage, placement, touch, corners):
+def find_support(linkage, placement, contacts, corners):
     """Write the support polygon into corners (4, 3) [m]: counter-clockwise from the rear right."""
     for side in range(2):
         first = 3 * side
-        _write_side(linkage, placement, touch, side, first, corners)
+        _write_side(linkage, placement, contacts, side, first, corners)
 
 
 @kernel
-def _write_side(linkage, placement, touch, side, first, corners):
-    point, pivot = touch.point, placement.bogie_pivots
+def _write_side(linkage, placement, contacts, side, first, corners):
+    point, pivot = contacts.point, placement.bogie_pivots
     rocker_is_rear = not linkage.on_bogie[first]
     on_rocker = first if rocker_is_rear else first + 2
     behind = first + 1 if rocker_is_rear else first

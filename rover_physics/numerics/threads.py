@@ -10,7 +10,7 @@ ALONE = 2000
 
 
 @contextmanager
-def threads_worth(poses: int) -> Iterator[int]:
+def limit_threads(poses: int) -> Iterator[int]:
     """Let kernels use as many threads as they may, or one if there are few `poses`; yield it."""
     allowed = numba.get_num_threads()
     used = allowed if poses > ALONE else 1

@@ -2,7 +2,7 @@
 
 Where the contact of a wheel jumps from one waypoint to the next, the poses in between decide
 whether the rover gets there. The path is halved around each jump until the jump is resolved or
-shorter than SHORTEST. What is left is a jump in height at one place: upwards the wheel is
+shorter than MIN_SPACING. What is left is a jump in height at one place: upwards the wheel is
 evaluated while it climbs the face, held at heights from foot to edge with the face as its
 contact; downwards it drops.
 """
@@ -22,7 +22,7 @@ HEIGHT_JUMP = 0.25
 """Change of a wheel's height, in wheel radii, that is looked into."""
 PIECES = 4
 """Pieces into which a stretch with a jump is divided, again and again."""
-SHORTEST = 1e-4
+MIN_SPACING = 1e-4
 """Distance between poses [m] below which a jump counts as one place."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Shares of the height of a face at which a climbing wheel is evaluated; at its foot only where
@@ -141,7 +141,7 @@ def _sort_pieces(
     """
     pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
     n_open, n_closed = sort_pieces(
-        ends, PIECES, known.results, known.poses, HEIGHT_JUMP * radius, SHORTEST, *pieces
+        ends, PIECES, known.results, known.poses, HEIGHT_JUMP * radius, MIN_SPACING, *pieces
     )
     return pieces[0, :n_open], pieces[1, :n_closed]
 

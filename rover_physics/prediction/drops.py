@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
-from rover_physics.prediction.crossing import HEIGHT_JUMP, SHORTEST, Crossings
+from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossings
 
-LEAST_ANGLE = np.radians(15.0)
+MIN_ANGLE = np.radians(15.0)
 """A wheel falls only from contacts at least this steep, however slippery they are."""
-MOST_FALLING = 2
+MAX_FALLING = 2
 """One axle at a time may fall; more is a rover sliding down a slope."""
 ON_THE_EDGE = np.radians(-2.0)
 """Contact angle from which on a wheel turns over an edge."""
 ROUNDING = 1e-9
 """Descents [m] that are none."""
-LONGEST_FALL = 2.5
+MAX_FALL_LENGTH = 2.5
 """Way of the rover, in wheel radii, from before the edge to after the landing."""
 
 
@@ -72,7 +72,7 @@ def _find_falls(radius, direction, poses, results, place, waypoint, poses_betwee
         result = results[i] if i < n else between[i - n]
         steps[k] = np.hypot(here[0] - last[0], here[1] - last[1])
         distance[k] = steps[k] + (distance[k - 1] if k > 0 else 0.0)
-        if _read_contacts(result, direction, angle[k], height[k]) < -LEAST_ANGLE:
+        if _read_contacts(result, direction, angle[k], height[k]) < -MIN_ANGLE:
             _find_steep(angle[k], result.friction, steep[k])
         last = here
     _keep_short_runs(distance, radius, steep)
@@ -128,12 +128,12 @@ def _find_steep(angle, friction, steep):
         mu = friction[wheel]
         held = np.arctan(mu) if mu == mu else np.arctan(1.0)
         least_held = min(least_held, held)
-        steep[wheel] = angle[wheel] < -max(held, LEAST_ANGLE)
+        steep[wheel] = angle[wheel] < -max(held, MIN_ANGLE)
         if steep[wheel]:
             count += 1
         elif angle[wheel] == angle[wheel]:
             others += angle[wheel]
-    if count > MOST_FALLING or others / max(6 - count, 1) < -0.5 * least_held:
+    if count > MAX_FALLING or others / max(6 - count, 1) < -0.5 * least_held:
         steep[:] = False
 
 
@@ -148,7 +148,7 @@ def _keep_short_runs(distance, radius, steep):
             while end < rows and steep[end, wheel]:
                 end += 1
             inside = start > 0 and end < rows
-            if not inside or distance[end] - distance[start - 1] > LONGEST_FALL * radius:
+            if not inside or distance[end] - distance[start - 1] > MAX_FALL_LENGTH * radius:
                 steep[start:end, wheel] = False
             start = end + 1
 
@@ -177,6 +177,6 @@ def _measure_drops(radius, height, steps, falling, fallen):
             descent = height[k - 1, wheel] - height[k, wheel]
             if not descent >= ROUNDING:
                 descent = 0.0
-            sudden = descent > HEIGHT_JUMP * radius and steps[k] <= 2.0 * SHORTEST
+            sudden = descent > HEIGHT_JUMP * radius and steps[k] <= 2.0 * MIN_SPACING
             if falling[k - 1, wheel] or falling[k, wheel] or sudden:
                 fallen[k, wheel] = fallen[k - 1, wheel] + descent

@@ -6,7 +6,7 @@ import numpy as np
 from numba import prange
 
 from rover_physics.contact.clearance import belly_clearance
-from rover_physics.contact.contact_record import TOUCH
+from rover_physics.contact.contact_record import CONTACTS
 from rover_physics.contact.settling import SETTLED, settle
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
 from rover_physics.forces.soil import coulomb_slip, effective_friction, solve_wheel
@@ -20,12 +20,12 @@ from rover_physics.forces.torques import (
 )
 from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.records import new_record, record_type, shared_array_of
-from rover_physics.numerics.threads import threads_worth
+from rover_physics.numerics.threads import limit_threads
 from rover_physics.rover.linkage import PLACEMENT, place_masses
 from rover_physics.terrain.ground import SOIL_NUMBERS, friction_at
 
 NO_EQUILIBRIUM = 4
-CHUNK, MOST_CHUNKS = 16, 64
+CHUNK, MAX_CHUNKS = 16, 64
 """Poses that share one work space at least, and most such chunks: enough to keep cores busy."""
 OPTIMAL_EFFORT = 5
 """Time of a pose under optimal torques, in that of one under equal ones."""
@@ -72,7 +72,7 @@ RESULT = record_type(
 
 WORK = record_type(
     ("placement", PLACEMENT),
-    ("touch", TOUCH),
+    ("contacts", CONTACTS),
     ("balance", BALANCE),
     ("search", TORQUE_SEARCH),
     ("J", float, (6, 6)),
@@ -98,7 +98,7 @@ def new_results(n: int) -> Any:
 def new_work() -> Any:
     """Return empty work space, no wheel held."""
     work = new_record(WORK)
-    work.touch.held_height = work.touch.held_angle = np.nan
+    work.contacts.held_height = work.contacts.held_angle = np.nan
     return work
 
 
@@ -114,7 +114,7 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
     """
     results = new_results(len(poses))
     records = [shared_array_of(record) for record in (linkage, samples, settings)]
-    with threads_worth(effort(settings, len(poses))) as threads:
+    with limit_threads(effort(settings, len(poses))) as threads:
         works = new_works(threads, len(poses))
         evaluate_poses(ground.records, *records, poses, held, works, results)
     return results
@@ -122,7 +122,7 @@ def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
 
 def new_works(threads: int, poses: int) -> Any:
     """Return empty work spaces for a sweep, one for each chunk of poses."""
-    chunks = 1 if threads == 1 else min(MOST_CHUNKS, -(-poses // CHUNK))
+    chunks = 1 if threads == 1 else min(MAX_CHUNKS, -(-poses // CHUNK))
     return _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
 
 
@@ -149,24 +149,24 @@ def evaluate_poses(grounds, linkages, samplings, settings, poses, held, works, r
 @kernel
 def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, result):
     """Evaluate the model at pose i into `result`; where it does not settle only the status."""
-    q, placement, touch = result.q, work.placement, work.touch
+    q, placement, contacts = result.q, work.placement, work.contacts
     for wheel in range(6 if held.shape[0] > 0 else 0):
-        touch.held_height[wheel] = held[i, wheel, 0]
-        touch.held_angle[wheel] = held[i, wheel, 1]
+        contacts.held_height[wheel] = held[i, wheel, 0]
+        contacts.held_angle[wheel] = held[i, wheel, 1]
     status = settle(
         ground, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
-        q, placement, touch, work.J, work.step,
+        q, placement, contacts, work.J, work.step,
     )  # fmt: skip
     if status == SETTLED:
         place_masses(linkage, q, placement)
         columns_needed = 1 if settings.policy == EQUAL else 1 + FREE_FORCES
-        if not balance_forces(linkage, placement, touch, columns_needed, work.balance):
+        if not balance_forces(linkage, placement, contacts, columns_needed, work.balance):
             status = NO_EQUILIBRIUM
     result.status = status
     if status != SETTLED:
         q[:] = np.nan
         return
-    _write_geometry(placement, touch, result)
+    _write_geometry(placement, contacts, result)
     _write_forces(ground, linkage, settings, work, result)
     angle, measure = find_tip_over(linkage, work)
     result.tip_over_ratio = angle / settings.flat_angle
@@ -175,17 +175,17 @@ def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, resu
 
 
 @kernel
-def _write_geometry(placement, touch, result):
+def _write_geometry(placement, contacts, result):
     for wheel in range(6):
-        result.contact_angle[wheel] = np.arctan2(touch.sine[wheel], touch.cosine[wheel])
+        result.contact_angle[wheel] = np.arctan2(contacts.sine[wheel], contacts.cosine[wheel])
         for k in range(3):
             result.wheel_centres[wheel, k] = placement.centres[wheel, k]
-            result.contact_points[wheel, k] = touch.point[wheel, k]
+            result.contact_points[wheel, k] = contacts.point[wheel, k]
 
 
 @kernel
 def _write_forces(ground, linkage, settings, work, result):
-    search, point = work.search, work.touch.point
+    search, point = work.search, work.contacts.point
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         search.mu[wheel] = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
@@ -246,7 +246,7 @@ def find_tip_over(linkage, work):
     moment[:] = 0.0
     if linkage.has_tool_load:
         _add_tool_load(linkage, work.placement, centre, force, moment)
-    find_support(linkage, work.placement, work.touch, work.corners)
+    find_support(linkage, work.placement, work.contacts, work.corners)
     return tip_over_angles(work.corners, centre, force, moment)
 
 

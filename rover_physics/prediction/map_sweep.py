@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.contact.settling import SETTLED
 from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.records import shared_array_of
-from rover_physics.numerics.threads import threads_worth
+from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.evaluation import (
     NONE_HELD,
     effort,
@@ -25,7 +25,7 @@ from rover_physics.prediction.evaluation import (
     new_works,
 )
 from rover_physics.prediction.model_setup import Setup, set_up
-from rover_physics.prediction.sweep import check_poses, one_sweep_at_a_time
+from rover_physics.prediction.sweep import check_poses, sweep_lock
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 
@@ -126,7 +126,7 @@ def _score(setup: Setup, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScore
     n = len(poses)
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
     records = [shared_array_of(record) for record in setup[1:]]
-    with one_sweep_at_a_time, threads_worth(effort(setup.settings, n)) as threads:
+    with sweep_lock, limit_threads(effort(setup.settings, n)) as threads:
         works = new_works(threads, n)
         results = new_results(len(works))
         score_all(

@@ -135,8 +135,8 @@ def _tip_over_on_flat_ground(same: _SameRover) -> tuple[float, float]:
     work, q = new_work(), np.zeros(6)
     place(linkage, 0.0, 0.0, 0.0, q, work.placement)
     place_masses(linkage, q, work.placement)
-    work.touch.point[:] = work.placement.centres
-    work.touch.point[:, 2] -= linkage.radius
+    work.contacts.point[:] = work.placement.centres
+    work.contacts.point[:, 2] -= linkage.radius
     angle, measure = find_tip_over(linkage, work)
     if not angle > 0.0:
         raise ModelError(

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.contact.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
 from rover_physics.errors import PoseError
-from rover_physics.numerics.threads import threads_worth
+from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, find_crossings
 from rover_physics.prediction.drops import find_falls
 from rover_physics.prediction.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, effort, evaluate
@@ -32,7 +32,7 @@ __all__ = [
 
 POLICY_NAMES = {number: name for name, number in POLICIES.items()}
 
-one_sweep_at_a_time = threading.Lock()  # not all of numba's threading layers allow two callers
+sweep_lock = threading.Lock()  # not all of numba's threading layers allow two callers
 
 
 def sweep_path(
@@ -110,7 +110,7 @@ def _sweep(
     rover: Rover, terrain: Terrain, setup: Setup, paths: Sequence[np.ndarray]
 ) -> list[PathPrediction]:
     def evaluate_at(at: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
-        with one_sweep_at_a_time:
+        with sweep_lock:
             return evaluate(*setup, at, held)
 
     if not paths:
@@ -120,7 +120,7 @@ def _sweep(
     joined = np.ones(len(poses) - 1, bool)
     joined[ends[:-1] - 1] = False
     radius, direction = rover.wheel.radius, float(setup.settings["direction"])
-    with threads_worth(effort(setup.settings, len(poses))):  # told once, not for each round
+    with limit_threads(effort(setup.settings, len(poses))):  # told once, not for each round
         results = evaluate_at(poses)
         crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []

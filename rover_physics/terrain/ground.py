@@ -22,9 +22,12 @@ NO_SOILS = np.zeros((1, SOIL_NUMBERS))
 
 GROUND = record_type(
     ("elevation", np.int64),  # address of (rows, columns) elevation [m], NaN where unknown
-    ("roof", np.int64),  # address of (block_rows, block_columns) highest elevation of each block
+    (
+        "block_max",
+        np.int64,
+    ),  # address of (block_rows, block_columns) highest elevation of each block
     # [m], infinite where any of it is unknown
-    ("ceiling", np.int64),  # address of the same, -inf where none of it is known
+    ("known_block_max", np.int64),  # address of the same, -inf where none of it is known
     ("friction", np.int64),  # address of (rows, columns) friction coefficient, 0 if there is none
     ("soil", np.int64),  # address of (rows, columns) rows of the table of soils, 0 if none
     ("soils", np.int64),  # address of that table, (1 + k, SOIL_NUMBERS)
@@ -47,10 +50,10 @@ class Ground:
     """(1,) GROUND."""
     elevation: np.ndarray
     """(ny, nx) elevation [m], NaN where unknown."""
-    roof: np.ndarray
+    block_max: np.ndarray
     """Highest elevation of each block of BLOCK x BLOCK cells [m], infinite where any of it is
     unknown."""
-    ceiling: np.ndarray
+    known_block_max: np.ndarray
     """Highest elevation of each block [m], -inf where none is known."""
     friction: np.ndarray | None
     """(ny, nx) friction coefficient, NaN where the rover's own holds."""
@@ -69,8 +72,8 @@ def pack_ground(terrain: Terrain) -> Ground:
     return _point_to(
         terrain,
         elevation=elevation,
-        roof=np.where(some_unknown, np.inf, highest),
-        ceiling=np.where(np.isnan(highest), -np.inf, highest),
+        block_max=np.where(some_unknown, np.inf, highest),
+        known_block_max=np.where(np.isnan(highest), -np.inf, highest),
         friction=None
         if terrain.friction is None
         else np.ascontiguousarray(terrain.friction, dtype=np.float64),
@@ -81,15 +84,15 @@ def pack_ground(terrain: Terrain) -> Ground:
 
 def _point_to(terrain: Terrain, **arrays: np.ndarray | None) -> Ground:
     """Return the Ground of these arrays, its record pointing to them."""
-    elevation, roof = arrays["elevation"], arrays["roof"]
-    assert elevation is not None and roof is not None
+    elevation, block_max = arrays["elevation"], arrays["block_max"]
+    assert elevation is not None and block_max is not None
     record = new_record(
         GROUND,
         **{name: 0 if array is None else address_of(array) for name, array in arrays.items()},
         rows=elevation.shape[0],
         columns=elevation.shape[1],
-        block_rows=roof.shape[0],
-        block_columns=roof.shape[1],
+        block_rows=block_max.shape[0],
+        block_columns=block_max.shape[1],
         x0=float(terrain.origin[0]),
         y0=float(terrain.origin[1]),
         inverse_resolution=1.0 / float(terrain.resolution),
@@ -124,7 +127,7 @@ def elevation_of(ground, i, j):
 
 
 @kernel
-def find_roof(ground, gx, gy, reach_x, reach_y):
+def find_block_max(ground, gx, gy, reach_x, reach_y):
     """Return the highest elevation [m] of a box around (gx, gy), all in cells.
 
     Infinite where there is unknown ground or the map ends in it. Block by block, so somewhat more
@@ -136,14 +139,14 @@ def find_roof(ground, gx, gy, reach_x, reach_y):
     ):
         return np.inf
     first, last = int64(low_x) >> BLOCK_BITS, int64(high_x + 1.0) >> BLOCK_BITS
-    roof = -np.inf
+    block_max = -np.inf
     for i in range(int64(low_y) >> BLOCK_BITS, (int64(high_y + 1.0) >> BLOCK_BITS) + 1):
         row = i * ground.block_columns
         for j in range(first, last + 1):
-            height = read_float(ground.roof, row + j)
-            if height > roof:
-                roof = height
-    return roof
+            height = read_float(ground.block_max, row + j)
+            if height > block_max:
+                block_max = height
+    return block_max
 
 
 @kernel

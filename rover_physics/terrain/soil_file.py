@@ -13,7 +13,7 @@ from rover_physics.files.yaml_file import read_yaml
 
 COULOMB_MODEL, BEKKER_WONG_MODEL = "coulomb", "bekker_wong"
 MODELS = (COULOMB_MODEL, BEKKER_WONG_MODEL)
-LARGEST_EXPONENT = 2.0
+MAX_EXPONENT = 2.0
 """Sinkage exponents are published from 0.1 to 1.6; the wheel formula breaks down at 3."""
 
 _BEKKER_WONG_KEYS = ("cohesion", "friction_angle", "k_c", "k_phi", "n", "shear_modulus")
@@ -127,6 +127,6 @@ def _read_soil(name: str, entry: object, source: str) -> Soil:
         friction_angle=friction_angle,
         k_c=soil.number("k_c", "N/m^(n+1)", least=0.0),
         k_phi=soil.number("k_phi", "N/m^(n+2)", above=0.0),
-        n=soil.number("n", "", above=0.0, most=LARGEST_EXPONENT),
+        n=soil.number("n", "", above=0.0, most=MAX_EXPONENT),
         shear_modulus=soil.number("shear_modulus", "m", above=0.0),
     )

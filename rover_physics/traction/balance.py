@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.contact.contact_record import TOUCH
+from rover_physics.contact.contact_record import CONTACTS
 from rover_physics.errors import ModelError
 from rover_physics.forces.equilibrium import BALANCE, FREE_TORQUES, balance_forces
 from rover_physics.numerics.kernels import kernel
@@ -84,7 +84,7 @@ class BalanceRows:
 
 ROWS_WORK = record_type(
     ("placement", PLACEMENT),
-    ("touch", TOUCH),
+    ("contacts", CONTACTS),
     ("balance", BALANCE),
     ("q", float, (6,)),
     ("angles", float, (6,)),
@@ -179,12 +179,12 @@ def _write_state(linkages, works, given, angles, offsets, A, b, along):
 @kernel
 def _write_rows(linkage, work, A, b, along):
     """Write the nine equations at what `work` was given; False where they are singular."""
-    placement, touch, balance = work.placement, work.touch, work.balance
+    placement, contacts, balance = work.placement, work.contacts, work.balance
     linkage.tool[1, 0] = -work.push
     place(linkage, 0.0, 0.0, 0.0, work.q, placement)
     place_masses(linkage, work.q, placement)
-    _write_touch(linkage.radius, placement, work.angles, work.offsets, touch)
-    if not balance_forces(linkage, placement, touch, 1 + FREE_TORQUES, balance):
+    _write_contact(linkage.radius, placement, work.angles, work.offsets, contacts)
+    if not balance_forces(linkage, placement, contacts, 1 + FREE_TORQUES, balance):
         return False
     for i in range(6):
         along[i] = 0.0
@@ -216,14 +216,14 @@ def _write_rows(linkage, work, A, b, along):
 
 
 @kernel
-def _write_touch(radius, placement, angles, offsets, touch):
+def _write_contact(radius, placement, angles, offsets, contacts):
     """Write where wheels of known contact angles touch."""
     R, forward, up = placement.R, placement.forward, placement.up
     for wheel in range(6):
         s, c = np.sin(angles[wheel]), np.cos(angles[wheel])
-        touch.sine[wheel], touch.cosine[wheel] = s, c
+        contacts.sine[wheel], contacts.cosine[wheel] = s, c
         for k in range(3):
-            touch.point[wheel, k] = (
+            contacts.point[wheel, k] = (
                 placement.centres[wheel, k]
                 + radius * (s * forward[k] - c * up[k])
                 + offsets[wheel] * R[k, 1]

@@ -34,9 +34,9 @@ SLIP = 0.1
 """Standard deviation of a wheel's speed from its rolling speed, as a share of it."""
 GYRO_NOISE = 0.005
 """Standard deviation of a turning rate [rad/s]."""
-LEAST_SPEED = 0.02
+MIN_SPEED = 0.02
 """Rolling speed below which nothing is learnt, as a share of a wheel radius a second."""
-MOST_ANGLE = 1.7
+MAX_ANGLE = 1.7
 """Largest angle [rad]: a wheel on a face, and a little more."""
 DOUBT = 3.0
 """Standard deviations beyond which an equation counts less: a wheel that slips obeys none."""
@@ -164,7 +164,7 @@ def _update(linkages, motions, duration, filters):
         rate = motion.wheel_rates[wheel] + state.turning[wheel]
         state.speeds[wheel] = linkage.radius * rate
         fastest = max(fastest, abs(state.speeds[wheel]))
-    if fastest > LEAST_SPEED * linkage.radius:
+    if fastest > MIN_SPEED * linkage.radius:
         _drift(linkage.radius, level, duration, state)
         _correct(linkage.length, level, state)
 
@@ -259,7 +259,7 @@ def _correct(reach, level, state):
             residual -= sa * (angles[a] - prior[a]) - sb * (angles[b] - prior[b])
             _take_equation(a, sa, b, -sb, residual, noise, state)
     for i in range(6):
-        angles[i] = min(max(angles[i], -MOST_ANGLE), MOST_ANGLE)
+        angles[i] = min(max(angles[i], -MAX_ANGLE), MAX_ANGLE)
 
 
 @kernel

@@ -4,10 +4,10 @@ import numpy as np
 
 from rover_physics.numerics.kernels import kernel
 from rover_physics.traction.balance import FORCES, WHEEL_COUNT, BalanceRows
-from rover_physics.traction.program import LEAST_LOAD, LEAST_PEAK, TractionWeights
+from rover_physics.traction.program import MIN_LOAD, MIN_PEAK, TractionWeights
 
 REACH = 1.5
-"""How far the search goes, in ways from the last forces to the answer of a programme."""
+"""How far the search goes, in ways from the last forces to the answer of a program."""
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 SECTIONS = 10
 """Sections of the search; they tell the place to within 1 % of the way."""
@@ -16,9 +16,9 @@ ROUNDING = 1e-4
 
 
 def measure_utilisation(rows: BalanceRows, friction: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return sqrt(T^2 + S^2) / (mu N) (6,) of x (14,), with loads of LEAST_LOAD at least."""
+    """Return sqrt(T^2 + S^2) / (mu N) (6,) of x (14,), with loads of MIN_LOAD at least."""
     across = np.hypot(x[:6], x[12] + x[13] * rows.along)
-    return across / (friction * np.maximum(x[6:12], LEAST_LOAD))
+    return across / (friction * np.maximum(x[6:12], MIN_LOAD))
 
 
 def measure_peak(rows: BalanceRows, friction: np.ndarray, x: np.ndarray) -> float:
@@ -36,7 +36,7 @@ def find_best_between(
 ) -> tuple[np.ndarray, float, float]:
     """Look on the line through two sets of forces for the one with the smallest cost.
 
-    A programme knows cones as they are about its reference; far from it they may be wrong, and a
+    A program knows cones as they are about its reference; far from it they may be wrong, and a
     sequence of answers may go to and fro. Where its answer has a smaller peak than the reference,
     peaks fall from the reference on, so that the best place on the way never has a larger one.
     The balance is linear: all on the line keep it where both ends do.
@@ -45,7 +45,7 @@ def find_best_between(
         rows: The balance.
         friction: (6,) friction coefficients.
         most_pull: Largest torque over the wheel radius, in force units.
-        weights: What the programme weighs; here of the exact peak.
+        weights: What the program weighs; here of the exact peak.
         start: (14,) the reference, in force units.
         aim: (14,) the answer, in force units.
 
@@ -66,14 +66,14 @@ def _measure_peak(along, friction, x):
     for wheel in range(WHEEL_COUNT):
         lateral = x[12] + x[13] * along[wheel]
         across = np.sqrt(x[wheel] * x[wheel] + lateral * lateral)
-        peak = max(peak, across / (friction[wheel] * max(x[6 + wheel], LEAST_LOAD)))
+        peak = max(peak, across / (friction[wheel] * max(x[6 + wheel], MIN_LOAD)))
     return peak
 
 
 @kernel
 def _search(along, friction, most_pull, by_peak, effort, slack, start, aim, x):
     """Write the best forces by golden section; return their peak and how far tractions moved."""
-    unit, mean = max(_measure_peak(along, friction, start), LEAST_PEAK), 0.0
+    unit, mean = max(_measure_peak(along, friction, start), MIN_PEAK), 0.0
     for wheel in range(WHEEL_COUNT):
         mean += friction[wheel] / WHEEL_COUNT
     scales = (by_peak, effort, slack, unit, unit * mean)
@@ -104,7 +104,7 @@ def _search(along, friction, most_pull, by_peak, effort, slack, start, aim, x):
 
 @kernel
 def _cost_at(place, along, friction, most_pull, scales, start, aim, x):
-    """Write the forces at a place on the line, and return what the programme minimises."""
+    """Write the forces at a place on the line, and return what the program minimises."""
     by_peak, effort, slack, unit, force_unit = scales
     squares = pull = lift = 0.0
     for k in range(FORCES):

@@ -1,4 +1,4 @@
-"""The quadratic programme that shares the torques: no wheel slips before all give their part.
+"""The quadratic program that shares the torques: no wheel slips before all give their part.
 
 Variables, x = scale * variables + shift in sixths of the weight: tractions T (6), loads N (6),
 lateral terms s0 and s1 with S_i = s0 + s1 along_i, the peak friction utilisation u, and three
@@ -8,19 +8,19 @@ over wheel radius, each with its slack; u and slacks >= 0. So an answer always e
 slacks say by how much it gives way. `scale` makes tractions and peak of order one: a peak of 0.1
 is no smaller a matter than one of 1.
 
-The cone sqrt(T^2 + S^2) <= u mu N is nothing that a quadratic programme can hold:
+The cone sqrt(T^2 + S^2) <= u mu N is nothing that a quadratic program can hold:
 
 - u N is a product. It is expanded to first order about the last peak and load, so that the
-  smallest peak is found by a sequence of programmes, as Dinkelbach does for ratios. A controller,
+  smallest peak is found by a sequence of programs, as Dinkelbach does for ratios. A controller,
   whose last answer is near, needs one or two of them.
 - The cone is round. It is replaced by SIDES of its tangents, one of them where the last forces
   point. Where the sequence settles that is exact; elsewhere the polygon is outside the cone.
 
 So an answer is looked at by the round cone and the product, both from the last forces on towards
 it, and the best place on that line is taken (`traction_merit`): the peak never rises from one
-programme to the next, and what is reported is the utilisation by the round cone.
+program to the next, and what is reported is the utilisation by the round cone.
 
-The change from the last forces is weighed as well: it makes the programme well conditioned, and
+The change from the last forces is weighed as well: it makes the program well conditioned, and
 it vanishes where the sequence settles, so that it costs nothing there (a proximal point method).
 
 Sources: Crouzeix, Ferland and Schaible, "An algorithm for generalized fractional programs",
@@ -44,13 +44,13 @@ FRICTION_SLACK, LOAD_SLACK, TORQUE_SLACK = 15, 16, 17
 VARIABLES = 18
 CONES = 9
 LIMIT = CONES + WHEEL_COUNT * SIDES
-CONTACTS = LIMIT + 1
-FORWARD = CONTACTS + WHEEL_COUNT
+LOAD_ROWS = LIMIT + 1
+FORWARD = LOAD_ROWS + WHEEL_COUNT
 BACKWARD = FORWARD + WHEEL_COUNT
 SIGNS = BACKWARD + WHEEL_COUNT
 ROWS = SIGNS + 4
 """Rows: balance (9), cones, limit of the peak, contacts (6), torques (2 x 6), signs (4)."""
-LEAST_LOAD, LEAST_PEAK, MOST_PEAK = 0.05, 0.02, 3.0
+MIN_LOAD, MIN_PEAK, MAX_PEAK = 0.05, 0.02, 3.0
 """Bounds of what the cones are expanded about: load in sixths of the weight, utilisation."""
 REGULARISATION = 1e-2
 """Curvature of what has no cost: loads and slacks."""
@@ -75,7 +75,7 @@ class TractionWeights:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The last answer, about which the programme is written."""
+    """The last answer, about which the program is written."""
 
     x: np.ndarray
     """(14,) tractions, loads and lateral terms in force units."""
@@ -112,7 +112,7 @@ def build_traction_qp(
     reference: Reference,
     weights: TractionWeights | None = None,
 ) -> TractionQP:
-    """Write the programme for one state of the rover.
+    """Write the program for one state of the rover.
 
     Args:
         rows: Balance at that state, with the wanted net traction.
@@ -127,7 +127,7 @@ def build_traction_qp(
     weights = weights or TractionWeights()
     check_limits(friction, most_pull)
     vectors, A, bounds = np.zeros((5, VARIABLES)), np.zeros((ROWS, VARIABLES)), np.empty((2, ROWS))
-    peak = min(max(reference.peak, LEAST_PEAK), MOST_PEAK)
+    peak = min(max(reference.peak, MIN_PEAK), MAX_PEAK)
     unit = peak * float(friction.sum()) / WHEEL_COUNT
     P, q, scale, shift, start = vectors
     _write_constraints(
@@ -175,7 +175,7 @@ def _write_constraints(
     lower[:] = -np.inf
     upper[:] = np.inf
     for wheel in range(6):
-        shift[6 + wheel] = max(last[6 + wheel], LEAST_LOAD)
+        shift[6 + wheel] = max(last[6 + wheel], MIN_LOAD)
     for row in range(9):
         room = wanted[row]
         for column in range(14):
@@ -195,7 +195,7 @@ def _write_constraints(
             A[row, 6 + wheel] = -mu * peak
             A[row, 14] = -mu * load * peak / unit
             upper[row] = 0.0
-        row = CONTACTS + wheel
+        row = LOAD_ROWS + wheel
         A[row, 6 + wheel] = A[row, 16] = 1.0
         lower[row] = -load / unit
         for row, sign in ((FORWARD + wheel, 1.0), (BACKWARD + wheel, -1.0)):

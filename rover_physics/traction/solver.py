@@ -1,4 +1,4 @@
-"""Solving for the torques: programmes about one another's answers by OSQP, equal torque else."""
+"""Solving for the torques: programs about one another's answers by OSQP, equal torque else."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
     "eps_abs": 1e-4,
     "eps_rel": 1e-4,
-    # The programme is scaled already; a scaling of its own, anew each time, spoils the start.
+    # The program is scaled already; a scaling of its own, anew each time, spoils the start.
     "scaling": 0,
     "rho": 3.0,
     "adaptive_rho_interval": 100,
@@ -32,7 +32,7 @@ SETTINGS = {
     "verbose": False,
 }
 """Of OSQP."""
-MOST_ITERATIONS = 4000
+MAX_ITERATIONS = 4000
 SETTLED = 0.02
 """Change of the scaled tractions, which are of order one, at which a sequence has settled."""
 SOLVED = 1
@@ -61,8 +61,8 @@ class TractionAnswer:
     """By how much the largest torque would be above the limit in [N m]; it is cut off."""
     iterations: int
     """Iterations of OSQP."""
-    programmes: int
-    """Programmes solved."""
+    programs: int
+    """Programs solved."""
     fallback: bool
     """Whether OSQP failed and torques are equal."""
     status: str
@@ -72,18 +72,18 @@ class TractionAnswer:
 class TractionWorkspace:
     """An OSQP problem that is set up once, updated in place and started from the last answer."""
 
-    def __init__(self, most_iterations: int = MOST_ITERATIONS):
-        """Set up the problem; `most_iterations` is where OSQP gives up."""
+    def __init__(self, max_iterations: int = MAX_ITERATIONS):
+        """Set up the problem; `max_iterations` is where OSQP gives up."""
         self._cells, pattern = _find_pattern()
         self._solver = osqp.OSQP()
         unbounded = np.full(ROWS, np.inf)
         self._solver.setup(
             sparse.eye(VARIABLES, format="csc"), np.zeros(VARIABLES), pattern,
-            -unbounded, unbounded, max_iter=most_iterations, **SETTINGS,
+            -unbounded, unbounded, max_iter=max_iterations, **SETTINGS,
         )  # fmt: skip
 
     def solve(self, qp: TractionQP) -> tuple[np.ndarray, int, str, bool]:
-        """Solve a programme.
+        """Solve a program.
 
         Returns:
             Variables (18,), iterations, OSQP's words for its status, whether it was solved.
@@ -112,7 +112,7 @@ def solve_traction(
     max_torque: float,
     wheel_radius: float,
     last: np.ndarray | None = None,
-    most_programmes: int = 2,
+    max_programs: int = 2,
     weights: TractionWeights | None = None,
 ) -> TractionAnswer:
     """Find the torques with the smallest peak friction utilisation.
@@ -125,7 +125,7 @@ def solve_traction(
         wheel_radius: Wheel radius [m].
         last: (6,) tractions of the last answer [N], near which the search starts; None starts
             from equal torques.
-        most_programmes: Largest number of programmes, fewer where they settle before; 0 asks for
+        max_programs: Largest number of programs, fewer where they settle before; 0 asks for
             equal torques.
         weights: What the objective weighs.
 
@@ -140,20 +140,20 @@ def solve_traction(
     weights = weights or TractionWeights()
     x = rows.complete(np.zeros(WHEEL_COUNT) if last is None else last / rows.force_unit)
     peak = measure_peak(rows, friction, x)
-    status, iterations, programmes = "", 0, 0
-    while programmes < most_programmes:
+    status, iterations, programs = "", 0, 0
+    while programs < max_programs:
         qp = build_traction_qp(rows, friction, most_pull, Reference(x, peak), weights)
         y, count, status, solved = workspace.solve(qp)
         iterations += count
         if not solved:
             break
-        programmes += 1
+        programs += 1
         unit = float(qp.scale[0])
         aim = rows.complete(unit * y[:WHEEL_COUNT])
         x, peak, moved = find_best_between(rows, friction, most_pull, weights, x, aim)
         if moved <= SETTLED * unit:
             break
-    if programmes == 0:
+    if programs == 0:
         x = rows.complete(np.zeros(WHEEL_COUNT))
     table, unit = np.empty((5, WHEEL_COUNT)), rows.force_unit
     torques, loads, tractions, lateral, utilisation = table
@@ -170,7 +170,7 @@ def solve_traction(
         load_slack=max(-least, 0.0),
         torque_slack=max(wheel_radius * pull - max_torque, 0.0),
         iterations=iterations,
-        programmes=programmes,
-        fallback=programmes == 0 and most_programmes > 0,
+        programs=programs,
+        fallback=programs == 0 and max_programs > 0,
         status=status,
     )

@@ -27,7 +27,7 @@ from rover_physics.traversability.verdict import Verdict, judge
 
 LOOK_AHEAD = 1.5
 """Wheelbases that the way on is looked at beyond as much way as the rover went in."""
-LONGEST_LOOK = 6.0
+MAX_LOOK_AHEAD = 6.0
 """Wheelbases that the way on is looked at, however far the rover went in."""
 CURVES = (0.0, 1.0, -1.0)
 """Curvatures of the ways on, in turns of one radian a wheelbase, for LOOK_AHEAD wheelbases."""
@@ -132,7 +132,7 @@ def _find_way_on(
     """
     wheelbase = _wheelbase(rover)
     inside = prediction.distance[end] - prediction.distance[stop]
-    length = min(LOOK_AHEAD * wheelbase + inside, LONGEST_LOOK * wheelbase)
+    length = min(LOOK_AHEAD * wheelbase + inside, MAX_LOOK_AHEAD * wheelbase)
     starts = [end]
     if inside > wheelbase:
         behind = prediction.distance[stop] + 0.5 * wheelbase

@@ -18,7 +18,7 @@ from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.prediction.evaluation import NONE_HELD, evaluate_pose, new_results, new_work
 from rover_physics.prediction.model_setup import Setup, set_up
 from rover_physics.prediction.path_prediction import Floats
-from rover_physics.prediction.sweep import check_poses, one_sweep_at_a_time
+from rover_physics.prediction.sweep import check_poses, sweep_lock
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 
@@ -88,7 +88,7 @@ def find_torque_ranges(
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
-        with one_sweep_at_a_time:
+        with sweep_lock:
             evaluate_pose(
                 setup.ground.records[0], *setup[1:], poses, NONE_HELD, i, work, results[i]
             )

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.traversability.classification import ClassifiedWaypoint
 from rover_physics.traversability.torque_ranges import TorqueRanges
-from rover_physics.traversability.traversability_class import Grade
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 
@@ -115,7 +115,7 @@ def write_prediction(
     verdict: Verdict,
     *,
     on_soil: bool = False,
-    grades: Sequence[Grade] | None = None,
+    classes: Sequence[ClassifiedWaypoint] | None = None,
     ranges: TorqueRanges | None = None,
 ) -> None:
     """Write a prediction and its verdict to an .npz file of exactly that name.
@@ -129,8 +129,8 @@ def write_prediction(
         prediction: The path of n waypoints.
         verdict: What the limits say to it.
         on_soil: Whether to write SOIL_ARRAYS (n, 6), in m and N.
-        grades: Of each waypoint, written as `grade`, `grade_constraint` and `grade_wheel` (n,)
-            text and `grade_margin` (n,).
+        classes: Of each waypoint, written as `traversability_class`, `class_constraint` and
+            `class_wheel` (n,) text and `class_margin` (n,).
         ranges: Written as `torque_range` (n, 6, 2), lowest and highest torque [N m].
 
     Raises:
@@ -145,11 +145,11 @@ def write_prediction(
         arrays["map_sigmas"] = np.array(prediction.bounds.sigmas)
         for name in BOUNDED_VALUES:
             arrays[f"{name}_bounds"] = getattr(prediction.bounds, name)
-    if grades is not None:
-        for name, field in (("", "grade"), ("_constraint", "constraint"), ("_wheel", "wheel")):
-            texts = [getattr(grade, field) for grade in grades]
-            arrays[f"grade{name}"] = np.array(texts, dtype=np.str_)
-        arrays["grade_margin"] = np.array([grade.margin for grade in grades])
+    if classes is not None:
+        for name in ("traversability_class", "constraint", "wheel"):
+            texts = np.array([getattr(waypoint, name) for waypoint in classes], dtype=np.str_)
+            arrays[name if name == "traversability_class" else f"class_{name}"] = texts
+        arrays["class_margin"] = np.array([waypoint.margin for waypoint in classes])
     if ranges is not None:
         arrays["torque_range"] = np.stack([ranges.lowest, ranges.highest], axis=-1)
     buffer = io.BytesIO()

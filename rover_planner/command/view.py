@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TERRAIN_SIZE = 12.0
 """Width of the terrain that is made where none is given [m]."""
 SEED = 7
-LONGEST_DEMO = 10.0
+MAX_DEMO_LENGTH = 10.0
 """Largest distance of the ends that are chosen where none are told [m]."""
 PLACES_TRIED = 41
 """Places along each side of the map that are tried for an end."""
@@ -131,7 +131,7 @@ def _load_or_make(path: Path | None, follow: bool) -> "Terrain":
 def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
     """Return two places where the rover can stand, on both sides of the middle of a map.
 
-    Each is the nearest to a quarter and three quarters of the way along x, at most LONGEST_DEMO
+    Each is the nearest to a quarter and three quarters of the way along x, at most MAX_DEMO_LENGTH
     apart; where the rover can stand nowhere they are just there, and the page says why not.
     """
     import numpy as np
@@ -140,7 +140,7 @@ def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
 
     x_low, x_high, y_low, y_high = ground.bounds
     middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high)])
-    half = 0.5 * min(0.5 * (x_high - x_low), LONGEST_DEMO)
+    half = 0.5 * min(0.5 * (x_high - x_low), MAX_DEMO_LENGTH)
     x, y = np.meshgrid(
         np.linspace(x_low, x_high, PLACES_TRIED), np.linspace(y_low, y_high, PLACES_TRIED)
     )

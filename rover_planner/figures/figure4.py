@@ -24,7 +24,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.figures.pictures import STYLE, save_figure
 
 AXLES = ("rear", "middle", "front")
-LARGEST_TORQUE = 0.2
+MAX_TORQUE = 0.2
 """Torques are varied between plus and minus this [N m], as in the paper."""
 ALONE, HELD = "other motors off, thrust held at the body", "thrust held by all wheels alike"
 
@@ -93,7 +93,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
     Raises:
         PlanningError: The file cannot be written.
     """
-    torques = np.array([-LARGEST_TORQUE, LARGEST_TORQUE])
+    torques = np.array([-MAX_TORQUE, MAX_TORQUE])
     loads = {
         (row, case): np.array([loads_under_torque(rover, row, t, case) for t in torques])
         for row in range(3)

@@ -28,8 +28,8 @@ from msg_adapters.verdicts import verdict_to_diagnostics
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
 from rover_planner.planning.judgement import Judgement
-from rover_planner.ros.deferred_work import Afterwards
-from rover_planner.ros.lazy_publisher import KeptTopic
+from rover_planner.ros.deferred_work import DeferredWork
+from rover_planner.ros.lazy_publisher import LazyPublisher
 
 WHEEL_TOPICS = {
     "wheel_loads": "wheel_loads",
@@ -54,11 +54,13 @@ _KINDS = {
 class ResultTopics:
     """Makes the plan of a judgement at once, and publishes the rest when the answer is sent."""
 
-    def __init__(self, node: Node, afterwards: Afterwards, map_frame: str):
-        self._node, self._afterwards, self._frame = node, afterwards, map_frame
+    def __init__(self, node: Node, deferred_work: DeferredWork, map_frame: str):
+        self._node, self._deferred_work, self._frame = node, deferred_work, map_frame
         self._poses = PoseStock()
         self._points: list[JointTrajectoryPoint] = []
-        self._topics = {name: KeptTopic(node, kind, f"~/{name}") for name, kind in _KINDS.items()}
+        self._topics = {
+            name: LazyPublisher(node, kind, f"~/{name}") for name, kind in _KINDS.items()
+        }
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(LOOK_OUT, self._serve_late_comers, clock=steady)
 
@@ -88,13 +90,13 @@ class ResultTopics:
             partial(topic.publish, partial(results.message, name))
             for name, topic in self._topics.items()
         ]
-        self._afterwards.do(log, *publications)
+        self._deferred_work.do(log, *publications)
         return results.plan()
 
     def _serve_late_comers(self) -> None:
         awaited = [topic for topic in self._topics.values() if topic.is_awaited]
         if awaited:
-            self._afterwards.do(*(topic.catch_up for topic in awaited))
+            self._deferred_work.do(*(topic.catch_up for topic in awaited))
 
 
 @dataclass(frozen=True)
@@ -152,15 +154,15 @@ class _Results:
             radius = self.rover.wheel.radius
             return joint_trajectory(prediction, radius, self.frame, self.stamp, self.points)
         if topic == "markers":
-            grades = [grade.grade for grade in self.judgement.grades]
+            classes = [waypoint.traversability_class for waypoint in self.judgement.classes]
             reasons, rows = candidate.verdict.reasons, self._rows_to_show()
-            return path_markers(prediction, reasons, rows, self.frame, self.stamp, grades)
+            return path_markers(prediction, reasons, rows, self.frame, self.stamp, classes)
         if topic == "tip_over_margin":
             return tip_over_array(prediction)
         return waypoint_array(getattr(prediction, WHEEL_TOPICS[topic]))
 
     def _rows_to_show(self) -> NDArray[np.intp]:
-        """Return waypoints about `plan_spacing` apart, and those where the grade changes."""
+        """Return waypoints about `plan_spacing` apart, and those where the class changes."""
         candidate = self.judgement.candidate
         assert candidate is not None
         return decimate(candidate.poses, self.plan_spacing, self.judgement.changes())

@@ -1,4 +1,4 @@
-"""The node /traction_controller: wheel torques shared by a quadratic programme at its rate."""
+"""The node /traction_controller: wheel torques shared by a quadratic program at its rate."""
 
 import gc
 import signal

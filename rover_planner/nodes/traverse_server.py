@@ -37,7 +37,7 @@ from rover_planner.parameters.declare import check_changes, declare_parameters
 from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
 from rover_planner.planning.judgement import Judgement, refusal
 from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
-from rover_planner.ros.deferred_work import Afterwards
+from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.refusals import BAD_INPUT, answer_or_refuse
 
@@ -53,8 +53,8 @@ class TraverseServer(Node):
         self._service = TraverseService(settings_from_parameters(self._values))
         self._map_frame: str = self._values["map_frame"]
         self._seen_maps: deque[int] = deque(maxlen=8)
-        self._afterwards = Afterwards(self)
-        self._results = ResultTopics(self, self._afterwards, self._map_frame)
+        self._deferred_work = DeferredWork(self)
+        self._results = ResultTopics(self, self._deferred_work, self._map_frame)
         self._load_first_map()
         self._create_subscriptions()
         self.create_service(GetPlan, "~/can_traverse", self._can_traverse)

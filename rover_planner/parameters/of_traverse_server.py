@@ -60,7 +60,7 @@ TRAVERSE_SERVER = (
     ParameterSpec(
         "plan_spacing",
         0.1,
-        "Distance between poses of a plan, which has those where the grade changes too; "
+        "Distance between poses of a plan, which has those where the class changes too; "
         "0 returns every waypoint.",
         "m",
         bounds=(0.0, 100.0),

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.traversability.traversability_class import Grade
+from rover_physics.traversability.classification import ClassifiedWaypoint
 from rover_planner.planning.path_query import Candidate
-from rover_planner.planning.path_report import describe_grades, describe_path
+from rover_planner.planning.path_report import describe_classes, describe_path
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,8 @@ class Judgement:
     """Why not, in words; empty if traversable."""
     candidate: Candidate | None = None
     """The path that was judged; None where the request was refused before."""
-    grade: Callable[[], tuple[Grade, ...]] = tuple
-    """Grades the waypoints; may have to sweep the path once more."""
+    classify: Callable[[], tuple[ClassifiedWaypoint, ...]] = tuple
+    """Classes the waypoints; may have to sweep the path once more."""
     notes: Callable[[], Mapping[str, Any]] = dict
     """Tells further entries of the verdict."""
 
@@ -34,9 +34,9 @@ class Judgement:
         return self.candidate is not None and self.candidate.verdict.traversable
 
     @cached_property
-    def grades(self) -> tuple[Grade, ...]:
+    def classes(self) -> tuple[ClassifiedWaypoint, ...]:
         """How passable each waypoint is; empty where no path was judged."""
-        return self.grade()
+        return self.classify()
 
     @cached_property
     def verdict(self) -> dict[str, Any]:
@@ -44,15 +44,15 @@ class Judgement:
         if self.candidate is None:
             said = {"code": self.code, "reason": self.reason, "first_failure": -1}
             return {"traversable": False, **said, **self.notes()}
-        path, grades = describe_path(self.candidate), describe_grades(self.grades)
-        return {**path, **grades, **self.notes()}
+        path, classes = describe_path(self.candidate), describe_classes(self.classes)
+        return {**path, **classes, **self.notes()}
 
     def changes(self) -> NDArray[np.intp]:
-        """Return the waypoints that have another grade than the one before."""
+        """Return the waypoints that have another class than the one before."""
         candidate = self.candidate
         if candidate is None or (self.traversable and candidate.verdict.policy == "equal"):
             return np.empty(0, np.intp)  # all are passable: no need to ask
-        names = np.array([grade.grade for grade in self.grades])
+        names = np.array([waypoint.traversability_class for waypoint in self.classes])
         return np.flatnonzero(names[1:] != names[:-1]) + 1
 
     def summary(self) -> str:

@@ -1,18 +1,18 @@
-"""What is said about a judged path: extents, failure and grades, as keys of a verdict."""
+"""What is said about a judged path: extents, failure and classes, as keys of a verdict."""
 
 from collections.abc import Sequence
 from typing import Any
 
-from rover_physics.traversability.traversability_class import Grade, deciding_waypoint
+from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
 from rover_planner.planning.path_query import Candidate
 
 PER_WAYPOINT = {
-    "grades": "grade",
-    "grade_constraints": "constraint",
-    "grade_wheels": "wheel",
-    "grade_margins": "margin",
+    "traversability_classes": "traversability_class",
+    "class_constraints": "constraint",
+    "class_wheels": "wheel",
+    "class_margins": "margin",
 }
-"""Keys with a value for each waypoint, and the field of a Grade that each holds."""
+"""Keys with a value for each waypoint, and the field of a ClassifiedWaypoint that each holds."""
 
 
 def describe_path(candidate: Candidate) -> dict[str, Any]:
@@ -29,19 +29,20 @@ def describe_path(candidate: Candidate) -> dict[str, Any]:
     return verdict
 
 
-def describe_grades(grades: Sequence[Grade]) -> dict[str, Any]:
-    """Return the grade of a path, with what decides it, and those of its waypoints."""
-    waypoint = deciding_waypoint(grades)
-    worst = grades[waypoint]
+def describe_classes(classes: Sequence[ClassifiedWaypoint]) -> dict[str, Any]:
+    """Return the class of a path, with what decides it, and those of its waypoints."""
+    waypoint = deciding_waypoint(classes)
+    worst = classes[waypoint]
     summary = {
-        "grade": worst.grade,
-        "grade_waypoint": waypoint,
-        "grade_constraint": worst.constraint,
-        "grade_wheel": worst.wheel,
-        "grade_margin": worst.margin,
-        "grade_reason": worst.reason,
+        "traversability_class": worst.traversability_class,
+        "class_waypoint": waypoint,
+        "class_constraint": worst.constraint,
+        "class_wheel": worst.wheel,
+        "class_margin": worst.margin,
+        "class_reason": worst.reason,
     }
     lists = {
-        key: [getattr(grade, field) for grade in grades] for key, field in PER_WAYPOINT.items()
+        key: [getattr(waypoint, field) for waypoint in classes]
+        for key, field in PER_WAYPOINT.items()
     }
     return summary | lists

@@ -17,7 +17,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_physics.terrain.soil_file import soil_named
-from rover_physics.traversability.traversability_class import grade_judged
+from rover_physics.traversability.classification import classify_judged
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.judgement import Judgement, refusal
@@ -273,8 +273,8 @@ class TraverseService:
     ) -> Judgement:
         """Make a judgement of a judged path, with all that describing it later takes."""
         assert self._terrain is not None
-        grade = partial(
-            grade_judged,
+        classify = partial(
+            classify_judged,
             self._settings.rover,
             self._terrain,
             candidate.prediction,
@@ -289,7 +289,7 @@ class TraverseService:
         def all_notes() -> dict[str, Any]:
             return {**suspension, **notes()}
 
-        return Judgement(verdict.code, verdict.reason, candidate, grade, all_notes)
+        return Judgement(verdict.code, verdict.reason, candidate, classify, all_notes)
 
     def _compare_suspension(self, candidate: Candidate) -> dict[str, Any]:
         """Compare the measured suspension with the predicted one at the path's start."""

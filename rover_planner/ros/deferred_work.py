@@ -15,18 +15,18 @@ SLICE = 0.002
 """Work that takes longer than this in one go waits for requests before it goes on [s]..."""
 GAP = 0.003
 """... for so long [s]."""
-MOST_WAITING = 4
+MAX_WAITING = 4
 """Answers whose work may wait for further requests to be answered."""
 
 Work = Callable[[], None]
 
 
-class Afterwards:
+class DeferredWork:
     """Runs work that was put off: answer by answer, piece by piece, and requests go first.
 
     A timer runs the pieces, and every further answer sets it back. So a request that comes
     meanwhile waits for no more than one SLICE and the piece that exceeds it. Under requests
-    without a pause the work of MOST_WAITING answers waits at most; then that of the oldest is
+    without a pause the work of MAX_WAITING answers waits at most; then that of the oldest is
     done, all of it, before the next request is looked at. Nothing is left out, nothing overtakes.
     """
 
@@ -41,7 +41,7 @@ class Afterwards:
         """Put off the work of one answer; where a piece of it fails the log says so."""
         self._answers.append(deque(pieces))
         self._wait(QUIET)
-        if len(self._answers) > MOST_WAITING:
+        if len(self._answers) > MAX_WAITING:
             self._too_many.trigger()
 
     def _run_some(self) -> None:
@@ -59,8 +59,8 @@ class Afterwards:
         self._timer.reset()
 
     def _run_oldest(self) -> None:
-        """Run what belongs to the oldest answers until no more than MOST_WAITING are left."""
-        while len(self._answers) > MOST_WAITING:
+        """Run what belongs to the oldest answers until no more than MAX_WAITING are left."""
+        while len(self._answers) > MAX_WAITING:
             self._run_next()
 
     def _run_next(self) -> None:

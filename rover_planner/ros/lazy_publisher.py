@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rover_planner.ros.qos import result_qos
 
 
-class KeptTopic:
+class LazyPublisher:
     """Publishes what somebody listens to; else keeps how to make the latest for whoever comes."""
 
     def __init__(self, node: Node, kind: type, name: str):

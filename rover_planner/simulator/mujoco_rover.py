@@ -28,7 +28,7 @@ SERVO_RATE = 5.0
 """Rate at which a servo adds up its error [1/s]."""
 MOTOR_INERTIA = 1.0
 """Inertia of a geared motor at the wheel, in wheel radii squared times a sixth of the mass."""
-LEAST_LOAD = 1e-3
+MIN_LOAD = 1e-3
 """Load, in weights, from which a wheel counts as on the ground."""
 
 _MODEL = """
@@ -251,7 +251,7 @@ class RoverPlant:
             loads[wheel] += force[0]
             shears[wheel] += np.hypot(force[1], force[2])
             slips[wheel] += force[0] * sliding
-        held = loads > LEAST_LOAD * self.rover.weight
+        held = loads > MIN_LOAD * self.rover.weight
         slip_speeds = np.where(held, slips / np.where(held, loads, 1.0), 0.0)
         return WheelContacts(loads, shears, slip_speeds)
 

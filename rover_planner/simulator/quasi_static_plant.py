@@ -26,10 +26,10 @@ from rover_planner.simulator.plant import PlantState, quaternion
 Floats = NDArray[np.float64]
 DRAG = 0.5
 """Share of its speed that a rover without torque loses each second beyond rolling: gears [1/s]."""
-MOST_SLIP = 0.95
+MAX_SLIP = 0.95
 CREEP = 1e-4
 """Speed below which it does not steer [m/s]."""
-LEAST_WAY, PATIENCE = 0.02, 2.0
+MIN_PROGRESS, PATIENCE = 0.02, 2.0
 """Way [m] that a rover has to make in so much time [s], or it is said to be stuck."""
 NO_LIMIT = 1e9
 
@@ -110,7 +110,7 @@ class QuasiStaticPlant:
         """Say why the rover stays where it is though its motors do all they can."""
         saturated = np.abs(self._torques) >= 0.999 * self._rover.wheel.max_torque
         moved = float(np.hypot(*(self._pose - self._anchor)[:2]))
-        if moved > LEAST_WAY or not (forces.sliding.any() or saturated.any()):
+        if moved > MIN_PROGRESS or not (forces.sliding.any() or saturated.any()):
             self._anchor, self._stalled = self._pose.copy(), 0.0
             return
         self._stalled += duration
@@ -144,7 +144,7 @@ class QuasiStaticPlant:
         ahead = np.array([np.cos(middle), np.sin(middle), 0.0])
         rolled = np.copysign(np.linalg.norm(ways, axis=1), ways @ ahead)
         turned = rolled / self._rover.wheel.radius
-        turned /= 1.0 - np.clip(self._slip(forces), 0.0, MOST_SLIP)
+        turned /= 1.0 - np.clip(self._slip(forces), 0.0, MAX_SLIP)
         self._spin += turned
         self._wheel_rates = turned / duration
 

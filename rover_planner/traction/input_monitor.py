@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 
-class InputWatch:
+class InputMonitor:
     """When each input was last good, and what is wrong with those that came bad."""
 
     def __init__(self, names: Iterable[str], timeout: float):

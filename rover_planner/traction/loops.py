@@ -11,7 +11,7 @@ from rover_physics.numerics.kernels import kernel
 Floats = NDArray[np.float64]
 OVERSPEED = 1.3
 """Rate of the wheels, over the wanted one, that is still taken for rolling."""
-SLOWEST, FASTEST = 0.2, 2.0
+MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.2, 2.0
 """Bounds of a wheel's speed over the mean that rolling asks for."""
 STALLED = 0.3
 """Share of the wanted rate below which the rover does not get on."""
@@ -35,7 +35,7 @@ class LoopGains:
     """Largest change of a torque [N m/s]."""
 
 
-class PushLoop:
+class PIController:
     """Turns an error of speed into a push: proportional to it, and to the way it adds up to."""
 
     def __init__(self, gain: float, integral_gain: float, most: float):
@@ -64,7 +64,7 @@ class PushLoop:
         return min(max(push, -self._most), self._most)
 
 
-class StallWatch:
+class StallDetector:
     """Tells how far to give way to speed servos where the rover does not get on.
 
     A wheel that is stopped by a face it has not felt yet looks like one on level ground, and
@@ -100,7 +100,7 @@ def rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:
         ratios: (6,) speeds of the wheels' centres, relative to their mean; a wheel that has to
             go backwards or far ahead is more likely one whose contact angle is wrong.
     """
-    ratios = np.minimum(np.maximum(ratios, SLOWEST), FASTEST)
+    ratios = np.minimum(np.maximum(ratios, MIN_SPEED_RATIO), MAX_SPEED_RATIO)
     most = OVERSPEED * abs(wanted)
     return ratios * min(max(median((wheel_rates / ratios).tolist()), -most), most)
 

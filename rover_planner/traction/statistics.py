@@ -61,7 +61,7 @@ class TractionStatistics:
         return words | {
             "solve_time_ms": round(1e3 * update.duration, 3),
             "iterations": answer.iterations,
-            "programmes": answer.programmes,
+            "programs": answer.programs,
             "status": answer.status,
             "fallback": answer.fallback,
             "contact_source": update.estimate.source,

@@ -24,8 +24,14 @@ from rover_physics.traction.contact_ekf import (
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.solver import TractionAnswer, TractionWorkspace, solve_traction
 from rover_planner.ros.map_intake import PreparedMap, prepare_map
-from rover_planner.traction.input_monitor import InputWatch
-from rover_planner.traction.loops import LoopGains, PushLoop, StallWatch, limit_rate, rolling_rates
+from rover_planner.traction.input_monitor import InputMonitor
+from rover_planner.traction.loops import (
+    LoopGains,
+    PIController,
+    StallDetector,
+    limit_rate,
+    rolling_rates,
+)
 
 Floats = NDArray[np.float64]
 INPUTS = ("joint_states", "imu", "cmd_vel")
@@ -33,11 +39,11 @@ ODOMETRY = "odometry"
 OWN_PAYLOAD = -1.0
 """Value of the parameter payload that takes what the rover file has."""
 EQUAL, OPTIMAL = "equal", "optimal"
-MOST_PUSH = 0.6
+MAX_PUSH = 0.6
 """Largest push of the speed loop, in weights."""
 SERVO_STIFFNESS = 6.0
 """Gain of the servos that take over where the rover does not get on, in gains against slip."""
-LONGEST_STEP = 0.1
+MAX_STEP = 0.1
 """Longest time between two updates that loops and filter count [s]."""
 
 
@@ -116,8 +122,8 @@ class TractionService:
 
     def __init__(self, settings: TractionSettings):
         self._workspace = TractionWorkspace()
-        self._watch = InputWatch(INPUTS, settings.timeout)
-        self._odometry_watch = InputWatch((ODOMETRY,), settings.odometry_timeout)
+        self._watch = InputMonitor(INPUTS, settings.timeout)
+        self._odometry_watch = InputMonitor((ODOMETRY,), settings.odometry_timeout)
         self._positions = np.zeros(len(SUSPENSION_JOINTS))
         self._rates: Floats | None = None
         self._wheel_rates = np.zeros(len(WHEEL_JOINTS))
@@ -148,17 +154,17 @@ class TractionService:
         weight = self._writer.weight
         mass = weight / rover.gravity
         self._arm = rover.suspension.wheels["middle"][1]
-        most = MOST_PUSH * weight
-        self._speed = PushLoop(mass * gains.speed, mass * gains.travel, most)
+        most = MAX_PUSH * weight
+        self._speed = PIController(mass * gains.speed, mass * gains.travel, most)
         inertia = mass * self._arm**2
         heading = inertia * gains.heading
-        self._heading = PushLoop(heading, 0.5 * heading, most * self._arm)
+        self._heading = PIController(heading, 0.5 * heading, most * self._arm)
         if self._terrain is not None:
             self.take_terrain(self._terrain)
         self._let_go()
 
     @property
-    def watch(self) -> InputWatch:
+    def watch(self) -> InputMonitor:
         """Which inputs are there and fresh."""
         return self._watch
 
@@ -217,7 +223,7 @@ class TractionService:
         fault = self._watch.find_fault(now)
         if fault:
             return self.rest(fault, start)
-        duration = 0.0 if self._last_time is None else min(now - self._last_time, LONGEST_STEP)
+        duration = 0.0 if self._last_time is None else min(now - self._last_time, MAX_STEP)
         self._last_time = now
         estimate, warning = self._estimate_contacts(now, duration)
         state = self._measured_state(estimate)
@@ -244,7 +250,7 @@ class TractionService:
     def _let_go(self) -> None:
         self._speed.reset()
         self._heading.reset()
-        self._stall = StallWatch()
+        self._stall = StallDetector()
         self._last_time = None
         self._last: Floats | None = None
         self._limited = False
@@ -298,7 +304,7 @@ class TractionService:
         answer = solve_traction(
             self._workspace, rows, self._friction, settings.max_torque,
             settings.rover.wheel.radius, self._last,
-            most_programmes=2 if settings.policy == OPTIMAL else 0,
+            max_programs=2 if settings.policy == OPTIMAL else 0,
         )  # fmt: skip
         self._last = answer.tractions
         self._limited = answer.torque_slack > 0.0 or answer.friction_slack > 0.0

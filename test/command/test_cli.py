@@ -279,37 +279,37 @@ def test_help_is_exit_code_0(capfd):
 
 
 GRADE_SHAPES = {
-    "grade": (N,),
-    "grade_constraint": (N,),
-    "grade_wheel": (N,),
-    "grade_margin": (N,),
+    "traversability_class": (N,),
+    "class_constraint": (N,),
+    "class_wheel": (N,),
+    "class_margin": (N,),
     "torque_range": (N, 6, 2),
 }
 
 
-def test_grades_and_torque_ranges_are_added_on_demand(files):
-    assert main([*arguments(files), "--grade", "--torque-ranges"]) == 0
+def test_classes_and_torque_ranges_are_added_on_demand(files):
+    assert main([*arguments(files), "--classes", "--torque-ranges"]) == 0
     with np.load(files / "out.npz", allow_pickle=False) as out:
         assert {
             name: out[name].shape for name in out.files
         } == SHAPES | REPLAY_SHAPES | GRADE_SHAPES
-        assert set(out["grade"]) == {"passable"}
-        assert set(out["grade_constraint"]) <= {"friction", "torque", "wheel_lift"}
-        assert set(out["grade_wheel"]) <= set(WHEELS)
-        assert (out["grade_margin"] > 0.5).all()
+        assert set(out["traversability_class"]) == {"passable"}
+        assert set(out["class_constraint"]) <= {"friction", "torque", "wheel_lift"}
+        assert set(out["class_wheel"]) <= set(WHEELS)
+        assert (out["class_margin"] > 0.5).all()
         low, high = out["torque_range"][..., 0], out["torque_range"][..., 1]
         assert (low < 0.0).all() and (high > 0.0).all()
 
 
-def test_what_only_traction_control_passes_is_graded_so_under_either_policy(files):
+def test_what_only_traction_control_passes_is_classified_so_under_either_policy(files):
     rise = np.tile(0.45 * 0.05 * np.arange(120), (80, 1))
     save_terrain(files / "terrain.npz", Terrain(rise, 0.05, (0.0, 0.0)))
     for policy, traversable in (("equal", False), ("optimal", True)):
-        assert main([*arguments(files), "--grade", "--policy", policy]) == 0
+        assert main([*arguments(files), "--classes", "--policy", policy]) == 0
         with np.load(files / "out.npz") as out:
             assert bool(out["traversable"]) == traversable
-            assert set(out["grade"]) == {"passable with traction control"}
-            assert (out["grade_margin"] > 0.0).all()
+            assert set(out["traversability_class"]) == {"passable with traction control"}
+            assert (out["class_margin"] > 0.0).all()
 
 
 def test_on_soil_the_file_has_sinkage_and_resistance_too(files):

@@ -2,25 +2,10 @@
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, WrenchStamped
 
 from msg_adapters.errors import MessageError
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-
-
-def make_target(x=1.0, y=2.0, z=0.3, frame="map") -> PoseStamped:
-    target = PoseStamped()
-    target.header.frame_id = frame
-    target.pose.position.x, target.pose.position.y, target.pose.position.z = x, y, z
-    return target
-
-
-def make_wrench(force=(1.0, 2.0, 3.0), moment=(4.0, 5.0, 6.0), frame="map") -> WrenchStamped:
-    wrench = WrenchStamped()
-    wrench.header.frame_id = frame
-    for vector, values in ((wrench.wrench.force, force), (wrench.wrench.torque, moment)):
-        vector.x, vector.y, vector.z = values
-    return wrench
+from support.tool_messages import make_target, make_wrench
 
 
 def test_a_target_is_its_place():

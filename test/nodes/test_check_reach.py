@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from std_srvs.srv import Trigger
-from test_tools import make_target, make_wrench
 
 from rover_physics.traversability.reach import judge_reach
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain
 from support.ros_fixtures import call, wait_until
+from support.tool_messages import make_target, make_wrench
 
 SERVER = "/traverse_server"
 PATH = [[-1.0, 0.0, 0.0], [0.0, 0.0, 0.5]]

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 import rover_planner.ros.deferred_work
-from rover_planner.ros.deferred_work import MOST_WAITING, Afterwards
+from rover_planner.ros.deferred_work import MAX_WAITING, DeferredWork
 from support.ros_fixtures import TIMEOUT, call, wait_until
 
 
@@ -23,9 +23,9 @@ def busy(ros):
 def test_what_is_put_off_runs_answer_by_answer_and_only_when_the_node_spins(ros, busy):
     executor = SingleThreadedExecutor(context=ros.context)
     executor.add_node(busy)
-    afterwards, done = Afterwards(busy), []
+    deferred_work, done = DeferredWork(busy), []
     for answer in "abc":
-        afterwards.do(*(partial(done.append, f"{answer}{k}") for k in range(3)))
+        deferred_work.do(*(partial(done.append, f"{answer}{k}") for k in range(3)))
     assert done == []
     end = time.monotonic() + TIMEOUT
     while len(done) < 9 and time.monotonic() < end:
@@ -36,10 +36,10 @@ def test_what_is_put_off_runs_answer_by_answer_and_only_when_the_node_spins(ros,
 
 
 def test_the_answer_does_not_wait_for_the_work(ros, client, busy):
-    afterwards, answered, waited = Afterwards(busy), threading.Event(), []
+    deferred_work, answered, waited = DeferredWork(busy), threading.Event(), []
 
     def answer(_request, response):
-        afterwards.do(lambda: waited.append(answered.wait(TIMEOUT)))
+        deferred_work.do(lambda: waited.append(answered.wait(TIMEOUT)))
         return response
 
     busy.create_service(Trigger, "ask", answer)
@@ -50,7 +50,7 @@ def test_the_answer_does_not_wait_for_the_work(ros, client, busy):
 
 
 def test_a_request_goes_before_what_is_left_of_the_work(ros, client, busy):
-    afterwards, told, pieces = Afterwards(busy), [], 100
+    deferred_work, told, pieces = DeferredWork(busy), [], 100
 
     def work(k):
         time.sleep(0.01)
@@ -61,7 +61,7 @@ def test_a_request_goes_before_what_is_left_of_the_work(ros, client, busy):
             told.append("second")
         else:
             told.append("first")
-            afterwards.do(*(partial(work, k) for k in range(pieces)))
+            deferred_work.do(*(partial(work, k) for k in range(pieces)))
         return response
 
     busy.create_service(Trigger, "ask", answer)
@@ -79,12 +79,12 @@ def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(
     ros, client, busy, monkeypatch
 ):
     monkeypatch.setattr(rover_planner.ros.deferred_work, "QUIET", 1e3)  # no pause is long enough
-    afterwards, done, asked = Afterwards(busy), [], 3 * MOST_WAITING
+    deferred_work, done, asked = DeferredWork(busy), [], 3 * MAX_WAITING
 
     def answer(_request, response):
         response.message = str(len(done))
         number = next(numbers)
-        afterwards.do(partial(done.append, (number, 0)), partial(done.append, (number, 1)))
+        deferred_work.do(partial(done.append, (number, 0)), partial(done.append, (number, 1)))
         return response
 
     numbers = iter(range(asked))
@@ -93,16 +93,16 @@ def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(
     ask = client.create_client(Trigger, "ask")
     for k in range(asked):
         finished = int(call(ask, Trigger.Request()).message) // 2
-        assert finished == max(0, k - MOST_WAITING)
-    expected = [(k, piece) for k in range(asked - MOST_WAITING) for piece in (0, 1)]
+        assert finished == max(0, k - MAX_WAITING)
+    expected = [(k, piece) for k in range(asked - MAX_WAITING) for piece in (0, 1)]
     wait_until(lambda: done == expected, "the work of all but the last")
 
 
 def test_a_fault_leaves_the_rest_and_the_node(ros, client, busy):
-    afterwards, done = Afterwards(busy), []
-    afterwards.do(lambda: 1 / 0, lambda: done.append("the rest"))
-    afterwards.do(lambda: 1 / 0)
-    afterwards.do(lambda: done.append("the next"))
+    deferred_work, done = DeferredWork(busy), []
+    deferred_work.do(lambda: 1 / 0, lambda: done.append("the rest"))
+    deferred_work.do(lambda: 1 / 0)
+    deferred_work.do(lambda: done.append("the next"))
     ros.spin(busy)
     wait_until(lambda: done == ["the rest", "the next"], "the rest")
     assert ros.is_alive(busy)

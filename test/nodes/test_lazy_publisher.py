@@ -4,7 +4,7 @@ import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from rover_planner.ros.lazy_publisher import KeptTopic
+from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import wait_until
 
@@ -22,7 +22,7 @@ def listen(ros, name="listener"):
 
 def test_nobody_listens_so_nothing_is_made_and_the_latest_is_kept(ros):
     node, made = Node("speaker", context=ros.context), []
-    topic = KeptTopic(node, Int32, "numbers")
+    topic = LazyPublisher(node, Int32, "numbers")
     for number in range(3):
         topic.publish(lambda number=number: made.append(number) or Int32(data=number))
     assert made == [] and not topic.is_awaited
@@ -37,7 +37,7 @@ def test_nobody_listens_so_nothing_is_made_and_the_latest_is_kept(ros):
 
 def test_listeners_hear_all_in_order_and_late_ones_what_was_published(ros):
     node = Node("speaker", context=ros.context)
-    topic = KeptTopic(node, Int32, "numbers")
+    topic = LazyPublisher(node, Int32, "numbers")
     topic.publish(lambda: Int32(data=0))
     heard = listen(ros)
     wait_until(lambda: topic.is_awaited, "the listener")
@@ -51,7 +51,7 @@ def test_listeners_hear_all_in_order_and_late_ones_what_was_published(ros):
 
 def test_a_message_that_cannot_be_made_is_not_tried_again(ros):
     node = Node("speaker", context=ros.context)
-    topic = KeptTopic(node, Int32, "numbers")
+    topic = LazyPublisher(node, Int32, "numbers")
     topic.publish(lambda: 1 / 0)
     listen(ros)
     wait_until(lambda: topic.is_awaited, "the listener")

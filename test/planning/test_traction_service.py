@@ -7,8 +7,8 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.traction.input_monitor import InputWatch
-from rover_planner.traction.loops import PushLoop, StallWatch, limit_rate, rolling_rates
+from rover_planner.traction.input_monitor import InputMonitor
+from rover_planner.traction.loops import PIController, StallDetector, limit_rate, rolling_rates
 from rover_planner.traction.traction_service import TractionService, settings_from_parameters
 from support.rough_grounds import plane
 
@@ -194,7 +194,7 @@ def test_new_settings_are_taken_over_at_once():
 
 
 def test_a_watch_tells_what_is_missing_then_wrong_then_stale():
-    watch = InputWatch(("a", "b"), 0.1)
+    watch = InputMonitor(("a", "b"), 0.1)
     assert watch.find_fault(0.0) == "waiting for a, b"
     watch.take("a", 0.0)
     watch.refuse("b", "b is nan")
@@ -205,7 +205,7 @@ def test_a_watch_tells_what_is_missing_then_wrong_then_stale():
 
 
 def test_a_push_that_cannot_be_given_does_not_add_up():
-    free, held = PushLoop(1.0, 10.0, 5.0), PushLoop(1.0, 10.0, 5.0)
+    free, held = PIController(1.0, 10.0, 5.0), PIController(1.0, 10.0, 5.0)
     for k in range(100):
         free.update(0.1, 0.02, False)
         held.update(0.1, 0.02, k > 10)
@@ -237,7 +237,7 @@ def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():
 
 
 def test_servos_take_over_only_where_the_rover_does_not_get_on():
-    watch = StallWatch()
+    watch = StallDetector()
     assert watch.update(0.3, 0.3, 5.0) == 0.0
     assert watch.update(0.0, 0.3, 0.4) == 0.0
     for _ in range(20):

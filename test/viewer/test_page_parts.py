@@ -15,14 +15,14 @@ from rover_planner.viewer.scene.colours import PASSABLE, REFUSED, UNKNOWN, of_us
 from rover_planner.viewer.state.journey import Journey
 from rover_planner.viewer.state.layers import LAYERS
 from rover_planner.viewer.state.playback import FAST, Playback
-from rover_planner.viewer.state.visitor_requests import Wishes
+from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer_sessions import LSR1, session_on, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
 from rover_planner.viewer.scene.ground_mesh import draw_ground, hit_ground
-from rover_planner.viewer.scene.overlays import MOST_GHOSTS, choose_ghosts
+from rover_planner.viewer.scene.overlays import MAX_GHOSTS, choose_ghosts
 
 # Journeys.
 
@@ -111,11 +111,11 @@ def test_steps_go_from_waypoint_to_waypoint():
     assert seen == [2.0, 3.0, 3.0, 2.0, 1.0, 0.0, 0.0]
 
 
-# Wishes.
+# VisitorRequests.
 
 
 def test_a_later_wish_of_a_kind_replaces_the_earlier_one():
-    wishes, done = Wishes(), []
+    wishes, done = VisitorRequests(), []
     for number in range(5):
         wishes.ask(lambda number=number: done.append(number), "slider")
     wishes.ask(lambda: done.append("step"))
@@ -252,7 +252,7 @@ def test_the_history_of_a_live_rover_keeps_what_is_known_every_centimetre():
 def test_ghosts_stand_at_refused_waypoints_apart_from_each_other():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
     ghosts = choose_ghosts(LSR1, list(session.answer.candidates))
-    assert 0 < len(ghosts) <= MOST_GHOSTS
+    assert 0 < len(ghosts) <= MAX_GHOSTS
     places = np.array([candidate.poses[row, :2] for candidate, row in ghosts])
     assert all(candidate.verdict.reasons[row] for candidate, row in ghosts)
     away = np.linalg.norm(places[:, None] - places[None], axis=2)

@@ -13,7 +13,7 @@ from rover_planner.viewer.panel.charts import Charts
 from rover_planner.viewer.scene.ground_mesh import hit_ground
 from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.state.session import REFUSALS, ViewSession
-from rover_planner.viewer.state.visitor_requests import Wishes
+from rover_planner.viewer.state.visitor_requests import VisitorRequests
 
 FRAME = 0.04
 """Time between two pictures [s]."""
@@ -29,7 +29,7 @@ class PageBase(ABC):
         import viser
 
         self.session = session
-        self.wishes = Wishes()
+        self.wishes = VisitorRequests()
         self._ended = threading.Event()
         self.server = viser.ViserServer(host, port, label="rover_planner", verbose=False)
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)

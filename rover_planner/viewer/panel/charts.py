@@ -13,7 +13,7 @@ from rover_planner.viewer.scene.colours import REFUSED, SIDE_DASHES, css
 from rover_planner.viewer.scene.colours import WHEELS as WHEEL_COLOURS
 
 Floats = NDArray[np.float64]
-MOST_POINTS = 160
+MAX_POINTS = 160
 """Points of a curve that are sent to the page."""
 HEIGHT = 146
 """Height of a plot [px]; three of them fit on a laptop's screen."""
@@ -66,7 +66,7 @@ class Charts:
         self.curves = {}
         if len(distance) < 2:
             return
-        rows = np.unique(np.linspace(0, len(distance) - 1, MOST_POINTS).astype(int))
+        rows = np.unique(np.linspace(0, len(distance) - 1, MAX_POINTS).astype(int))
         for name, chart in CHARTS.items():
             curves = values[name][rows].reshape(len(rows), -1)
             self.curves[name] = distance[rows], np.minimum(curves, chart.highest)

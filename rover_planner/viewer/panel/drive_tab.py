@@ -8,7 +8,7 @@ from rover_planner.viewer.panel.board import draw_board, say_nothing_to_show
 from rover_planner.viewer.panel.controls import PLAY_BUTTONS, STEP_BUTTONS, Player, PlayerActions
 from rover_planner.viewer.state.journey import Frame, Journey
 from rover_planner.viewer.state.playback import Playback
-from rover_planner.viewer.state.visitor_requests import Wishes
+from rover_planner.viewer.state.visitor_requests import VisitorRequests
 
 HAND_OFF = 0.5
 """Time after a visitor's last word to the scrubber from which the page moves it again [s]."""
@@ -17,7 +17,7 @@ HAND_OFF = 0.5
 class DriveTab:
     """Everything that has to be on the screen without scrolling."""
 
-    def __init__(self, gui: Any, playback: Playback | None, wishes: Wishes):
+    def __init__(self, gui: Any, playback: Playback | None, wishes: VisitorRequests):
         """Add it to the container that is open; no player without a playback."""
         self._wishes = wishes
         self._times = Journey.empty_times()

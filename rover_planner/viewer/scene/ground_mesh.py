@@ -17,11 +17,11 @@ from rover_planner.viewer.scene.colours import ramp
 from rover_planner.viewer.state.layers import LAYERS, SLOPE, predict_layer, slope_of, span_of
 
 Floats = NDArray[np.float64]
-MOST_CELLS = 250
+MAX_CELLS = 250
 """Cells along a side beyond which only every second, third, ... is drawn."""
-MOST_SCORED = 100
+MAX_SCORED = 100
 """The same for places where the model is asked."""
-MOST_PIXELS = 1200
+MAX_PIXELS = 1200
 """Pixels along a side of the picture."""
 LIGHT = (-0.6, 0.5, 1.0)
 """Where light comes from on the picture."""
@@ -65,9 +65,9 @@ def draw_ground(
         RoverError: The model refuses an argument.
     """
     layer = LAYERS[layer_name]
-    x, y, heights = _thin_out(terrain, MOST_CELLS)
+    x, y, heights = _thin_out(terrain, MAX_CELLS)
     if layer.score is not None:
-        coarse_x, coarse_y, _ = _thin_out(terrain, MOST_SCORED)
+        coarse_x, coarse_y, _ = _thin_out(terrain, MAX_SCORED)
         at = (coarse_x, coarse_y)
         values = predict_layer(layer, rover, terrain, heading, at, arguments or {})
         low, high = span_of(layer, rover, values)
@@ -116,7 +116,7 @@ def _shade(colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats) ->
 
 def _picture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
     """Return a finer picture with thin lines every metre, for the sense of scale."""
-    factor = max(1, min(8, MOST_PIXELS // max(colours.shape[:2])))
+    factor = max(1, min(8, MAX_PIXELS // max(colours.shape[:2])))
     fine = ndimage.zoom(colours, (factor, factor, 1), order=1, mode="nearest", grid_mode=True)
     for axis, places in enumerate((y, x)):
         step = places[1] - places[0]

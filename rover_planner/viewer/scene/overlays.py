@@ -14,9 +14,9 @@ from rover_planner.viewer.scene.quaternions import of_attitude
 from rover_planner.viewer.scene.rover_figure import outline_mesh
 
 Floats = NDArray[np.float64]
-MOST_GHOSTS = 4
+MAX_GHOSTS = 4
 """Ghosts at a time; more hide what they point at."""
-MOST_POINTS = 250
+MAX_POINTS = 250
 """Points of a path that are drawn."""
 LABEL_WIDTH = 30
 """Letters in a line of a label."""
@@ -132,11 +132,11 @@ class PathOverlay:
 
 def _thin(count: int) -> NDArray[np.intp]:
     """Return rows of a path to draw, the first and the last among them."""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST_POINTS)).round().astype(np.intp))
+    return np.unique(np.linspace(0, count - 1, min(count, MAX_POINTS)).round().astype(np.intp))
 
 
 def choose_ghosts(rover: Rover, candidates: list[Candidate]) -> list[tuple[Candidate, int]]:
-    """Choose waypoints to show as ghosts: at most MOST_GHOSTS, one and a half wheelbases apart.
+    """Choose waypoints to show as ghosts: at most MAX_GHOSTS, one and a half wheelbases apart.
 
     Of each path the places come in order where a stretch of refused waypoints begins; the first
     failures of all paths come before what lies further along them.
@@ -155,7 +155,7 @@ def choose_ghosts(rover: Rover, candidates: list[Candidate]) -> list[tuple[Candi
     for candidate, row in [*first, *later]:
         here = candidate.poses[row, :2]
         taken = [np.hypot(*(one.poses[other, :2] - here)) for one, other in chosen]
-        if len(chosen) < MOST_GHOSTS and all(away >= apart for away in taken):
+        if len(chosen) < MAX_GHOSTS and all(away >= apart for away in taken):
             chosen.append((candidate, row))
     return chosen
 

@@ -11,7 +11,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
 
 Floats = NDArray[np.float64]
-MOST_SLIP = 0.95
+MAX_SLIP = 0.95
 """Slip at which a turning wheel is shown as turning no faster."""
 
 
@@ -84,7 +84,7 @@ class Journey:
         series["attitude"] = np.column_stack([prediction.roll[:n], prediction.pitch[:n], yaw])
         moves = np.linalg.norm(np.diff(prediction.wheel_centres[:n], axis=0), axis=2)
         rolled = (
-            moves / rover.wheel.radius / (1.0 - np.clip(series["slip_ratio"], 0, MOST_SLIP))[1:]
+            moves / rover.wheel.radius / (1.0 - np.clip(series["slip_ratio"], 0, MAX_SLIP))[1:]
         )
         series["spin"] = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
         series["speed"] = np.full(n, rover.nominal_speed)

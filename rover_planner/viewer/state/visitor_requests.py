@@ -6,7 +6,7 @@ from collections.abc import Callable
 Act = Callable[[], None]
 
 
-class Wishes:
+class VisitorRequests:
     """A queue in which a later wish of the same kind replaces an earlier one.
 
     While a slider is dragged the page is told dozens of values a second; only the last one that

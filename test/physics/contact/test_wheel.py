@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 from rover_physics.contact.contact_record import (
     EXACT,
     FULL,
+    IN_CONTACT,
     OFF_MAP,
     QUICK,
-    TOUCHING,
     UNKNOWN_GROUND,
-    new_touch,
+    new_contacts,
 )
-from rover_physics.contact.wheel import find_contact, find_touch
+from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.contact.wheel_samples import sample_wheel
 from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
@@ -35,26 +35,28 @@ class WheelOn:
 
     def __init__(self, ground: Terrain, centre, scope, roll=0.0, pitch=0.0, yaw=0.0):
         self.samples = sample_wheel(LSR1, ground.resolution)
-        self.placement, self.touch = new_record(PLACEMENT), new_touch()
+        self.placement, self.contacts = new_record(PLACEMENT), new_contacts()
         q = np.array([0.0, roll, pitch, 0.0, 0.0, 0.0])
         place(LINKAGE, 0.0, 0.0, yaw, q, self.placement)
         self.placement.centres[0] = centre
         self.ground = pack_ground(ground)
         record = self.ground.records[0]
         for step in (QUICK, scope):
-            self.status = find_touch(record, self.samples, self.placement, 0, step, self.touch)
+            self.status = find_contact(
+                record, self.samples, self.placement, 0, step, self.contacts
+            )
 
     @property
     def gap(self) -> float:
-        return self.touch.gap[0]
+        return self.contacts.gap[0]
 
     @property
     def angle(self) -> float:
-        return np.arctan2(self.touch.sine[0], self.touch.cosine[0])
+        return np.arctan2(self.contacts.sine[0], self.contacts.cosine[0])
 
     def share(self) -> "WheelOn":
         """Let the circles that are nearly as near share the load."""
-        find_contact(self.samples, self.placement, 0, self.touch)
+        blend_contact(self.samples, self.placement, 0, self.contacts)
         return self
 
 
@@ -79,14 +81,14 @@ def dense_gap(ground, centre, roll, pitch, yaw, laterals) -> float:
 @pytest.mark.parametrize("height", [0.05, 0.10, 0.30])
 def test_over_level_ground_the_gap_is_the_height_less_the_radius(scope, height):
     wheel = WheelOn(plane(0.0, 0.0, height=0.4), [0.013, -0.007, 0.4 + height], scope)
-    assert wheel.status == TOUCHING
+    assert wheel.status == IN_CONTACT
     assert wheel.gap == pytest.approx(height - RADIUS, abs=1e-12)
     assert wheel.angle == pytest.approx(0.0, abs=1e-6)
 
 
 def test_on_level_ground_an_upright_wheel_touches_in_its_middle():
     wheel = WheelOn(plane(0.0, 0.0), [0.013, -0.007, RADIUS], FULL, yaw=0.6).share()
-    assert wheel.touch.point[0] == pytest.approx([0.013, -0.007, 0.0], abs=1e-9)
+    assert wheel.contacts.point[0] == pytest.approx([0.013, -0.007, 0.0], abs=1e-9)
 
 
 @few
@@ -99,7 +101,7 @@ def test_on_a_plane_the_contact_angle_is_the_slope_along_the_heading(slope, yaw)
     assert attitude.apply([0.0, 0.0, 1.0]) == pytest.approx(normal)
     wheel = WheelOn(plane(slope, 0.0), normal * RADIUS, FULL, -cross, -along, yaw).share()
     assert wheel.gap == pytest.approx(0.0, abs=1e-8)
-    assert wheel.touch.point[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    assert wheel.contacts.point[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     below = attitude.as_matrix()[:, 1]
     ahead = np.cross(below, [0.0, 0.0, 1.0])
     assert np.sin(wheel.angle) == pytest.approx(-normal @ ahead / np.linalg.norm(ahead), abs=1e-6)
@@ -117,7 +119,7 @@ def test_a_leaning_wheel_stands_on_its_lower_edge(roll, side):
     lowest = RADIUS * np.cos(roll) + 0.5 * WIDTH * np.sin(abs(roll))
     assert wheel.gap == pytest.approx(0.2 - lowest, abs=1e-9)
     across = RADIUS * np.sin(roll) + side * 0.5 * WIDTH * np.cos(roll)
-    assert wheel.touch.point[0, 1] == pytest.approx(across, abs=1e-9)
+    assert wheel.contacts.point[0, 1] == pytest.approx(across, abs=1e-9)
 
 
 def block(height: float) -> Terrain:
@@ -173,7 +175,7 @@ def test_the_touching_point_is_on_the_rim_and_in_the_gap_to_a_tenth_of_a_millime
 ):
     ground = fractal(seed)
     wheel = WheelOn(ground, [0.1, 0.2, 0.5], FULL, roll, 0.0, yaw)
-    point, axis = wheel.touch.point[0], wheel.placement.R[:, 1]
+    point, axis = wheel.contacts.point[0], wheel.placement.R[:, 1]
     arm = point - [0.1, 0.2, 0.5]
     assert np.linalg.norm(arm - (arm @ axis) * axis) == pytest.approx(RADIUS, abs=1e-12)
     assert abs(arm @ axis) <= 0.5 * WIDTH + 1e-12
@@ -187,7 +189,7 @@ def test_the_normal_says_how_the_gap_changes_sideways(seed, step):
     ground = smooth(seed)
     here = WheelOn(ground, [0.1, 0.2, 0.3], FULL)
     there = WheelOn(ground, [0.1 + step, 0.2, 0.3], FULL)
-    assert there.gap - here.gap == pytest.approx(here.touch.normal[0, 0] * step, abs=5e-6)
+    assert there.gap - here.gap == pytest.approx(here.contacts.normal[0, 0] * step, abs=5e-6)
 
 
 @pytest.mark.parametrize("scope", [FULL, EXACT])
@@ -197,7 +199,7 @@ def test_unknown_ground_and_the_map_edge_are_told_apart(scope):
     heights[:, heights.shape[1] // 2 + 10] = np.nan
     holed = Terrain(heights, ground.resolution, ground.origin)
     edge = ground.bounds[1]
-    assert WheelOn(holed, [0.0, 0.0, 0.1], scope).status == TOUCHING
+    assert WheelOn(holed, [0.0, 0.0, 0.1], scope).status == IN_CONTACT
     assert WheelOn(holed, [10 * RESOLUTION - 0.12, 0.0, 0.1], scope).status == UNKNOWN_GROUND
     assert WheelOn(holed, [10 * RESOLUTION, 0.0, 0.1], scope).status == UNKNOWN_GROUND
     assert WheelOn(ground, [edge - 0.09, 0.0, 0.1], scope).status == OFF_MAP

@@ -253,9 +253,9 @@ def load_changes(rover: Rover, torques: list[float]) -> np.ndarray:
     work, q = new_work(), np.zeros(6)
     place(linkage, 0.0, 0.0, 0.0, q, work.placement)
     place_masses(linkage, q, work.placement)
-    work.touch.sine[:], work.touch.cosine[:] = 0.0, 1.0
-    work.touch.point[:] = work.placement.centres - [0.0, 0.0, rover.wheel.radius]
-    assert balance_forces(linkage, work.placement, work.touch, 6, work.balance)
+    work.contacts.sine[:], work.contacts.cosine[:] = 0.0, 1.0
+    work.contacts.point[:] = work.placement.centres - [0.0, 0.0, rover.wheel.radius]
+    assert balance_forces(linkage, work.placement, work.contacts, 6, work.balance)
     pulls = np.array(torques * 2) / rover.wheel.radius
     relative = pulls[:5] - pulls[5]
     assert work.balance.tangential[:, 1:6] @ relative == pytest.approx(pulls, abs=1e-9)

@@ -13,7 +13,7 @@ from rover_physics.forces.soil import (
     EXPONENT,
     K_C,
     K_PHI,
-    LEAST_FRICTION,
+    MIN_FRICTION,
     SHEAR_MODULUS,
     TAN_PHI,
     contact_length,
@@ -147,7 +147,7 @@ def test_slip_rises_with_the_pull_needed(name, wheel, N, share, more):
 def test_forces_within_the_effective_friction_are_within_the_strength(name, wheel, N, t, s):
     soil, (r, b) = packed(name), wheel
     friction = effective_friction(soil, MU, r, b, N)
-    assume(friction > LEAST_FRICTION)
+    assume(friction > MIN_FRICTION)
     T, S = t * friction * N, s * friction * N
     result = solve_wheel(soil, MU, r, b, N, T, S)
     circle = math.hypot(t, s)
@@ -290,7 +290,7 @@ def test_a_wheel_sunk_to_its_axle_gives_no_pull():
     assert not is_sinkage_moderate(result[SINKAGE], 0.1)
     assert result[LARGEST] == -result[RESISTANCE] < 0.0
     assert result[SLIP] == 1.0 and result[UTILISATION] == np.inf
-    assert effective_friction(soil, MU, 0.1, 0.08, 2000.0) == LEAST_FRICTION
+    assert effective_friction(soil, MU, 0.1, 0.08, 2000.0) == MIN_FRICTION
 
 
 def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged():
@@ -318,7 +318,7 @@ def test_a_lifted_wheel_has_no_grip(name, N):
     assert (slip, sinkage, resistance, largest) == (1.0, 0.0, 0.0, 0.0)
     assert (torque, utilisation) == (0.2, np.inf)
     if name is not None:
-        assert effective_friction(soil, MU, 0.1, 0.08, N) == LEAST_FRICTION
+        assert effective_friction(soil, MU, 0.1, 0.08, N) == MIN_FRICTION
 
 
 @pytest.mark.parametrize("name", RIGID)

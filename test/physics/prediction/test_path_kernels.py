@@ -7,7 +7,7 @@ from rover_physics.contact.settling import NOT_SETTLED, OFF_MAP, SETTLED
 from rover_physics.prediction.evaluation import new_results
 from rover_physics.prediction.path_kernels import add_up, divide_stretches, find_jumps, sort_pieces
 
-HEIGHT_JUMP, SHORTEST = 0.025, 1e-4
+HEIGHT_JUMP, MIN_SPACING = 0.025, 1e-4
 
 
 def results_with(contact_angles, statuses=SETTLED, heights=0.0):
@@ -39,7 +39,7 @@ def sorted_pieces(results, xs, pieces=4):
     """Return open and closed pieces of one stretch: its ends, then the rows between them."""
     spare = np.empty((2, pieces, 2), np.int64)
     n_open, n_closed = sort_pieces(
-        np.array([[0, 1]]), pieces, results, along_x(xs), HEIGHT_JUMP, SHORTEST, *spare
+        np.array([[0, 1]]), pieces, results, along_x(xs), HEIGHT_JUMP, MIN_SPACING, *spare
     )
     return spare[0, :n_open].tolist(), spare[1, :n_closed].tolist()
 

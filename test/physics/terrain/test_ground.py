@@ -18,6 +18,6 @@ def test_blocks_hold_the_highest_ground(shape):
         for j in range(-(-shape[1] // BLOCK)):
             block = elevation[i * BLOCK : (i + 1) * BLOCK, j * BLOCK : (j + 1) * BLOCK]
             unknown = np.isnan(block)
-            assert packed.roof[i, j] == (np.inf if unknown.any() else block.max())
-            assert packed.ceiling[i, j] == block[~unknown].max(initial=-np.inf)
-    assert packed.roof.shape == packed.ceiling.shape == (i + 1, j + 1)
+            assert packed.block_max[i, j] == (np.inf if unknown.any() else block.max())
+            assert packed.known_block_max[i, j] == block[~unknown].max(initial=-np.inf)
+    assert packed.block_max.shape == packed.known_block_max.shape == (i + 1, j + 1)

@@ -3,7 +3,7 @@
 import pytest
 
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.traversability_class import grade_path
+from rover_physics.traversability.classification import classify_path
 from support.reference_drives import drive_ground, drive_path, unlimited
 
 pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
@@ -16,8 +16,11 @@ STEP = Obstacle("step", 0.10, 0.5)
 def test_the_planner_calls_the_step_passable_only_with_traction_control():
     rover = unlimited(load_rover("lsr1"))
     ground = drive_ground(STEP.kind, STEP.size)
-    grades = [grade.grade for grade in grade_path(rover, ground, drive_path(), friction=0.5)]
-    assert "passable with traction control" in grades and "impassable" not in grades
+    classes = [
+        waypoint.traversability_class
+        for waypoint in classify_path(rover, ground, drive_path(), friction=0.5)
+    ]
+    assert "passable with traction control" in classes and "impassable" not in classes
 
 
 @pytest.mark.parametrize(("controller", "passes"), [(EQUAL, False), (MAP, True)])

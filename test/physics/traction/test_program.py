@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_torques import can_stand
 
 from rover_physics.errors import ModelError
 from rover_physics.prediction.sweep import sweep_path
@@ -19,6 +18,7 @@ from rover_physics.traction.program import (
     build_traction_qp,
 )
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
+from support.best_torques import can_stand
 from support.rough_grounds import plane
 from support.rover_geometry import balance_matrix
 from support.traction_states import rough_states, state_of
@@ -31,12 +31,12 @@ def level(angles=(0.0,) * 6):
     return MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.array(angles))
 
 
-def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programmes=12, **more):
+def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **more):
     rows = BalanceWriter(rover).write(state, net)
     wheel = rover.wheel
     return solve_traction(
         more.pop("workspace", None) or TractionWorkspace(), rows, friction,
-        torque or wheel.max_torque, wheel.radius, most_programmes=programmes, **more,
+        torque or wheel.max_torque, wheel.radius, max_programs=programs, **more,
     )  # fmt: skip
 
 
@@ -59,7 +59,7 @@ def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_opti
         rows = writer.write(state_of(prediction, i), 0.0)
         answer = solve_traction(
             workspace, rows, FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius,
-            most_programmes=12,
+            max_programs=12,
         )  # fmt: skip
         assert not answer.fallback and answer.load_slack == answer.torque_slack == 0.0
         A, b, along = balance_matrix(LSR1, prediction, i)
@@ -182,9 +182,7 @@ def test_the_peak_never_rises_from_one_programme_to_the_next():
         rows = writer.write(state_of(prediction, i), 0.0)
         last, peak = None, measure_peak(rows, FRICTION, rows.complete(np.zeros(6)))
         for _ in range(6):
-            answer = solve_traction(
-                workspace, rows, FRICTION, 2.0, 0.1, last=last, most_programmes=1
-            )
+            answer = solve_traction(workspace, rows, FRICTION, 2.0, 0.1, last=last, max_programs=1)
             assert not answer.fallback
             assert answer.utilisation.max() <= peak * (1.0 + 1e-3)
             last, peak = answer.tractions, answer.utilisation.max()
@@ -218,14 +216,14 @@ def test_limits_of_torque_turn_to_wheels_with_torque_left():
 
 def test_an_unsolved_programme_falls_back_to_equal_torques_and_says_so():
     prediction, i = next(rough_states(LSR1, 1))
-    answer = solve(LSR1, state_of(prediction, i), workspace=TractionWorkspace(most_iterations=1))
-    assert answer.fallback and answer.programmes == 0 and answer.status != "solved"
+    answer = solve(LSR1, state_of(prediction, i), workspace=TractionWorkspace(max_iterations=1))
+    assert answer.fallback and answer.programs == 0 and answer.status != "solved"
     assert answer.torques == pytest.approx(prediction.torque[i], abs=1e-9)
 
 
 def test_equal_torques_on_demand_are_no_fallback():
     prediction, i = next(rough_states(LSR1, 1))
-    answer = solve(LSR1, state_of(prediction, i), programmes=0)
+    answer = solve(LSR1, state_of(prediction, i), programs=0)
     assert not answer.fallback and np.ptp(answer.torques) < 1e-12
 
 
@@ -234,7 +232,7 @@ def test_a_start_from_the_last_answer_takes_less():
     prediction, i = next(rough_states(LSR1, 1))
     cold = solve(LSR1, state_of(prediction, i), workspace=workspace)
     warm = solve(LSR1, state_of(prediction, i), workspace=workspace, last=cold.tractions)
-    assert warm.programmes == 1 and warm.iterations < 0.5 * cold.iterations
+    assert warm.programs == 1 and warm.iterations < 0.5 * cold.iterations
     assert warm.utilisation.max() == pytest.approx(cold.utilisation.max(), rel=5e-3)
 
 

@@ -1,4 +1,4 @@
-"""Torque ranges: as wide as linear programmes of their own find them, and consistent."""
+"""Torque ranges: as wide as linear programs of their own find them, and consistent."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ few = settings(max_examples=15, deadline=None)
 
 
 def range_by_programme(prediction, i, wheel, max_torque, inside: bool) -> np.ndarray:
-    """Return the range [N m] of a wheel's torque by linear programmes in N, T, s0, s1.
+    """Return the range [N m] of a wheel's torque by linear programs in N, T, s0, s1.
 
     The friction cones are replaced by pyramids around them or inside them.
     """

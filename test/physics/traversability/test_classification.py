@@ -1,4 +1,4 @@
-"""Grades: passable, passable with traction control, impassable, and what decides it."""
+"""Classes: passable, passable with traction control, impassable, and what decides it."""
 
 from dataclasses import replace
 
@@ -9,17 +9,17 @@ from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability import traversability_class as grades_module
-from rover_physics.traversability.judge_path import judge_path
-from rover_physics.traversability.traversability_class import (
+from rover_physics.traversability import classification
+from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
     WHEEL_CONSTRAINTS,
     WITH_TRACTION_CONTROL,
+    classify_judged,
+    classify_path,
     deciding_waypoint,
-    grade_judged,
-    grade_path,
 )
+from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.verdict import judge
 from support.rough_grounds import plane, random_poses, rocky
 
@@ -28,21 +28,21 @@ POSE = [[0.0, 0.0, 0.0]]
 
 
 @pytest.mark.parametrize(
-    ("slope", "friction", "grade"),
+    ("slope", "friction", "traversability_class"),
     [
         (0.2, 0.8, PASSABLE),
         (0.45, 0.8, WITH_TRACTION_CONTROL),
         (0.45, 0.4, IMPASSABLE),
     ],
 )
-def test_a_slope_is_graded_by_what_it_needs(slope, friction, grade):
-    found = grade_path(LSR1, plane(slope, 0.0), POSE, friction=friction)[0]
-    assert found.grade == grade
-    assert (found.reason == "") == (grade == PASSABLE)
+def test_a_slope_is_classified_by_what_it_needs(slope, friction, traversability_class):
+    found = classify_path(LSR1, plane(slope, 0.0), POSE, friction=friction)[0]
+    assert found.traversability_class == traversability_class
+    assert (found.reason == "") == (traversability_class == PASSABLE)
 
 
 def test_a_passable_waypoint_names_its_tightest_constraint():
-    found = grade_path(LSR1, plane(0.2, 0.0), POSE)[0]
+    found = classify_path(LSR1, plane(0.2, 0.0), POSE)[0]
     equal = sweep_path(LSR1, plane(0.2, 0.0), POSE)
     used = equal.friction_utilisation[0]
     assert found.constraint == "friction"
@@ -52,7 +52,7 @@ def test_a_passable_waypoint_names_its_tightest_constraint():
 
 
 def test_with_traction_control_the_margin_is_that_of_optimal_torques():
-    found = grade_path(LSR1, plane(0.45, 0.0), POSE)[0]
+    found = classify_path(LSR1, plane(0.45, 0.0), POSE)[0]
     optimal = sweep_path(LSR1, plane(0.45, 0.0), POSE, policy="optimal")
     assert found.policy == "optimal"
     assert found.margin == pytest.approx(1.0 - optimal.friction_utilisation[0].max())
@@ -61,47 +61,47 @@ def test_with_traction_control_the_margin_is_that_of_optimal_torques():
 
 
 def test_weak_motors_make_torque_the_constraint():
-    found = grade_path(LSR1, plane(0.45, 0.0), POSE, friction=5.0, max_torque=0.3)[0]
-    assert (found.grade, found.constraint) == (IMPASSABLE, "torque")
+    found = classify_path(LSR1, plane(0.45, 0.0), POSE, friction=5.0, max_torque=0.3)[0]
+    assert (found.traversability_class, found.constraint) == (IMPASSABLE, "torque")
     assert found.margin < 0.0
     assert found.wheel in WHEELS
 
 
 def test_limits_that_are_no_wheels_name_no_wheel():
     careful = replace(LSR1, limits=replace(LSR1.limits, tilt=0.1))
-    found = grade_path(careful, plane(0.2, 0.0), POSE)[0]
-    assert (found.grade, found.constraint, found.wheel) == (IMPASSABLE, "tilt", "")
+    found = classify_path(careful, plane(0.2, 0.0), POSE)[0]
+    assert (found.traversability_class, found.constraint, found.wheel) == (IMPASSABLE, "tilt", "")
     assert found.margin == pytest.approx(1.0 - np.arctan(0.2) / 0.1, abs=1e-3)
 
 
 def test_a_waypoint_off_the_map_has_no_margin():
-    found = grade_path(LSR1, plane(0.0, 0.0), [[50.0, 0.0, 0.0]])[0]
-    assert (found.grade, found.constraint) == (IMPASSABLE, "off_map")
+    found = classify_path(LSR1, plane(0.0, 0.0), [[50.0, 0.0, 0.0]])[0]
+    assert (found.traversability_class, found.constraint) == (IMPASSABLE, "off_map")
     assert np.isnan(found.margin)
 
 
-def test_grades_agree_with_the_verdicts_of_both_policies():
+def test_classes_agree_with_the_verdicts_of_both_policies():
     ground, poses = rocky(3), random_poses(3, 60, 1.8)
-    grades = grade_path(LSR1, ground, poses, friction=0.22)
+    classes = classify_path(LSR1, ground, poses, friction=0.22)
     equal, optimal = (
         judge(LSR1, sweep_path(LSR1, ground, poses, friction=0.22, policy=policy))
         for policy in ("equal", "optimal")
     )
     seen = set()
-    for grade, one, other in zip(grades, equal.codes, optimal.codes, strict=True):
-        seen.add(grade.grade)
+    for waypoint, one, other in zip(classes, equal.codes, optimal.codes, strict=True):
+        seen.add(waypoint.traversability_class)
         expected = IMPASSABLE
         if not one:
             expected = PASSABLE
         elif not other:
             expected = WITH_TRACTION_CONTROL
-        assert grade.grade == expected
+        assert waypoint.traversability_class == expected
         if expected == IMPASSABLE:
-            assert grade.constraint == other
-            assert not grade.margin > 0.0
+            assert waypoint.constraint == other
+            assert not waypoint.margin > 0.0
         else:
-            assert grade.constraint in WHEEL_CONSTRAINTS
-            assert grade.margin >= -1e-9
+            assert waypoint.constraint in WHEEL_CONSTRAINTS
+            assert waypoint.margin >= -1e-9
     assert len(seen) == 3
 
 
@@ -110,12 +110,14 @@ def test_what_breaks_on_the_way_counts_at_the_waypoint_that_follows():
     ground = plane(0.0, 0.0)
     step = replace(ground, elevation=np.where(ground.elevation + xs(ground) > 0.6, 0.12, 0.0))
     poses = np.column_stack([x[15:60], np.zeros(45), np.zeros(45)])
-    grades = grade_path(LSR1, step, poses)
+    classes = classify_path(LSR1, step, poses)
     optimal = judge(LSR1, sweep_path(LSR1, step, poses, policy="optimal"))
-    for grade, reason in zip(grades, optimal.reasons, strict=True):
-        if grade.grade == IMPASSABLE:
-            assert grade.reason == reason
-    assert any(grade.grade == IMPASSABLE for grade in grades) == (not optimal.traversable)
+    for waypoint, reason in zip(classes, optimal.reasons, strict=True):
+        if waypoint.traversability_class == IMPASSABLE:
+            assert waypoint.reason == reason
+    assert any(waypoint.traversability_class == IMPASSABLE for waypoint in classes) == (
+        not optimal.traversable
+    )
 
 
 def xs(ground) -> np.ndarray:
@@ -125,35 +127,35 @@ def xs(ground) -> np.ndarray:
 def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
     ground, poses = crater(), way_into_the_crater()
     verdict = judge_path(LSR1, ground, poses, policy="optimal", soil="dry_sand")[1]
-    grades = grade_path(LSR1, ground, poses, soil="dry_sand")
+    classes = classify_path(LSR1, ground, poses, soil="dry_sand")
     assert verdict.code == "trapped"
-    deciding = deciding_waypoint(grades)
+    deciding = deciding_waypoint(classes)
     assert deciding == verdict.first_failure
-    assert grades[deciding].grade == IMPASSABLE
-    assert (grades[deciding].constraint, grades[deciding].wheel) == ("trapped", "")
-    assert grades[deciding].reason == verdict.reason
-    assert np.isnan(grades[deciding].margin)
+    assert classes[deciding].traversability_class == IMPASSABLE
+    assert (classes[deciding].constraint, classes[deciding].wheel) == ("trapped", "")
+    assert classes[deciding].reason == verdict.reason
+    assert np.isnan(classes[deciding].margin)
 
 
 @pytest.mark.parametrize(("slope", "friction"), [(0.2, 0.8), (0.45, 0.8), (0.45, 0.4)])
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_grades_do_not_depend_on_the_policy_that_was_judged_first(slope, friction, policy):
+def test_classes_do_not_depend_on_the_policy_that_was_judged_first(slope, friction, policy):
     ground = plane(slope, 0.0)
     judged = judge_path(LSR1, ground, POSE, policy=policy, friction=friction)
-    found = grade_judged(LSR1, ground, *judged, friction=friction)
-    assert found == grade_path(LSR1, ground, POSE, friction=friction)
+    found = classify_judged(LSR1, ground, *judged, friction=friction)
+    assert found == classify_path(LSR1, ground, POSE, friction=friction)
 
 
 def test_what_equal_torques_pass_is_not_asked_about_again(monkeypatch):
     asked = []
     monkeypatch.setattr(
-        grades_module,
+        classification,
         "judge_path",
         lambda *a, **k: asked.append(k["policy"]) or judge_path(*a, **k),
     )
-    grade_path(LSR1, plane(0.2, 0.0), POSE)
+    classify_path(LSR1, plane(0.2, 0.0), POSE)
     assert asked == ["equal"]
-    grade_path(LSR1, plane(0.45, 0.0), POSE)
+    classify_path(LSR1, plane(0.45, 0.0), POSE)
     assert asked == ["equal", "equal", "optimal"]
 
 
@@ -162,11 +164,11 @@ def test_a_path_hangs_on_its_worst_waypoint():
     level = plane(0.0, 0.0)
     height = 0.08 * np.clip(xs(level) + 1.2, 0.0, None) ** 2
     rising = replace(level, elevation=level.elevation + height)
-    grades = grade_path(LSR1, rising, poses)
-    assert {grade.grade for grade in grades} == {PASSABLE}
-    margins = [grade.margin for grade in grades]
-    assert deciding_waypoint(grades) == int(np.argmin(margins)) == 3
-    refused = grade_path(LSR1, rising, [*poses, [50.0, 0.0, 0.0], [60.0, 0.0, 0.0]])
+    classes = classify_path(LSR1, rising, poses)
+    assert {waypoint.traversability_class for waypoint in classes} == {PASSABLE}
+    margins = [waypoint.margin for waypoint in classes]
+    assert deciding_waypoint(classes) == int(np.argmin(margins)) == 3
+    refused = classify_path(LSR1, rising, [*poses, [50.0, 0.0, 0.0], [60.0, 0.0, 0.0]])
     assert deciding_waypoint(refused) == 4
 
 

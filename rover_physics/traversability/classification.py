@@ -18,17 +18,17 @@ from rover_physics.traversability.verdict import Verdict, find_reasons
 PASSABLE = "passable"
 WITH_TRACTION_CONTROL = "passable with traction control"
 IMPASSABLE = "impassable"
-GRADES = (PASSABLE, WITH_TRACTION_CONTROL, IMPASSABLE)
-"""The grades, from best to worst."""
+TRAVERSABILITY_CLASSES = (PASSABLE, WITH_TRACTION_CONTROL, IMPASSABLE)
+"""The classes, from best to worst."""
 WHEEL_CONSTRAINTS = ("wheel_lift", "friction", "torque")
 """The paper's three constraints, by their codes in a verdict."""
 
 
 @dataclass(frozen=True)
-class Grade:
+class ClassifiedWaypoint:
     """How passable one waypoint is, with the way to it, and what decides that."""
 
-    grade: str
+    traversability_class: str
     """PASSABLE, WITH_TRACTION_CONTROL or IMPASSABLE."""
     policy: str
     """Torque policy that the rest is about: "equal" where passable, else "optimal"."""
@@ -42,10 +42,10 @@ class Grade:
     """Why the waypoint is impassable, or why equal torques do not do; empty where passable."""
 
 
-def grade_path(
+def classify_path(
     rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: Any
-) -> tuple[Grade, ...]:
-    """Grade each waypoint of a path by what both torque policies make of it.
+) -> tuple[ClassifiedWaypoint, ...]:
+    """ClassifiedWaypoint each waypoint of a path by what both torque policies make of it.
 
     Args:
         rover: The rover.
@@ -54,24 +54,24 @@ def grade_path(
         arguments: Further arguments of `judge_path`, except `policy`.
 
     Returns:
-        A grade per waypoint; a limit broken on the way to a waypoint counts there, and so does
+        A class per waypoint; a limit broken on the way to a waypoint counts there, and so does
         that the rover would be trapped.
 
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
     """
     equal = judge_path(rover, terrain, poses, policy="equal", **arguments)
-    return grade_judged(rover, terrain, *equal, **arguments)
+    return classify_judged(rover, terrain, *equal, **arguments)
 
 
-def grade_judged(
+def classify_judged(
     rover: Rover,
     terrain: Terrain,
     prediction: PathPrediction,
     verdict: Verdict,
     **arguments: Any,
-) -> tuple[Grade, ...]:
-    """Grade each waypoint of a path that `judge_path` has judged under one policy.
+) -> tuple[ClassifiedWaypoint, ...]:
+    """ClassifiedWaypoint each waypoint of a path that `judge_path` has judged under one policy.
 
     The other policy is asked only where it matters: nothing that equal torques pass needs others.
 
@@ -95,20 +95,26 @@ def grade_judged(
             break
     equal = _decide(rover, *judged["equal"])
     optimal = _decide(rover, *judged["optimal"]) if "optimal" in judged else equal
-    return tuple(_grade(one, other) for one, other in zip(equal, optimal, strict=True))
+    return tuple(_classify(one, other) for one, other in zip(equal, optimal, strict=True))
 
 
-def deciding_waypoint(grades: Sequence[Grade]) -> int:
-    """Return the index of the waypoint that the grade of a whole path hangs on.
+def deciding_waypoint(classes: Sequence[ClassifiedWaypoint]) -> int:
+    """Return the index of the waypoint that the class of a whole path hangs on.
 
-    Of the waypoints with the worst grade it is the first where that is IMPASSABLE, else the one
+    Of the waypoints with the worst class it is the first where that is IMPASSABLE, else the one
     with the least margin.
     """
-    worst = max(GRADES.index(grade.grade) for grade in grades)
-    among = [i for i, grade in enumerate(grades) if GRADES.index(grade.grade) == worst]
-    if worst == GRADES.index(IMPASSABLE):
+    worst = max(
+        TRAVERSABILITY_CLASSES.index(waypoint.traversability_class) for waypoint in classes
+    )
+    among = [
+        i
+        for i, waypoint in enumerate(classes)
+        if TRAVERSABILITY_CLASSES.index(waypoint.traversability_class) == worst
+    ]
+    if worst == TRAVERSABILITY_CLASSES.index(IMPASSABLE):
         return among[0]
-    margins = np.array([grades[i].margin for i in among])
+    margins = np.array([classes[i].margin for i in among])
     return among[int(np.argmin(np.where(np.isnan(margins), np.inf, margins)))]
 
 
@@ -125,16 +131,28 @@ _NOTHING_ASKED = _Decision("", -1, float("nan"), "")
 """Where a wheel rolls off an edge none of WHEEL_CONSTRAINTS counts: see UNNEEDED_IN_A_FALL."""
 
 
-def _grade(equal: _Decision, optimal: _Decision) -> Grade:
-    """Return the grade of a waypoint from what decides about it under either policy."""
+def _classify(equal: _Decision, optimal: _Decision) -> ClassifiedWaypoint:
+    """Return the class of a waypoint from what decides about it under either policy."""
     if not equal.reason:
-        grade, policy, decision, reason = PASSABLE, "equal", equal, ""
+        traversability_class, policy, decision, reason = PASSABLE, "equal", equal, ""
     elif not optimal.reason:
-        grade, policy, decision, reason = WITH_TRACTION_CONTROL, "optimal", optimal, equal.reason
+        traversability_class, policy, decision, reason = (
+            WITH_TRACTION_CONTROL,
+            "optimal",
+            optimal,
+            equal.reason,
+        )
     else:
-        grade, policy, decision, reason = IMPASSABLE, "optimal", optimal, optimal.reason
+        traversability_class, policy, decision, reason = (
+            IMPASSABLE,
+            "optimal",
+            optimal,
+            optimal.reason,
+        )
     wheel = WHEELS[decision.wheel] if decision.wheel >= 0 else ""
-    return Grade(grade, policy, decision.constraint, wheel, decision.margin, reason)
+    return ClassifiedWaypoint(
+        traversability_class, policy, decision.constraint, wheel, decision.margin, reason
+    )
 
 
 def _decide(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> list[_Decision]:

@@ -1,4 +1,4 @@
-"""The traverse server grades paths, whichever policy it assumes; soil and payload count."""
+"""The traverse server classes paths, whichever policy it assumes; soil and payload count."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 
 from msg_adapters.markers import WITH_TRACTION_CONTROL as AMBER
 from rover_physics.names import WHEELS
-from rover_physics.traversability.traversability_class import (
+from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
     WITH_TRACTION_CONTROL,
@@ -36,11 +36,11 @@ def test_traction_control_is_named_whichever_policy_is_assumed(
     assert client.set_parameter("policy", policy)[0]
     verdict = check(client, server)
     assert verdict["traversable"] == traversable and verdict["policy"] == policy
-    assert verdict["grade"] == WITH_TRACTION_CONTROL
-    assert verdict["grade_constraint"] == "friction" and verdict["grade_wheel"] in WHEELS
-    assert 0.0 < verdict["grade_margin"] < 1.0
+    assert verdict["traversability_class"] == WITH_TRACTION_CONTROL
+    assert verdict["class_constraint"] == "friction" and verdict["class_wheel"] in WHEELS
+    assert 0.0 < verdict["class_margin"] < 1.0
     assert {len(verdict[key]) for key in PER_WAYPOINT} == {verdict["waypoints"]}
-    assert set(verdict["grades"]) == {WITH_TRACTION_CONTROL}
+    assert set(verdict["traversability_classes"]) == {WITH_TRACTION_CONTROL}
 
 
 def test_a_plan_has_a_pose_where_the_grade_changes(server, client):
@@ -49,14 +49,14 @@ def test_a_plan_has_a_pose_where_the_grade_changes(server, client):
         assert client.set_parameter(name, value)[0]
     plan = client.can_traverse((-1.5, 0.0, 0.0), (1.5, 0.0, 0.0))
     verdict = check(client, server, [[-1.5, 0.0, 0.0], [1.5, 0.0, 0.0]])
-    grades = np.array(verdict["grades"])
-    changes = np.flatnonzero(grades[1:] != grades[:-1]) + 1
+    classes = np.array(verdict["traversability_classes"])
+    changes = np.flatnonzero(classes[1:] != classes[:-1]) + 1
     assert len(changes) and len(plan.poses) == 2 + len(changes)
     found = [pose.pose.position.x for pose in plan.poses[1:-1]]
     np.testing.assert_allclose(found, -1.5 + 0.02 * changes, atol=1e-9)
 
 
-def test_the_drawn_path_is_coloured_by_grade(server, client):
+def test_the_drawn_path_is_coloured_by_class(server, client):
     client.send_terrain(make_terrain(slope))
     _, results = client.next_results(lambda: client.check_poses(server, PATH))
     line = next(marker for marker in results["markers"].markers if marker.ns == "path")
@@ -67,21 +67,23 @@ def test_the_drawn_path_is_coloured_by_grade(server, client):
 
 def test_an_easy_path_is_passable_with_the_margin_of_its_worst_waypoint(mapped, client):
     verdict = check(client, mapped)
-    assert verdict["grade"] == PASSABLE and verdict["grade_reason"] == ""
-    assert verdict["grade_margin"] == pytest.approx(min(verdict["grade_margins"]))
-    assert verdict["grade_margin"] == verdict["grade_margins"][verdict["grade_waypoint"]]
+    assert verdict["traversability_class"] == PASSABLE and verdict["class_reason"] == ""
+    assert verdict["class_margin"] == pytest.approx(min(verdict["class_margins"]))
+    assert verdict["class_margin"] == verdict["class_margins"][verdict["class_waypoint"]]
 
 
-def test_an_impassable_path_is_graded_by_its_first_failure(mapped, client):
+def test_an_impassable_path_is_classified_by_its_first_failure(mapped, client):
     verdict = check(client, mapped, [[3.0, 0.0, 0.0], [6.0, 0.0, 0.0]])
-    assert verdict["grade"] == IMPASSABLE and verdict["grade_constraint"] == "off_map"
-    assert verdict["grade_waypoint"] == verdict["first_failure"]
-    assert verdict["grade_margin"] is None and verdict["grade_wheel"] == ""
+    assert (
+        verdict["traversability_class"] == IMPASSABLE and verdict["class_constraint"] == "off_map"
+    )
+    assert verdict["class_waypoint"] == verdict["first_failure"]
+    assert verdict["class_margin"] is None and verdict["class_wheel"] == ""
 
 
-def test_plans_are_graded_too_and_the_status_has_the_summary_alone(mapped, client):
+def test_plans_are_classified_too_and_the_status_has_the_summary_alone(mapped, client):
     verdict = ask(client)[1]
-    assert verdict["grade"] == PASSABLE
+    assert verdict["traversability_class"] == PASSABLE
     assert not PER_WAYPOINT.keys() & verdict.keys()
 
 
