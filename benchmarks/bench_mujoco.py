@@ -11,10 +11,10 @@ from benchmarks.bench_poses import run_settling
 from benchmarks.grounds import random_poses, reference_ground
 from benchmarks.measure import Figure, median_time
 from benchmarks.mujoco_rover import DroppedRover, Settled
-from rover_physics.contact.settling import SETTLED
 from rover_physics.prediction.evaluation import evaluate
 from rover_physics.prediction.model_setup import set_up
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 
 POSES = 15
 """Poses on each ground."""
@@ -49,7 +49,7 @@ def compare(ground, settled: list[Settled]) -> float:
     off = [
         np.linalg.norm(one.wheel_centres - rest.wheel_centres, axis=1).max()
         for one, rest in zip(ours, settled, strict=True)
-        if one.status == SETTLED
+        if one.status == PoseStatus.SETTLED
     ]
     return 1e3 * float(np.median(off))
 

@@ -9,12 +9,13 @@ from benchmarks.grounds import all_grounds, random_poses
 from benchmarks.measure import Figure, median_times
 from rover_physics.contact.contact_record import AGAIN, COARSE, FULL, NEAR, QUICK
 from rover_physics.contact.rim_scan import scan_rim
-from rover_physics.contact.settling import SETTLED, SLOPED, settle, write_gap_rates
+from rover_physics.contact.settling import SLOPED, settle, write_gap_rates
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.prediction.evaluation import WORK, evaluate, new_work
 from rover_physics.prediction.model_setup import set_up
 from rover_physics.rover.linkage import place
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 
 POSES = 2_000
 REPEATS = 15
@@ -132,7 +133,7 @@ def measure() -> list[Figure]:
     for name, ground in all_grounds().items():
         setup, poses = set_up(load_rover("lsr1"), ground), random_poses(ground, POSES)
         results = evaluate(*setup, poses)
-        settled = results["status"] == SETTLED
+        settled = results["status"] == PoseStatus.SETTLED
         poses, q = poses[settled], results["q"][settled].copy()
         records = (np.array([setup.linkage]), np.array([setup.samples]))
         works = np.full(1, new_work(), WORK)

@@ -5,11 +5,13 @@ import numpy as np
 
 from benchmarks.grounds import all_grounds, random_poses, reference_ground
 from benchmarks.measure import Figure, median_time, median_times
-from rover_physics.contact.settling import SETTLED, settle, settle_from
+from rover_physics.contact.settling import settle, settle_from
 from rover_physics.prediction.evaluation import WORK, evaluate, new_results, new_work
 from rover_physics.prediction.model_setup import Setup, set_up
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import place
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import find_block_max, height_inside
 
@@ -41,7 +43,7 @@ def settle_along(grounds, linkages, samplings, poses, works, results):
     work = works[0]
     for i in range(len(poses)):
         q = results[i].q
-        if i > 0 and results[i - 1].status == SETTLED:
+        if i > 0 and results[i - 1].status == PoseStatus.SETTLED:
             q[:] = results[i - 1].q
             results[i].status = settle_from(
                 grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
@@ -85,9 +87,9 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
     laterals, radius = samples.laterals[: samples.circles], samples.radius
     scale = ground.inverse_resolution
     cells = []
-    settled = results[results["status"] == SETTLED]
+    settled = results[results["status"] == PoseStatus.SETTLED]
     work = new_work()
-    for i in np.flatnonzero(results["status"] == SETTLED):
+    for i in np.flatnonzero(results["status"] == PoseStatus.SETTLED):
         place(setup.linkage, *poses[i], results[i].q, work.placement)
         placed = work.placement
         axis = placed.R[:, 1]
@@ -109,7 +111,9 @@ def measure() -> list[Figure]:
     figures = []
     for name, ground in all_grounds().items():
         poses = random_poses(ground, POSES)
-        equal, optimal = (set_up(rover, ground, policy=p) for p in ("equal", "optimal"))
+        equal, optimal = (
+            set_up(rover, ground, SweepOptions(policy=p)) for p in ("equal", "optimal")
+        )
         times = {
             "settling": median_time(lambda: run_settling(equal, poses)),  # noqa: B023
             "equal": median_time(lambda: evaluate(*equal, poses)),  # noqa: B023
@@ -144,7 +148,7 @@ def measure_warm_start(rover) -> list[Figure]:
             [lambda: settle_with(settle_all), lambda: settle_with(settle_along)]
         )
         rest, neighbour = settle_with(settle_all), settle_with(settle_along)
-        both = (rest["status"] == SETTLED) & (neighbour["status"] == SETTLED)
+        both = (rest["status"] == PoseStatus.SETTLED) & (neighbour["status"] == PoseStatus.SETTLED)
         moved = np.abs(rest["q"] - neighbour["q"]).max(axis=1)[both] > OTHER_POSE
         figures += [
             Figure("warm", f"{name}: from the neighbour", warm / cold, "x", against="from rest"),

@@ -31,6 +31,7 @@ PLACES = {
     "judge_path": ("rover_physics.traversability.judge_path", "rover_physics.trap"),
     "score_poses": ("rover_physics.prediction.map_sweep", "rover_physics.map_sweep"),
     "judge_reach": ("rover_physics.traversability.reach", "rover_physics.reach"),
+    "BoundStatus": ("rover_physics.status",),
     "SweepOptions": ("rover_physics.prediction.sweep_options",),
     "BalanceWriter": ("rover_physics.traction.balance", "rover_physics.traction_rows"),
     "MeasuredState": ("rover_physics.traction.balance", "rover_physics.traction_rows"),
@@ -38,7 +39,10 @@ PLACES = {
     "solve_traction": ("rover_physics.traction.solver", "rover_physics.traction_solver"),
 }
 """Where each name is found, in this version first, then in version 0.1."""
-RENAMED = {"programmes": "programs"}
+BOUND_STATUSES_BEFORE = (
+    "BOUNDED", "NOT_SETTLED", "ON_EDGE", "UNKNOWN_NEAR", "OFF_MAP_NEAR", "SINGULAR",
+)  # fmt: skip
+"""Names of the status of bounds by its code in version 0.1."""
 ARM = {"arm_yaw": 0.3, "arm_shoulder": 0.2, "arm_elbow": 0.6}
 
 
@@ -135,6 +139,8 @@ def note_judged(found: dict[str, np.ndarray], label: str, prediction: Any, verdi
         note_arrays(found, f"{label} | between", prediction.between)
     if prediction.bounds is not None:
         note_arrays(found, f"{label} | bounds", prediction.bounds)
+        names = [name_bound_status(int(code)) for code in prediction.bounds.status]
+        found[f"{label} | bounds | status"] = np.array(names)
     told = [str(text) for text in (*verdict.codes, *verdict.reasons)]
     found[f"{label} | verdict"] = np.array([str(verdict.first_failure), *told])
 
@@ -144,6 +150,12 @@ def note_arrays(found: dict[str, np.ndarray], label: str, record: Any) -> None:
     for name, value in vars(record).items():
         if isinstance(value, np.ndarray) and value.dtype != object:
             found[f"{label} | {name}"] = np.array(value)
+
+
+def name_bound_status(code: int) -> str:
+    """Return the name of a status of bounds; version 0.1 numbered them in another way."""
+    kind = find("BoundStatus")
+    return str(kind(code).name) if kind else BOUND_STATUSES_BEFORE[code]
 
 
 def note_uncertain(
@@ -202,10 +214,8 @@ def note_reach(found: dict[str, np.ndarray]) -> None:
 def ask_reach(rover: Any, terrain: Any, target: np.ndarray) -> Any:
     """Ask whether the arm reaches a point and pushes there with 5 N."""
     judge = find("judge_reach")
-    if find("SweepOptions") is None:
-        return judge(rover, terrain, (0.0, 0.0, 0.3), target, tool_force=(0.0, 0.0, 5.0))
-    options = find("SweepOptions")(tool_force=(0.0, 0.0, 5.0))
-    return judge(rover, terrain, (0.0, 0.0, 0.3), target, options)
+    name = "tool_force" if find("SweepOptions") is None else "force"
+    return judge(rover, terrain, (0.0, 0.0, 0.3), target, **{name: (0.0, 0.0, 5.0)})
 
 
 def compare(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> int:

@@ -5,6 +5,7 @@ Run from the repository: python -m benchmarks.uncertainty [maps per case]
 
 import sys
 import time
+from functools import partial
 
 import numba
 import numpy as np
@@ -13,6 +14,7 @@ from rich.table import Table
 
 from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from support.uncertain_grounds import (
@@ -136,11 +138,10 @@ def show_times() -> Table:
             terrain = with_std(uncertain_grounds(rover)[ground], 0.005)
             poses = path_across(1, 200)
             for policy in ("equal", "optimal"):
-                prediction = sweep_path(rover, terrain, poses, policy=policy)
-                sweep = _least(lambda: sweep_path(rover, terrain, poses, policy=policy))  # noqa: B023
-                bounds = _least(
-                    lambda: bound_path(rover, terrain, prediction, policy=policy)  # noqa: B023
-                )
+                options = SweepOptions(policy=policy)
+                prediction = sweep_path(rover, terrain, poses, options)
+                sweep = _least(partial(sweep_path, rover, terrain, poses, options))
+                bounds = _least(partial(bound_path, rover, terrain, prediction, options))
                 per_waypoint = (f"{1e6 * seconds / 200:.0f}" for seconds in (sweep, bounds))
                 table.add_row(name, ground, policy, *per_waypoint)
     return table

@@ -1,3 +1,87 @@
-"""The quasi-static model of a rocker-bogie rover on uneven ground: numpy in, dataclasses out."""
+"""The quasi-static model of a rocker-bogie rover on uneven ground: numpy in, dataclasses out.
+
+The names below are the API. Each is imported when it is first used, so that a program that needs
+a rover file alone does not wait for the compiled model.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rover_physics.errors import RoverError
+    from rover_physics.prediction.map_sweep import PoseScores, score_poses, sweep_map
+    from rover_physics.prediction.path_prediction import PathPrediction
+    from rover_physics.prediction.sweep import sweep_path, sweep_paths
+    from rover_physics.prediction.sweep_options import SweepOptions
+    from rover_physics.rover.model import Rover
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.status import PoseStatus
+    from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+    from rover_physics.traversability.classification import classify_path
+    from rover_physics.traversability.judge_path import judge_path, judge_paths
+    from rover_physics.traversability.reach import judge_reach
+    from rover_physics.traversability.torque_ranges import find_torque_ranges
+    from rover_physics.traversability.verdict import Verdict
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "PathPrediction": "prediction.path_prediction",
+    "PoseScores": "prediction.map_sweep",
+    "PoseStatus": "status",
+    "Rover": "rover.model",
+    "RoverError": "errors",
+    "SweepOptions": "prediction.sweep_options",
+    "Terrain": "terrain.grid",
+    "Verdict": "traversability.verdict",
+    "classify_path": "traversability.classification",
+    "find_torque_ranges": "traversability.torque_ranges",
+    "judge_path": "traversability.judge_path",
+    "judge_paths": "traversability.judge_path",
+    "judge_reach": "traversability.reach",
+    "load_rover": "rover.rover_file",
+    "load_terrain": "terrain.grid",
+    "save_terrain": "terrain.grid",
+    "score_poses": "prediction.map_sweep",
+    "sweep_map": "prediction.map_sweep",
+    "sweep_path": "prediction.sweep",
+    "sweep_paths": "prediction.sweep",
+}
+"""Names of the API, and the module below this package that holds each."""
+
+__all__ = [
+    "PathPrediction",
+    "PoseScores",
+    "PoseStatus",
+    "Rover",
+    "RoverError",
+    "SweepOptions",
+    "Terrain",
+    "Verdict",
+    "__version__",
+    "classify_path",
+    "find_torque_ranges",
+    "judge_path",
+    "judge_paths",
+    "judge_reach",
+    "load_rover",
+    "load_terrain",
+    "save_terrain",
+    "score_poses",
+    "sweep_map",
+    "sweep_path",
+    "sweep_paths",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name of the API when it is first used (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -95,6 +95,7 @@ def predict(
 
     Exit code 0 when it ran, whatever the verdict; 2 for bad input.
     """
+    from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_physics.traversability.classification import classify_judged
@@ -107,26 +108,27 @@ def predict(
     model = load_rover(rover)
     ground = load_terrain(terrain)
     path = read_poses(poses)
-    options: dict[str, Any] = {
-        "friction": friction,
-        "max_torque": max_torque,
-        "soil": soil,
-        "joint_angles": read_arm_angles(model, arm or ()),
-        "payload": payload,
-        "tool_force": tool_force,
-        "tool_moment": tool_moment,
-    }
+    options = SweepOptions(
+        policy=policy,
+        friction=friction,
+        max_torque=max_torque,
+        soil=soil,
+        joint_angles=read_arm_angles(model, arm or ()),
+        payload=payload,
+        tool_force=tool_force,
+        tool_moment=tool_moment,
+    )
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
-        judged = judge_path(model, ground, path, policy=policy, sigmas=sigmas, **options)
+        judged = judge_path(model, ground, path, options, sigmas=sigmas)
         if classes:
             progress("classify the waypoints")
         found = (
-            classify_judged(model, ground, *judged, sigmas=sigmas, **options) if classes else None
+            classify_judged(model, ground, *judged, options, sigmas=sigmas) if classes else None
         )
         if torque_ranges:
             progress("find the ranges of the torques")
-        ranges = find_torque_ranges(model, ground, path, **options) if torque_ranges else None
+        ranges = find_torque_ranges(model, ground, path, options) if torque_ranges else None
     on_soil = soil is not None or bool(ground.soil_names)
     write_prediction(out, *judged, on_soil=on_soil, classes=found, ranges=ranges)
 
@@ -159,6 +161,7 @@ def reach(
 
     Exit code 0 when it ran, whatever the answer; 2 for bad input.
     """
+    from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_physics.traversability.reach import judge_reach
@@ -172,13 +175,11 @@ def reach(
             ground,
             (x, y, yaw),
             (tx, ty, tz),
-            tool_force=force,
-            tool_moment=moment,
-            payload=payload,
-            friction=friction,
-            max_torque=max_torque,
-            policy=policy,
-            soil=soil,
+            SweepOptions(
+                payload=payload, friction=friction, max_torque=max_torque, policy=policy, soil=soil
+            ),
+            force=force,
+            moment=moment,
         )
     print(json.dumps(answer.to_dict(), allow_nan=False))
 

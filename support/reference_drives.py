@@ -9,6 +9,7 @@ import numpy as np
 
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -96,9 +97,7 @@ def judge_drive(drive: Drive, policy: str) -> tuple[PathPrediction, Verdict]:
         rover,
         drive_ground(drive.kind, drive.size),
         drive_path(),
-        friction=drive.friction,
-        max_torque=drive.max_torque,
-        policy=policy,
+        SweepOptions(friction=drive.friction, max_torque=drive.max_torque, policy=policy),
     )
     return prediction, judge(rover, prediction)
 

@@ -8,6 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
@@ -98,14 +99,14 @@ def draw_path(
     sigmas: float = 3.0,
 ) -> Outcome:
     """Sweep a path over maps drawn at random and hold it against its bounds."""
-    prediction = sweep_path(rover, terrain, poses, policy=policy)
-    bounds = bound_path(rover, terrain, prediction, sigmas, policy=policy)
+    prediction = sweep_path(rover, terrain, poses, SweepOptions(policy=policy))
+    bounds = bound_path(rover, terrain, prediction, SweepOptions(policy=policy), sigmas=sigmas)
     rows = bounds.bounded
     limits = {name: getattr(bounds, name)[rows] for name in BOUNDED_VALUES}
     drawn: dict[str, list[np.ndarray]] = {name: [] for name in BOUNDED_VALUES}
     outside = dict.fromkeys((*BOUNDED_VALUES, "no pose", "any"), 0)
     for sample in draw_maps(terrain, length, count, seed):
-        swept = sweep_path(rover, sample, poses, policy=policy)
+        swept = sweep_path(rover, sample, poses, SweepOptions(policy=policy))
         beyond = ~swept.settled[rows]
         outside["no pose"] += int(beyond.sum())
         for name, limit in limits.items():

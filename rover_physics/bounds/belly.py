@@ -8,14 +8,15 @@ from rover_physics.terrain.ground import elevation_of, height_at_cell, look_up
 
 
 @kernel
-def bound_clearance(ground, error, linkage, spread, bounds):
+def bound_clearance(uncertain, work, bounds):
     """Write the smallest and largest possible clearance [m] into bounds (2,); NaN over nothing.
 
     Above each cell the underside is lowest where each wheel is at the end of its interval that
     lowers it there. The rover is placed at its nominal configuration. Second-order terms of the
     turn, and the shift of the outline that goes with it, are added at their largest.
     """
-    placement, belly = spread.model.placement, linkage.belly
+    ground, belly = uncertain.nominal.ground, uncertain.nominal.linkage.belly
+    placement, spread = work.rover.placement, work.spread
     R, origin = placement.R, placement.origin
     bounds[0] = bounds[1] = np.nan
     if not R[2, 2] > 0.0:
@@ -47,23 +48,24 @@ def bound_clearance(ground, error, linkage, spread, bounds):
                 continue
             above = origin[2] + z - height
             lowered, raised = _plane_change(R, spread, dx, dy, z)
-            wrong = elevation_of(error, i, j)
+            wrong = elevation_of(uncertain.error, i, j)
             least = min(least, above - wrong + lowered - bend)
             if inside >= shift:
                 most = min(most, above + wrong + raised + bend)
     if most == np.inf:
-        least, most = _bound_points(ground, error, spread, belly, shift, bend, least)
+        least, most = _bound_points(uncertain, work, shift, bend, least)
     if least < np.inf:
         bounds[0], bounds[1] = least, most
 
 
 @kernel
-def _bound_points(ground, error, spread, belly, shift, bend, least):
+def _bound_points(uncertain, work, shift, bend, least):
     """Return smaller of `least` and the least clearance below POINTS, and the most there [m].
 
     For outlines with no known cell inside, where `belly_clearance` looks at these points.
     """
-    R, origin = spread.model.placement.R, spread.model.placement.origin
+    ground, belly = uncertain.nominal.ground, uncertain.nominal.linkage.belly
+    R, origin = work.rover.placement.R, work.rover.placement.origin
     most = np.inf
     for k in range(POINTS):
         x, y, z = point_of_underside(R, origin, belly, k)
@@ -72,8 +74,11 @@ def _bound_points(ground, error, spread, belly, shift, bend, least):
             continue
         gx = (x - ground.x0) * ground.inverse_resolution
         gy = (y - ground.y0) * ground.inverse_resolution
-        wrong = height_at_cell(error, gx, gy) + bend + shift * (abs(slope_x) + abs(slope_y))
-        lowered, raised = _plane_change(R, spread, x - origin[0], y - origin[1], z - origin[2])
+        wrong = height_at_cell(uncertain.error, gx, gy) + bend
+        wrong = wrong + shift * (abs(slope_x) + abs(slope_y))
+        lowered, raised = _plane_change(
+            R, work.spread, x - origin[0], y - origin[1], z - origin[2]
+        )
         least = min(least, z - height + lowered - wrong)
         most = min(most, z - height + raised + wrong)
     return least, most

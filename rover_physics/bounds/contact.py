@@ -46,13 +46,16 @@ CONTACT_BOUNDS = record_type(
 
 
 @kernel
-def bound_contacts(ground, error, samples, placement, angles, points, reach, contact_bounds):
-    """Write the possible contact_bounds of all wheels of a placed rover into `contact_bounds`.
+def bound_contacts(uncertain, work, nominal):
+    """Write the possible contacts of all wheels of the placed rover into `work.contact_bounds`.
 
-    `error` is a GROUND whose elevation bounds the error of each cell's height [m]; angles (6,)
-    [rad] and points (6, 3) [m] are the nominal contacts; reach (6,) bounds how far the wheels move
-    along [m].
+    Args:
+        uncertain: UNCERTAIN; the elevation of its `error` bounds the error of each height [m].
+        work: BOUNDS_WORK; its spread says how far the wheels move along.
+        nominal: NOMINAL contacts.
     """
+    placement, contact_bounds = work.rover.placement, work.contact_bounds
+    angles, points, reach = nominal.contact_angle, nominal.contact_points, work.spread.reach
     R, rim = placement.R, contact_bounds.rim
     for wheel in range(6):
         lateral = 0.0
@@ -65,15 +68,17 @@ def bound_contacts(ground, error, samples, placement, angles, points, reach, con
         contact_bounds.lateral[wheel] = lateral
         contact_bounds.lateral_low[wheel] = contact_bounds.lateral_high[wheel] = lateral
         rim.reach = reach[wheel]
-        rim.largest_error = _find_largest_error(ground, error, samples, placement, wheel)
+        rim.largest_error = _find_largest_error(uncertain, work, wheel)
         if max(rim.largest_error, rim.reach) > 0.0:
-            _look_around(ground, samples, placement, wheel, angle, rim)
-            _widen(ground, error, samples, placement, wheel, contact_bounds)
+            _look_around(uncertain.nominal, work.rover, wheel, angle, rim)
+            _widen(uncertain, work, wheel)
 
 
 @kernel
-def _find_largest_error(ground, error, samples, placement, wheel):
+def _find_largest_error(uncertain, work, wheel):
     """Return the largest error [m] of a height within reach of a wheel."""
+    ground, samples = uncertain.nominal.ground, uncertain.nominal.samples
+    error, placement = uncertain.error, work.rover.placement
     reach = samples.reach * ground.inverse_resolution
     gx = (placement.centres[wheel, 0] - ground.x0) * ground.inverse_resolution
     gy = (placement.centres[wheel, 1] - ground.y0) * ground.inverse_resolution
@@ -87,28 +92,28 @@ def _find_largest_error(ground, error, samples, placement, wheel):
 
 
 @kernel
-def _look_around(ground, samples, placement, wheel, angle, rim):
+def _look_around(model, rover, wheel, angle, rim):
     """Write the gaps of all samples of a wheel, and where each circle comes nearest."""
+    samples = model.samples
     s, c = np.sin(angle), np.cos(angle)
     for m in range(samples.circles):
-        gap, gx, gy = _gap_at(ground, samples, placement, wheel, m, s, c)
+        gap, _ = _gap_at(model, rover, (wheel, m), (s, c))
         rim.nearest[m], rim.nearest_angle[m] = np.inf, angle
         if gap == gap:
             rim.nearest[m] = gap
         for k in range(samples.rows):
-            gap, gx, gy = _gap_at(
-                ground, samples, placement, wheel, m, samples.sines[k], samples.cosines[k]
-            )
+            gap, _ = _gap_at(model, rover, (wheel, m), (samples.sines[k], samples.cosines[k]))
             rim.gap[m, k] = gap
-        _find_lowest(ground, samples, placement, wheel, m, rim)
+        _find_lowest(model, rover, wheel, m, rim)
 
 
 @kernel
-def _find_lowest(ground, samples, placement, wheel, m, rim):
+def _find_lowest(model, rover, wheel, m, rim):
     """Write where the gap of circle m is smallest near each sample that is below its neighbours.
 
     Beside a face or on an edge much lies between two samples.
     """
+    samples = model.samples
     for k in range(samples.rows):
         gap = rim.gap[m, k]
         rim.lowest[m, k] = np.nan
@@ -116,19 +121,24 @@ def _find_lowest(ground, samples, placement, wheel, m, rim):
         after = rim.gap[m, min(k + 1, samples.rows - 1)]
         if gap != gap or gap > before or gap > after:
             continue
-        gap, s, c, _, _ = search_circle(
-            ground, samples, placement, wheel, samples.laterals[m],
-            samples.sines[k], samples.cosines[k],
-        )  # fmt: skip
-        angle = np.arctan2(s, c)
+        circle = wheel, samples.laterals[m]
+        gap, turn, _ = search_circle(model, rover, circle, (samples.sines[k], samples.cosines[k]))
+        angle = np.arctan2(turn[0], turn[1])
         rim.lowest[m, k] = angle
         if gap < rim.nearest[m]:
             rim.nearest[m], rim.nearest_angle[m] = gap, angle
 
 
 @kernel
-def _gap_at(ground, samples, placement, wheel, m, s, c):
-    """Return the gap [m] at one point of the rim, NaN off known ground, and its place in cells."""
+def _gap_at(model, rover, circle, turn):
+    """Return the gap [m] at one point of the rim, NaN off known ground, and its place in cells.
+
+    `circle` is (wheel, index of its circle), `turn` (sine, cosine) of the contact angle; the place
+    is (x, y).
+    """
+    ground, samples, placement = model.ground, model.samples, rover.placement
+    wheel, m = circle
+    s, c = turn
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     across, radius = samples.laterals[m], samples.radius
     x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
@@ -137,20 +147,20 @@ def _gap_at(ground, samples, placement, wheel, m, s, c):
     gx = (x - ground.x0) * ground.inverse_resolution
     gy = (y - ground.y0) * ground.inverse_resolution
     if not is_cell_on_map(ground, gx, gy):
-        return np.nan, gx, gy
-    return z - height_at_cell(ground, gx, gy), gx, gy
+        return np.nan, (gx, gy)
+    return z - height_at_cell(ground, gx, gy), (gx, gy)
 
 
 @kernel
-def _error_between(error, ax, ay, bx, by):
+def _error_between(error, a, b):
     """Return a bound on the error [m] of the height difference of two places, in cells.
 
     Exact for errors that are independent from cell to cell, too large for such that are alike.
     """
     total = 0.0
     for place in range(2):
-        gx, gy = (ax, ay) if place == 0 else (bx, by)
-        other_x, other_y = (bx, by) if place == 0 else (ax, ay)
+        gx, gy = a if place == 0 else b
+        other_x, other_y = b if place == 0 else a
         i = min(int(gy), error.rows - 2)
         j = min(int(gx), error.columns - 2)
         for row in range(i, i + 2):
@@ -175,8 +185,9 @@ def _angle_of_row(samples, k):
 
 
 @kernel
-def _widen(ground, error, samples, placement, wheel, contact_bounds):
+def _widen(uncertain, work, wheel):
     """Widen the contact of a wheel to all points of its rim that may touch."""
+    samples, contact_bounds = uncertain.nominal.samples, work.contact_bounds
     rim = contact_bounds.rim
     best = 0
     for m in range(samples.circles):
@@ -185,11 +196,11 @@ def _widen(ground, error, samples, placement, wheel, contact_bounds):
     give = COMPLIANCE * samples.radius
     first, last, largest = contact_bounds.lateral[wheel], contact_bounds.lateral[wheel], 0.0
     for m in range(samples.circles):
-        reach = _error_to_circle(ground, error, samples, placement, wheel, m, best, rim)
+        reach = _error_to_circle(uncertain, work, wheel, m, best)
         largest = max(largest, reach)
         if rim.nearest[m] - rim.nearest[best] <= reach + give:
             first, last = min(first, samples.laterals[m]), max(last, samples.laterals[m])
-            _widen_angles(ground, error, samples, placement, wheel, m, contact_bounds)
+            _widen_angles(uncertain, work, wheel, m)
     # Circles closer to each other than the give share the load: small errors shift it a little.
     share = min(1.0, largest / give)
     middle = contact_bounds.lateral[wheel]
@@ -198,12 +209,13 @@ def _widen(ground, error, samples, placement, wheel, contact_bounds):
 
 
 @kernel
-def _error_to_circle(ground, error, samples, placement, wheel, m, best, rim):
+def _error_to_circle(uncertain, work, wheel, m, best):
     """Return a bound on the error [m] between the gaps of the nearest points of two circles."""
+    model, rover, rim = uncertain.nominal, work.rover, work.contact_bounds.rim
     here, there = rim.nearest_angle[m], rim.nearest_angle[best]
-    gap, ax, ay = _gap_at(ground, samples, placement, wheel, m, np.sin(here), np.cos(here))
-    gap, bx, by = _gap_at(ground, samples, placement, wheel, best, np.sin(there), np.cos(there))
-    return np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, here, there))
+    _, a = _gap_at(model, rover, (wheel, m), (np.sin(here), np.cos(here)))
+    _, b = _gap_at(model, rover, (wheel, best), (np.sin(there), np.cos(there)))
+    return np.hypot(_error_between(uncertain.error, a, b), _shift_between(rim, here, there))
 
 
 @kernel
@@ -215,19 +227,19 @@ def _shift_between(rim, angle, other):
 
 
 @kernel
-def _widen_angles(ground, error, samples, placement, wheel, m, contact_bounds):
+def _widen_angles(uncertain, work, wheel, m):
     """Widen the angles of a wheel to those at which circle m may touch."""
-    rim = contact_bounds.rim
-    nearest = rim.nearest_angle[m]
+    contact_bounds = work.contact_bounds
+    nearest = contact_bounds.rim.nearest_angle[m]
     contact_bounds.angle_low[wheel] = min(contact_bounds.angle_low[wheel], nearest)
     contact_bounds.angle_high[wheel] = max(contact_bounds.angle_high[wheel], nearest)
     for side in range(2):
-        inside, outside = _find_farthest(ground, error, samples, placement, wheel, m, side, rim)
+        inside, outside = _find_farthest(uncertain, work, wheel, m, side)
         if contact_bounds.angle_low[wheel] <= outside <= contact_bounds.angle_high[wheel]:
             continue
         for _ in range(HALVINGS):
             middle = 0.5 * (inside + outside)
-            if _may_touch(ground, error, samples, placement, wheel, m, middle, nearest, rim):
+            if _may_touch(uncertain, work, (wheel, m), middle, nearest):
                 inside = middle
             else:
                 outside = middle
@@ -236,12 +248,13 @@ def _widen_angles(ground, error, samples, placement, wheel, m, contact_bounds):
 
 
 @kernel
-def _find_farthest(ground, error, samples, placement, wheel, m, side, rim):
+def _find_farthest(uncertain, work, wheel, m, side):
     """Return the last sampled angle [rad] at which circle m may touch, and the next outwards.
 
     Behind the nearest point (side 0) or ahead of it (1); samples count with the smallest gap
     near them.
     """
+    samples, rim = uncertain.nominal.samples, work.contact_bounds.rim
     nearest = rim.nearest_angle[m]
     away = -1.0 if side == 0 else 1.0
     spacing = np.pi / (samples.rows - 1)
@@ -256,11 +269,9 @@ def _find_farthest(ground, error, samples, placement, wheel, m, side, rim):
         doubt = np.hypot(SQRT2 * rim.largest_error, _shift_between(rim, angle, nearest))
         if lowest != lowest and rim.gap[m, k] - rim.nearest[m] > doubt:
             continue
-        if lowest == lowest and _may_touch(
-            ground, error, samples, placement, wheel, m, lowest, nearest, rim
-        ):
+        if lowest == lowest and _may_touch(uncertain, work, (wheel, m), lowest, nearest):
             return lowest, _clip_angle(max(away * angle, away * lowest + spacing) * away)
-        if _may_touch(ground, error, samples, placement, wheel, m, angle, nearest, rim):
+        if _may_touch(uncertain, work, (wheel, m), angle, nearest):
             return angle, _clip_angle(angle + away * spacing)
     return nearest, outside
 
@@ -271,19 +282,21 @@ def _clip_angle(angle):
 
 
 @kernel
-def _may_touch(ground, error, samples, placement, wheel, m, angle, nearest, rim):
-    """Tell whether circle m may touch at `angle` [rad] rather than on the way to `nearest`."""
-    s, c = np.sin(angle), np.cos(angle)
-    gap, ax, ay = _gap_at(ground, samples, placement, wheel, m, s, c)
+def _may_touch(uncertain, work, circle, angle, nearest):
+    """Tell whether a circle may touch at `angle` [rad] rather than on the way to `nearest`.
+
+    `circle` is (wheel, index of its circle).
+    """
+    model, rover, rim = uncertain.nominal, work.rover, work.contact_bounds.rim
+    gap, a = _gap_at(model, rover, circle, (np.sin(angle), np.cos(angle)))
     if gap != gap:
         return False
     for rung in range(RUNGS):
         other = angle + (nearest - angle) * ((rung + 1.0) / RUNGS) ** 2
-        s, c = np.sin(other), np.cos(other)
-        lower, bx, by = _gap_at(ground, samples, placement, wheel, m, s, c)
+        lower, b = _gap_at(model, rover, circle, (np.sin(other), np.cos(other)))
         if not gap - lower > 0.0:
             continue
-        doubt = np.hypot(_error_between(error, ax, ay, bx, by), _shift_between(rim, angle, other))
+        doubt = np.hypot(_error_between(uncertain.error, a, b), _shift_between(rim, angle, other))
         if gap - lower > doubt:
             return False
     return True

@@ -14,10 +14,9 @@ the Engineering Mechanics Division 100(1), 1974.
 import numpy as np
 
 from rover_physics.forces.equilibrium import FREE_FORCES, balance_forces
-from rover_physics.forces.soil import solve_wheel
+from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.stability import CORNERS, measure_edge
 from rover_physics.forces.torques import (
-    EQUAL,
     apply_torques,
     minimise_friction,
     take_equal_torques,
@@ -26,6 +25,7 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 from rover_physics.prediction.evaluation import find_tip_over
 from rover_physics.rover.linkage import place, place_masses
+from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import SOIL_NUMBERS, copy_soil, friction_at, soil_row_at
 
 HEIGHT, ANGLE, PLACE = 0, 6, 12
@@ -70,33 +70,36 @@ BOX = record_type(
 
 
 @kernel
-def bound_forces(ground, linkage, samples, settings, pose, spread, contact_bounds, box):
+def bound_forces(model, work):
     """Write smallest and largest outputs into `box`; False where the balance is singular.
 
     Under policy optimal the differences of the torques are those that are best for the nominal
     rover, the common pull makes up for the rest: the best torques of any other rover need
     no more friction than these. On soil they need no more than equal ones.
     """
-    _fill_box(spread, contact_bounds, box)
-    place(linkage, pose[0], pose[1], pose[2], spread.q, spread.model.placement)
-    _find_grounds(ground, samples, settings, spread.model.placement, contact_bounds, box)
-    box.columns = 1 if settings.policy == EQUAL or settings.on_soil else 1 + FREE_FORCES
-    if not _choose_torques(ground, linkage, settings, pose, spread, box):
+    rover, box, settings = work.rover, work.box, model.settings
+    _fill_box(work.spread, work.contact_bounds, box)
+    place(model.linkage, rover.pose, work.spread.q, rover.placement)
+    _find_grounds(model, rover.placement, work.contact_bounds, box)
+    box.columns = (
+        1 if settings.policy == TorquePolicy.EQUAL or settings.on_soil else 1 + FREE_FORCES
+    )
+    if not _choose_torques(model, work):
         return False
     for output in range(OUTPUTS):
         box.base_value[output] = box.smallest[output] = box.largest[output] = box.value[output]
-    if not _find_gains(ground, linkage, settings, pose, spread, box):
+    if not _find_gains(model, work):
         return False
     for wheel in range(6):
-        _bound_output(ground, linkage, settings, pose, LOAD + wheel, spread, box)
+        _bound_output(model, work, LOAD + wheel)
         if wheel == 0 or box.columns > 1:
-            _bound_output(ground, linkage, settings, pose, PULL + wheel, spread, box)
+            _bound_output(model, work, PULL + wheel)
         else:
             box.smallest[PULL + wheel] = box.smallest[PULL]
             box.largest[PULL + wheel] = box.largest[PULL]
-        _bound_use(ground, linkage, settings, pose, wheel, spread, box)
+        _bound_use(model, work, wheel)
     for edge in range(CORNERS):
-        _bound_output(ground, linkage, settings, pose, TIP + edge, spread, box)
+        _bound_output(model, work, TIP + edge)
     return True
 
 
@@ -114,8 +117,9 @@ def _fill_box(spread, contact_bounds, box):
 
 
 @kernel
-def _find_grounds(ground, samples, settings, placement, contact_bounds, box):
+def _find_grounds(model, placement, contact_bounds, box):
     """Write friction and soils of all cells that each wheel of a placed rover may touch."""
+    ground, samples, settings = model.ground, model.samples, model.settings
     cell = 1.0 / ground.inverse_resolution
     layered = ground.friction != 0 or ground.soil != 0
     for wheel in range(6):
@@ -162,36 +166,36 @@ def _note_soil(row, wheel, box):
 
 
 @kernel
-def _choose_torques(ground, linkage, settings, pose, spread, box):
+def _choose_torques(model, work):
     """Balance the nominal rover and keep its torques for all others; False where singular."""
-    work = spread.model
+    rover, box, linkage = work.rover, work.box, model.linkage
     for k in range(INPUTS):
         box.at[k] = box.base[k]
-    work.search.y[:] = 0.0
-    work.search.resistance[:] = 0.0
-    if not _evaluate(ground, linkage, settings, pose, spread, box):
+    rover.search.y[:] = 0.0
+    rover.search.resistance[:] = 0.0
+    if not _evaluate(model, work):
         return False
     if box.columns > 1:
         weight = linkage.mass * linkage.gravity
         for wheel in range(6):
-            work.search.mu[wheel] = box.mu_low[wheel]
-        minimise_friction(
-            work.balance, settings.allowed_torque / (linkage.radius * weight), work.search
-        )
-        return _evaluate(ground, linkage, settings, pose, spread, box)
+            rover.search.mu[wheel] = box.mu_low[wheel]
+        largest = model.settings.allowed_torque / (linkage.radius * weight)
+        minimise_friction(rover.balance, largest, rover.search)
+        return _evaluate(model, work)
     return True
 
 
 @kernel
-def _evaluate(ground, linkage, settings, pose, spread, box):
+def _evaluate(model, work):
     """Write the outputs at the inputs `box.at`; False where the balance is singular."""
-    work, q = spread.model, spread.trial
-    placement, contacts, search = work.placement, work.contacts, work.search
+    linkage, rover, spread, box = model.linkage, work.rover, work.spread, work.box
+    placement, contacts, search = rover.placement, rover.contacts, rover.search
+    q = spread.trial
     for i in range(6):
         q[i] = spread.q[i]
         for wheel in range(6):
             q[i] += spread.response[i, wheel] * box.at[HEIGHT + wheel]
-    place(linkage, pose[0], pose[1], pose[2], q, placement)
+    place(linkage, rover.pose, q, placement)
     place_masses(linkage, q, placement)
     for wheel in range(6):
         s, c = np.sin(box.at[ANGLE + wheel]), np.cos(box.at[ANGLE + wheel])
@@ -200,28 +204,28 @@ def _evaluate(ground, linkage, settings, pose, spread, box):
             radial = linkage.radius * (s * placement.forward[i] - c * placement.up[i])
             aside = box.at[PLACE + wheel] * placement.R[i, 1]
             contacts.point[wheel, i] = placement.centres[wheel, i] + aside + radial
-    if not balance_forces(linkage, placement, contacts, box.columns, work.balance):
+    if not balance_forces(linkage, placement, contacts, box.columns, rover.balance):
         return False
     if box.columns == 1:
-        take_equal_torques(work.balance, search)
+        take_equal_torques(rover.balance, search)
     else:
-        apply_torques(work.balance, FREE_FORCES, search)
+        apply_torques(rover.balance, FREE_FORCES, search)
     for wheel in range(6):
         N, T, S = search.wheel_loads[wheel], search.tangential[wheel], search.lateral[wheel]
         box.value[LOAD + wheel], box.value[PULL + wheel], box.value[SIDE + wheel] = N, T, S
-        box.value[USE + wheel] = _worst_use(ground, linkage, settings, wheel, N, T, S, box)
-    find_tip_over(linkage, work)
+        box.value[USE + wheel] = _worst_use(model, box, wheel, (N, T, S))
+    find_tip_over(linkage, rover)
     for edge in range(CORNERS):
-        angle, measure = measure_edge(
-            work.corners, edge, (edge + 1) % CORNERS, work.centre, work.force, work.moment
-        )
+        angle, measure = measure_edge(rover.corners, edge, rover.centre, rover.force, rover.moment)
         box.value[TIP + edge] = angle
     return True
 
 
 @kernel
-def _worst_use(ground, linkage, settings, wheel, N, T, S, box):
+def _worst_use(model, box, wheel, forces):
     """Return the largest utilisation of a wheel on any of the grounds it may touch."""
+    ground, linkage, settings = model.ground, model.linkage, model.settings
+    N, T, S = forces
     N = max(N, MIN_LOAD)
     if not settings.on_soil:
         return np.sqrt(T * T + S * S) / (box.mu_low[wheel] * N)
@@ -229,17 +233,18 @@ def _worst_use(ground, linkage, settings, wheel, N, T, S, box):
     worst = 0.0
     for k in range(box.soil_count[wheel]):
         copy_soil(ground, box.soils[wheel, k], box.soil)
+        own = SoilWheel(linkage.radius, linkage.width, box.mu_low[wheel])
         solved = solve_wheel(
-            box.soil, box.mu_low[wheel], linkage.radius, linkage.width,
-            weight * N, settings.direction * weight * T, weight * S,
-        )  # fmt: skip
-        worst = max(worst, solved[5])
+            box.soil, own, weight * N, settings.direction * weight * T, weight * S
+        )
+        worst = max(worst, solved.utilisation)
     return worst
 
 
 @kernel
-def _find_gains(ground, linkage, settings, pose, spread, box):
+def _find_gains(model, work):
     """Write what each input alone changes at either end; False where the balance is singular."""
+    box = work.box
     for k in range(INPUTS):
         box.at[k] = box.base[k]
     for k in range(INPUTS):
@@ -252,7 +257,7 @@ def _find_gains(ground, linkage, settings, pose, spread, box):
                     else:
                         box.gain_high[k, output] = 0.0
                 continue
-            if not _evaluate(ground, linkage, settings, pose, spread, box):
+            if not _evaluate(model, work):
                 return False
             _include_values(box)
             for output in range(OUTPUTS):
@@ -274,16 +279,17 @@ def _include_values(box):
 
 
 @kernel
-def _bound_output(ground, linkage, settings, pose, output, spread, box):
+def _bound_output(model, work, output):
     """Go where an output is largest and where it is smallest."""
+    box = work.box
     for side in range(2):
         box.aim[:] = 0.0
         box.aim[output] = 1.0 - 2.0 * side
-        _go_to_extreme(ground, linkage, settings, pose, spread, box)
+        _go_to_extreme(model, work)
 
 
 @kernel
-def _bound_use(ground, linkage, settings, pose, wheel, spread, box):
+def _bound_use(model, work, wheel):
     """Go where the utilisation of a wheel is largest.
 
     The utilisation sqrt(T^2 + S^2) / (mu N) is at least u where T cos(a) + S sin(a) - u mu N >= 0
@@ -291,6 +297,7 @@ def _bound_use(ground, linkage, settings, pose, wheel, spread, box):
     taken to their extremes, at first towards each combination of signs, then in the direction
     and at the level that were found.
     """
+    box = work.box
     pull = max(abs(box.smallest[PULL + wheel]), abs(box.largest[PULL + wheel]))
     side = abs(box.base_value[SIDE + wheel])
     total = 0.0
@@ -315,15 +322,16 @@ def _bound_use(ground, linkage, settings, pose, wheel, spread, box):
         box.aim[:] = 0.0
         box.aim[PULL + wheel], box.aim[SIDE + wheel] = pull / length, side / length
         box.aim[LOAD + wheel] = -box.largest[USE + wheel] * box.mu_low[wheel]
-        _go_to_extreme(ground, linkage, settings, pose, spread, box)
+        _go_to_extreme(model, work)
         if box.value[USE + wheel] > best:
             best = box.value[USE + wheel]
             best_pull, best_side = box.value[PULL + wheel], box.value[SIDE + wheel]
 
 
 @kernel
-def _go_to_extreme(ground, linkage, settings, pose, spread, box):
+def _go_to_extreme(model, work):
     """Go where the sum of outputs that `box.aim` weighs is largest, as the gains have it."""
+    box = work.box
     total = 0.0
     for k in range(INPUTS):
         low, high = 0.0, 0.0
@@ -341,7 +349,7 @@ def _go_to_extreme(ground, linkage, settings, pose, spread, box):
         elif gain > 0.0:
             total += gain * gain
     _share_deviation(total, box)
-    if _evaluate(ground, linkage, settings, pose, spread, box):
+    if _evaluate(model, work):
         _include_values(box)
 
 

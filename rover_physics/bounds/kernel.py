@@ -1,5 +1,6 @@
 """Bounds on all that is predicted at one pose of uncertain ground, and the sweep of it."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,23 +9,18 @@ from numba import prange
 from rover_physics.bounds.belly import bound_clearance
 from rover_physics.bounds.contact import CONTACT_BOUNDS, bound_contacts
 from rover_physics.bounds.forces import BOX, LOAD, PULL, TIP, USE, bound_forces
-from rover_physics.bounds.pose import (
-    BOUNDED,
-    NOT_SETTLED,
-    SINGULAR,
-    SPREAD,
-    bound_configuration,
-)
+from rover_physics.bounds.pose import SPREAD, bound_configuration
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
-from rover_physics.forces.soil import solve_wheel
+from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.stability import CORNERS
-from rover_physics.forces.torques import EQUAL
 from rover_physics.numerics.kernels import kernel, sweep_kernel
-from rover_physics.numerics.records import new_record, record_type
+from rover_physics.numerics.records import new_record, record_type, shared_array_of
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS
+from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
+from rover_physics.prediction.model_setup import PackedModel
 from rover_physics.rover.linkage import place
-from rover_physics.terrain.ground import copy_soil
+from rover_physics.status import BoundStatus, TorquePolicy
+from rover_physics.terrain.ground import GROUND, Ground, copy_soil
 
 BOUNDS_EFFORT = 50
 """Time to bound a pose, in that to predict it under equal torques."""
@@ -52,8 +48,33 @@ BOUNDS = record_type(
 )
 """Smallest and largest values at one pose; all are as in `PathBounds`."""
 
-BOUNDS_WORK = record_type(("spread", SPREAD), ("contact_bounds", CONTACT_BOUNDS), ("box", BOX))
+UNCERTAIN = record_type(
+    ("nominal", MODEL),  # the model on the ground in between
+    ("low", MODEL),  # the same on the lowest ground
+    ("high", MODEL),  # the same on the highest ground
+    ("error", GROUND),  # elevation: how far lowest and highest are from the ground in between [m]
+)
+"""A model whose ground is known within bounds."""
+
+BOUNDS_WORK = record_type(
+    ("rover", WORK),  # work space of the model
+    ("spread", SPREAD),  # where the parts may be
+    ("contact_bounds", CONTACT_BOUNDS),  # where the wheels may touch
+    ("box", BOX),  # what the forces may be
+)
 """Work space of one thread."""
+
+
+@dataclass(frozen=True, eq=False)
+class UncertainGround:
+    """A terrain whose heights are known within bounds."""
+
+    low: Ground
+    """The lowest ground."""
+    high: Ground
+    """The highest ground."""
+    error: Ground
+    """Its elevation is how far both are from the ground in between [m]."""
 
 
 def new_bounds(n: int) -> Any:
@@ -64,69 +85,70 @@ def new_bounds(n: int) -> Any:
     return np.full(n, blank, BOUNDS).view(np.recarray)
 
 
-def find_bounds(setup, low, high, error, poses, nominal) -> Any:
-    """Bound what is predicted at poses (n, 3); return BOUNDS (n,).
+def find_bounds(
+    model: PackedModel, ground: UncertainGround, poses: np.ndarray, nominal: np.ndarray
+) -> Any:
+    """Bound what is predicted at poses; return BOUNDS (n,).
 
     Args:
-        setup: The `Setup` of the sweep.
-        low: The lowest ground.
-        high: The highest ground.
-        error: A Ground whose elevation is how far both are from the ground in between [m].
+        model: The model on the ground in between.
+        ground: The bounds of the ground.
         poses: (n, 3) x, y [m] and yaw [rad].
         nominal: (n,) NOMINAL, what was predicted on the ground in between.
     """
     bounds = new_bounds(len(poses))
     works = np.zeros(min(MAX_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
     for name in ("held_height", "held_angle"):
-        works["spread"]["model"]["contacts"][name] = np.nan
-    records = (np.array([record]) for record in setup[1:])
-    grounds = (ground.records for ground in (low, high, error))
+        works["rover"]["contacts"][name] = np.nan
+    uncertain = shared_array_of(_pack_uncertain(model, ground))
     with limit_threads(BOUNDS_EFFORT * len(poses)):
-        bound_poses(setup.ground.records, *grounds, *records, poses, nominal, works, bounds)
+        bound_poses(uncertain, poses, nominal, works, bounds)
     return bounds
 
 
+def _pack_uncertain(model: PackedModel, ground: UncertainGround) -> Any:
+    """Return the UNCERTAIN of a model; whoever keeps it must keep the grounds."""
+    uncertain = new_record(UNCERTAIN, error=ground.error.records[0])
+    for name, surface in (("nominal", None), ("low", ground.low), ("high", ground.high)):
+        uncertain[name] = model.record
+        if surface is not None:
+            uncertain[name]["ground"] = surface.records[0]
+    return uncertain
+
+
 @sweep_kernel
-def bound_poses(
-    grounds, low, high, error, linkages, samplings, settings, poses, nominal, works, bounds
-):
+def bound_poses(uncertains, poses, nominal, works, bounds):
     """Bound the poses into `bounds` in chunks, as many as there are work spaces."""
     n, chunks = poses.shape[0], works.size
     for chunk in prange(chunks):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            bounds[i].status = bound_pose(
-                grounds[0], low[0], high[0], error[0], linkages[0], samplings[0], settings[0],
-                poses[i], nominal[i], works[chunk], bounds[i],
-            )  # fmt: skip
+            set_pose(poses, i, works[chunk].rover)
+            bounds[i].status = bound_pose(uncertains[0], nominal[i], works[chunk], bounds[i])
 
 
 @kernel
-def bound_pose(ground, low, high, error, linkage, samples, settings, pose, nominal, work, result):
-    """Bound one pose into `result`; return BOUNDED or what keeps it from being bounded."""
-    spread, contact_bounds, box = work.spread, work.contact_bounds, work.box
+def bound_pose(uncertain, nominal, work, result):
+    """Bound the pose of the work space into `result`, a BOUNDS; return its BoundStatus."""
+    model, spread, box = uncertain.nominal, work.spread, work.box
     if not nominal.settled:
-        return NOT_SETTLED
+        return BoundStatus.NOT_SETTLED
     for k in range(6):
         spread.q[k] = nominal.q[k]
-    outcome = bound_configuration(ground, low, high, linkage, samples, pose, spread)
-    if outcome != BOUNDED:
+    outcome = bound_configuration(uncertain, work)
+    if outcome != BoundStatus.BOUNDED:
         return outcome
-    placement = spread.model.placement
-    place(linkage, pose[0], pose[1], pose[2], spread.q, placement)
-    bound_contacts(
-        ground, error, samples, placement, nominal.contact_angle, nominal.contact_points,
-        spread.reach, contact_bounds,
-    )  # fmt: skip
-    bound_clearance(ground, error, linkage, spread, result.belly_clearance)
-    if not bound_forces(ground, linkage, samples, settings, pose, spread, contact_bounds, box):
-        return SINGULAR
+    place(model.linkage, work.rover.pose, spread.q, work.rover.placement)
+    bound_contacts(uncertain, work, nominal)
+    bound_clearance(uncertain, work, result.belly_clearance)
+    if not bound_forces(model, work):
+        return BoundStatus.SINGULAR
     _write_configuration(spread, result)
-    _write_tip_over(settings, box, result)
+    _write_tip_over(model.settings, box, result)
     for wheel in range(6):
-        _write_wheel(ground, linkage, settings, wheel, box, result)
-    if settings.policy != EQUAL:
-        _let_torques_follow(settings, spread.model.search, result)
-    return BOUNDED
+        _write_wheel(model, wheel, box, result)
+    if model.settings.policy != TorquePolicy.EQUAL:
+        _let_torques_follow(model.settings, work.rover.search, result)
+    return BoundStatus.BOUNDED
 
 
 @kernel
@@ -152,8 +174,9 @@ def _write_tip_over(settings, box, result):
 
 
 @kernel
-def _write_wheel(ground, linkage, settings, wheel, box, result):
+def _write_wheel(model, wheel, box, result):
     """Write the bounds on load, sinkage, torque saturation and utilisation of a wheel."""
+    ground, linkage, settings = model.ground, model.linkage, model.settings
     weight = linkage.mass * linkage.gravity
     lightest, heaviest = weight * box.smallest[LOAD + wheel], weight * box.largest[LOAD + wheel]
     backward, forward = weight * box.smallest[PULL + wheel], weight * box.largest[PULL + wheel]
@@ -166,10 +189,12 @@ def _write_wheel(ground, linkage, settings, wheel, box, result):
         shallowest = np.inf
         for k in range(box.soil_count[wheel]):
             copy_soil(ground, box.soils[wheel, k], soil)
-            light = solve_wheel(soil, 1.0, linkage.radius, linkage.width, lightest, 0.0, 0.0)
-            heavy = solve_wheel(soil, 1.0, linkage.radius, linkage.width, heaviest, 0.0, 0.0)
-            shallowest, deepest = min(shallowest, light[1]), max(deepest, heavy[1])
-            resistance = max(resistance, heavy[2])
+            own = SoilWheel(linkage.radius, linkage.width, 1.0)
+            light = solve_wheel(soil, own, lightest, 0.0, 0.0)
+            heavy = solve_wheel(soil, own, heaviest, 0.0, 0.0)
+            shallowest = min(shallowest, light.sinkage)
+            deepest = max(deepest, heavy.sinkage)
+            resistance = max(resistance, heavy.resistance)
     result.sinkage[wheel, 0], result.sinkage[wheel, 1] = shallowest, deepest
     result.torque_saturation[wheel, 0] = linkage.radius * least / settings.max_torque
     result.torque_saturation[wheel, 1] = linkage.radius * (most + resistance) / settings.max_torque

@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.forces import MAX_SOILS
-from rover_physics.bounds.kernel import NOMINAL, find_bounds
+from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
 from rover_physics.errors import ModelError
-from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.model_setup import pack_model
 from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import Floats, PathPrediction
 from rover_physics.prediction.sweep import sweep_lock
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.terrain.ground import Ground, pack_ground
+from rover_physics.terrain.ground import pack_ground
 
 SIGMAS = 3.0
 """Standard deviations of the map that are allowed for unless told."""
@@ -57,8 +58,8 @@ def bound_path(
     rover: Rover,
     terrain: Terrain,
     prediction: PathPrediction,
+    options: SweepOptions = DEFAULT_OPTIONS,
     sigmas: float | None = SIGMAS,
-    **arguments: Any,
 ) -> PathBounds | None:
     """Bound what was predicted along a path where the heights of the map are uncertain.
 
@@ -66,8 +67,8 @@ def bound_path(
         rover: The rover.
         terrain: The ground, with its layer `elevation_std`.
         prediction: Of `sweep_path` over the same terrain.
+        options: Those that `sweep_path` had.
         sigmas: Standard deviations by which each height may be wrong; 0 or None for no bounds.
-        arguments: The further arguments that `sweep_path` had.
 
     Returns:
         Bounds on each waypoint that contain the prediction; None where there is nothing to
@@ -85,24 +86,22 @@ def bound_path(
             f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
             f"most {MAX_SOILS - 1}"
         )
-    low, high, error = _spread(terrain, allowed)
-    setup = set_up(rover, terrain, **arguments)
+    ground, model = _pack_uncertain(terrain, allowed), pack_model(rover, terrain, options)
     with sweep_lock:
-        found = find_bounds(setup, low, high, error, prediction.poses, _pack_nominal(prediction))
+        found = find_bounds(model, ground, prediction.poses, _pack_nominal(prediction))
     values = {name: _include(found[name], prediction, name) for name in BOUNDED_VALUES}
     return PathBounds(sigmas=allowed, status=found.status.copy(), **values)
 
 
 @lru_cache(maxsize=2)
-def _spread(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Ground]:
-    """Return the lowest and the highest ground, and how far they are from the one in between."""
+def _pack_uncertain(terrain: Terrain, sigmas: float) -> UncertainGround:
+    """Return the terrain as low and as high as its errors allow."""
     assert terrain.elevation_std is not None
     error = np.ascontiguousarray(sigmas * terrain.elevation_std)
-    low, high, between = (
-        pack_ground(replace(terrain, elevation=elevation))
-        for elevation in (terrain.elevation - error, terrain.elevation + error, error)
+    heights = (terrain.elevation - error, terrain.elevation + error, error)
+    return UncertainGround(
+        *(pack_ground(replace(terrain, elevation=elevation)) for elevation in heights)
     )
-    return low, high, between
 
 
 def _pack_nominal(prediction: PathPrediction) -> Any:

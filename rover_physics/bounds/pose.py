@@ -13,18 +13,15 @@ Robotics 37(5), 2020.
 
 import numpy as np
 
-from rover_physics.contact.contact_record import FULL, IN_CONTACT, OFF_MAP, QUICK
-from rover_physics.contact.settling import LEVEL, SLOPED, write_gap_rates
+from rover_physics.contact.contact_record import SearchScope
+from rover_physics.contact.settling import GroundSlope, write_gap_rates
 from rover_physics.contact.wheel import find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
-from rover_physics.prediction.evaluation import WORK
 from rover_physics.rover.linkage import place, rocker_sign
+from rover_physics.status import BoundStatus, ContactStatus
 
-BOUNDED, NOT_SETTLED, ON_EDGE, UNKNOWN_NEAR, OFF_MAP_NEAR, SINGULAR = 0, 1, 2, 3, 4, 5
-"""What becomes of a pose: bounded; not settled to begin with; a wheel may climb or fall off an
-edge; unknown ground or the map's edge is within reach; the forces are not determined there."""
 NOMINAL_GAP = 1e-2
 """Largest gap, in wheel radii, at which a predicted configuration counts as standing. Beside rocks
 a search may miss the nearest point by so much; bounds are then widened by it."""
@@ -43,7 +40,6 @@ MAX_TURN = 0.3
 """Largest turn of a step [rad]."""
 
 SPREAD = record_type(
-    ("model", WORK),  # work space of the model
     ("q", float, (6,)),  # the nominal configuration, as in `settling`
     ("rates", float, (6, 6)),  # derivatives of the gaps by q
     ("response", float, (6, 6)),  # derivatives of q by the wheels' heights
@@ -61,64 +57,71 @@ SPREAD = record_type(
 
 
 @kernel
-def bound_configuration(ground, low, high, linkage, samples, pose, spread):
-    """Write into `spread` how far its nominal q may change between two surfaces.
+def bound_configuration(uncertain, work):
+    """Write into `work.spread` how far its nominal q may change between two surfaces.
 
-    pose (3,) is x, y [m] and yaw [rad]. Returns BOUNDED or what keeps it from being bounded.
+    Args:
+        uncertain: UNCERTAIN, the model on the nominal, the lowest and the highest ground.
+        work: BOUNDS_WORK with the pose and the nominal q.
+
+    Returns:
+        A BoundStatus.
     """
-    outcome = _find_heights(ground, low, high, linkage, samples, pose, spread)
-    if outcome != BOUNDED:
+    spread = work.spread
+    outcome = _find_heights(uncertain, work)
+    if outcome != BoundStatus.BOUNDED:
         return outcome
-    if _may_change_level(low, high, linkage, samples, spread):
-        return ON_EDGE
+    if _may_change_level(uncertain, work):
+        return BoundStatus.ON_EDGE
     for i in range(6):
         spread.q_low[i] = spread.q_high[i] = spread.q[i]
     for angle in range(1, 6):
         for side in range(2):
-            outcome = _settle_extreme(
-                low, high, linkage, samples, pose, angle, 1.0 - 2.0 * side, spread
-            )
-            if outcome != BOUNDED:
+            outcome = _settle_extreme(uncertain, work, angle, 1.0 - 2.0 * side)
+            if outcome != BoundStatus.BOUNDED:
                 return outcome
-    return BOUNDED
+    return BoundStatus.BOUNDED
 
 
 @kernel
-def _find_heights(ground, low, high, linkage, samples, pose, spread):
-    """Write the response and the interval of each wheel's height; leave the nominal touch."""
-    work = spread.model
-    placement, contacts = work.placement, work.contacts
-    place(linkage, pose[0], pose[1], pose[2], spread.q, placement)
+def _find_heights(uncertain, work):
+    """Write the response and the interval of each wheel's height; leave the nominal contacts."""
+    rover, spread, linkage = work.rover, work.spread, uncertain.nominal.linkage
+    placement, contacts = rover.placement, rover.contacts
+    place(linkage, rover.pose, spread.q, placement)
     spread.low[:] = 0.0
     spread.high[:] = 0.0
     for wheel in range(6):
         for surface in range(2):
-            outcome = _find_contact_on(
-                low if surface == 0 else high, samples, placement, wheel, contacts
-            )
-            if outcome != BOUNDED:
+            model = uncertain.low if surface == 0 else uncertain.high
+            outcome = _find_contact_on(model, rover, wheel)
+            if outcome != BoundStatus.BOUNDED:
                 return outcome
             if surface == 0:
                 spread.low[wheel] = -contacts.gap[wheel]
             else:
                 spread.high[wheel] = -contacts.gap[wheel]
-        outcome = _find_contact_on(ground, samples, placement, wheel, contacts)
-        if outcome != BOUNDED:
+        outcome = _find_contact_on(uncertain.nominal, rover, wheel)
+        if outcome != BoundStatus.BOUNDED:
             return outcome
         gap = contacts.gap[wheel]
         if abs(gap) > NOMINAL_GAP * linkage.radius:
-            return ON_EDGE
+            return BoundStatus.ON_EDGE
         spread.low[wheel] = min(spread.low[wheel] + gap, 0.0)
         spread.high[wheel] = max(spread.high[wheel] + gap, 0.0)
         in_doubt = spread.high[wheel] > spread.low[wheel]
         if in_doubt and abs(gap) > EXTREME_GAP * linkage.radius:
             spread.low[wheel] -= abs(gap)
             spread.high[wheel] += abs(gap)
-    write_gap_rates(linkage, placement, contacts, LEVEL, spread.rates)
-    if not _invert(spread.rates, work.J, spread.lift):
-        return ON_EDGE
-    write_gap_rates(linkage, placement, contacts, SLOPED, spread.rates)
-    return BOUNDED if _invert(spread.rates, work.J, spread.response) else ON_EDGE
+    write_gap_rates(linkage, placement, contacts, GroundSlope.LEVEL, spread.rates)
+    if not _invert(spread.rates, rover.J, spread.lift):
+        return BoundStatus.ON_EDGE
+    write_gap_rates(linkage, placement, contacts, GroundSlope.SLOPED, spread.rates)
+    return (
+        BoundStatus.BOUNDED
+        if _invert(spread.rates, rover.J, spread.response)
+        else BoundStatus.ON_EDGE
+    )
 
 
 @kernel
@@ -132,21 +135,23 @@ def _invert(matrix, copy, inverse):
 
 
 @kernel
-def _may_change_level(low, high, linkage, samples, spread):
+def _may_change_level(uncertain, work):
     """Tell whether any wheel of the placed rover may climb or fall to another level."""
-    placement, contacts = spread.model.placement, spread.model.contacts
+    rover, spread, linkage = work.rover, work.spread, uncertain.nominal.linkage
+    placement, contacts = rover.placement, rover.contacts
     fx, fy = placement.forward[0], placement.forward[1]
     for wheel in range(6):
         slope = -contacts.normal[wheel, 0] * fx - contacts.normal[wheel, 1] * fy
-        along, reach = _find_moves(linkage, wheel, spread)
+        along, reach = _find_moves(linkage, work, wheel)
         spread.reach[wheel] = reach
         ahead, arm = _find_arm(linkage, wheel, placement)
         for way in range(2):
-            surface, sign = high if way == 0 else low, 1.0 - 2.0 * way
+            surface = uncertain.high if way == 0 else uncertain.low
+            sign = 1.0 - 2.0 * way
             margin = spread.high[wheel] if way == 0 else -spread.low[wheel]
             for side in range(2):
                 shift = reach * (1.0 - 2.0 * side)
-                rise = sign * _rise_at(surface, samples, placement, wheel, shift, contacts)
+                rise = sign * _rise_at(surface, rover, wheel, shift)
                 if rise - sign * slope * shift - margin > JUMP * linkage.radius:
                     return True
                 for level in LEVELS:
@@ -154,7 +159,7 @@ def _may_change_level(low, high, linkage, samples, spread):
                     move = along * sign * needed + shift
                     if ahead * shift <= 0.0:
                         move -= np.copysign(0.5 * needed * needed / arm, ahead)
-                    rise = sign * _rise_at(surface, samples, placement, wheel, move, contacts)
+                    rise = sign * _rise_at(surface, rover, wheel, move)
                     if rise - margin > needed:
                         return True
     return False
@@ -177,35 +182,37 @@ def _find_arm(linkage, wheel, placement):
 
 
 @kernel
-def _rise_at(surface, samples, placement, wheel, move, contacts):
+def _rise_at(model, rover, wheel, move):
     """Return how much higher than now a wheel is where it is moved forward [m]."""
+    placement = rover.placement
     x, y = placement.centres[wheel, 0], placement.centres[wheel, 1]
     placement.centres[wheel, 0] += move * placement.forward[0]
     placement.centres[wheel, 1] += move * placement.forward[1]
-    find_contact(surface, samples, placement, wheel, QUICK, contacts)
+    find_contact(model, rover, wheel, SearchScope.QUICK)
     placement.centres[wheel, 0], placement.centres[wheel, 1] = x, y
-    return -contacts.gap[wheel]
+    return -rover.contacts.gap[wheel]
 
 
 @kernel
-def _find_moves(linkage, wheel, spread):
+def _find_moves(linkage, work, wheel):
     """Return how far a wheel moves forward per metre that it alone rises, and at most [m].
 
     The latter is as all wheels rise or fall on the uncertain ground.
     """
-    placement, rate = spread.model.placement, spread.rate
+    placement, spread = work.rover.placement, work.spread
+    rate = spread.rate
     R, origin, centre = placement.R, placement.origin, placement.centres[wheel]
     forward = placement.forward
     length, side = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0]), wheel // 3
     rate[:] = 0.0
-    rate[1] = _shift(R[0, 0], R[1, 0], R[2, 0], centre, origin, forward)
-    rate[2] = _shift(-R[1, 0] / length, R[0, 0] / length, 0.0, centre, origin, forward)
-    ax, ay, az = R[0, 1], R[1, 1], R[2, 1]
+    rate[1] = _shift((R[0, 0], R[1, 0], R[2, 0]), centre, origin, forward)
+    rate[2] = _shift((-R[1, 0] / length, R[0, 0] / length, 0.0), centre, origin, forward)
+    axis = R[0, 1], R[1, 1], R[2, 1]
     pivot = placement.rocker_pivots[side]
-    rate[3] = rocker_sign(side) * _shift(ax, ay, az, centre, pivot, forward)
+    rate[3] = rocker_sign(side) * _shift(axis, centre, pivot, forward)
     if linkage.on_bogie[wheel]:
         pivot = placement.bogie_pivots[side]
-        rate[4 + side] = _shift(ax, ay, az, centre, pivot, forward)
+        rate[4 + side] = _shift(axis, centre, pivot, forward)
     own, reach = 0.0, 0.0
     for other in range(6):
         change = 0.0
@@ -218,25 +225,32 @@ def _find_moves(linkage, wheel, spread):
 
 
 @kernel
-def _shift(ax, ay, az, point, pivot, forward):
+def _shift(axis, point, pivot, forward):
     """Return how fast a point goes forward in a turn about an axis through `pivot`."""
+    ax, ay, az = axis
     x, y, z = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
     return forward[0] * (ay * z - az * y) + forward[1] * (az * x - ax * z)
 
 
 @kernel
-def _find_contact_on(ground, samples, placement, wheel, contacts):
-    """Find the touch of a wheel on one surface."""
-    outcome = find_contact(ground, samples, placement, wheel, QUICK, contacts)
-    if outcome != IN_CONTACT or contacts.gap[wheel] != contacts.gap[wheel]:
-        return OFF_MAP_NEAR if outcome == OFF_MAP else UNKNOWN_NEAR
-    find_contact(ground, samples, placement, wheel, FULL, contacts)
-    return BOUNDED
+def _find_contact_on(model, rover, wheel):
+    """Find the contact of a wheel on one surface; return a BoundStatus."""
+    contacts = rover.contacts
+    outcome = find_contact(model, rover, wheel, SearchScope.QUICK)
+    if outcome != ContactStatus.IN_CONTACT or contacts.gap[wheel] != contacts.gap[wheel]:
+        return (
+            BoundStatus.OFF_MAP_NEAR
+            if outcome == ContactStatus.OFF_MAP
+            else BoundStatus.UNKNOWN_NEAR
+        )
+    find_contact(model, rover, wheel, SearchScope.FULL)
+    return BoundStatus.BOUNDED
 
 
 @kernel
-def _settle_extreme(low, high, linkage, samples, pose, angle, sign, spread):
+def _settle_extreme(uncertain, work, angle, sign):
     """Settle where q[angle] is largest (sign 1) or smallest (-1); widen the bounds to that."""
+    spread, radius = work.spread, uncertain.nominal.linkage.radius
     q = spread.trial
     largest = 0.0
     for i in range(6):
@@ -249,62 +263,63 @@ def _settle_extreme(low, high, linkage, samples, pose, angle, sign, spread):
         for i in range(6):
             q[i] += spread.response[i, wheel] * height
     if largest == 0.0:
-        return BOUNDED
-    outcome, worst = _approach(low, high, linkage, samples, pose, spread)
-    if outcome != BOUNDED:
+        return BoundStatus.BOUNDED
+    outcome, worst = _approach(uncertain, work)
+    if outcome != BoundStatus.BOUNDED:
         return outcome
-    if worst > MAX_GAP_LEFT * linkage.radius:
-        return ON_EDGE
-    _include_trial(linkage, worst > EXTREME_GAP * linkage.radius, spread)
-    return BOUNDED
+    if worst > MAX_GAP_LEFT * radius:
+        return BoundStatus.ON_EDGE
+    _include_trial(work, worst > EXTREME_GAP * radius)
+    return BoundStatus.BOUNDED
 
 
 @kernel
-def _approach(low, high, linkage, samples, pose, spread):
+def _approach(uncertain, work):
     """Take Newton steps from the trial; return the outcome and the largest gap left [m]."""
-    work, q = spread.model, spread.trial
+    linkage, rover, q = uncertain.nominal.linkage, work.rover, work.spread.trial
     worst = 0.0
     for attempt in range(EXTREME_STEPS):
-        outcome, worst = _find_trial_contacts(low, high, linkage, samples, pose, spread)
-        if outcome != BOUNDED or worst <= EXTREME_GAP * linkage.radius:
+        outcome, worst = _find_trial_contacts(uncertain, work)
+        if outcome != BoundStatus.BOUNDED or worst <= EXTREME_GAP * linkage.radius:
             return outcome, worst
         if attempt == EXTREME_STEPS - 1:
             break
-        write_gap_rates(linkage, work.placement, work.contacts, SLOPED, work.J)
+        write_gap_rates(linkage, rover.placement, rover.contacts, GroundSlope.SLOPED, rover.J)
         for wheel in range(6):
-            work.step[wheel, 0] = work.contacts.gap[wheel]
-        if not solve_in_place(work.J, work.step, 6, 1):
-            return np.int64(ON_EDGE), worst
+            rover.step[wheel, 0] = rover.contacts.gap[wheel]
+        if not solve_in_place(rover.J, rover.step, 6, 1):
+            return BoundStatus.ON_EDGE, worst
         turn = 0.0
         for i in range(1, 6):
-            turn = max(turn, abs(work.step[i, 0]))
+            turn = max(turn, abs(rover.step[i, 0]))
         share = min(1.0, MAX_TURN / turn) if turn > 0.0 else 1.0
         if attempt > 3:
             share *= 0.5
         for i in range(6):
-            q[i] -= share * work.step[i, 0]
-    return np.int64(BOUNDED), worst
+            q[i] -= share * rover.step[i, 0]
+    return BoundStatus.BOUNDED, worst
 
 
 @kernel
-def _find_trial_contacts(low, high, linkage, samples, pose, spread):
+def _find_trial_contacts(uncertain, work):
     """Touch with each wheel of the trial on its surface; return outcome and largest gap [m]."""
-    work = spread.model
-    place(linkage, pose[0], pose[1], pose[2], spread.trial, work.placement)
+    rover, spread = work.rover, work.spread
+    place(uncertain.nominal.linkage, rover.pose, spread.trial, rover.placement)
     worst = 0.0
     for wheel in range(6):
-        surface = high if spread.raised[wheel] == 1 else low
-        outcome = _find_contact_on(surface, samples, work.placement, wheel, work.contacts)
-        if outcome != BOUNDED:
-            return np.int64(outcome), np.inf
-        worst = max(worst, abs(work.contacts.gap[wheel]))
-    return np.int64(BOUNDED), worst
+        model = uncertain.high if spread.raised[wheel] == 1 else uncertain.low
+        outcome = _find_contact_on(model, rover, wheel)
+        if outcome != BoundStatus.BOUNDED:
+            return outcome, np.inf
+        worst = max(worst, abs(rover.contacts.gap[wheel]))
+    return BoundStatus.BOUNDED, worst
 
 
 @kernel
-def _include_trial(linkage, unsettled, spread):
+def _include_trial(work, unsettled):
     """Widen the bounds on q and on the wheels' heights to the trial and what is left of gaps."""
-    q, gap = spread.trial, spread.model.contacts.gap
+    spread, gap = work.spread, work.rover.contacts.gap
+    q = spread.trial
     for i in range(6):
         left = 0.0
         for wheel in range(6 if unsettled else 0):

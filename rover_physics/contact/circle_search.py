@@ -18,16 +18,27 @@ BESIDE_SHARE = 0.8
 
 
 @kernel
-def search_circle(ground, samples, placement, wheel, across, s, c):
-    """Return the smallest gap [m] of a circle near the angle of (s, c), and where.
-
-    That is sine and cosine of the angle, and the slope of the ground there along x and y.
+def search_circle(model, work, circle, turn):
+    """Return the smallest gap [m] of a circle near an angle, and where.
 
     On a plane the circle touches in the direction of the plane's normal, so the first trials look
     in the direction of the normal found last. On an edge that leads to and fro: then the next
     trial is where the tangents of the gap from both sides meet, which is also where the gap can't
-    be smaller. Infinite over unknown ground.
+    be smaller.
+
+    Args:
+        model: A record with `ground` and `samples`.
+        work: A record with `placement`.
+        circle: (index of the wheel, distance of the circle from its middle plane [m]).
+        turn: (sine, cosine) of the angle to begin with.
+
+    Returns:
+        Gap [m], infinite over unknown ground; (sine, cosine) of the contact angle; slope of the
+        ground there (along x, along y).
     """
+    ground, samples, placement = model.ground, model.samples, work.placement
+    wheel, across = circle
+    s, c = turn
     R, centres, forward, up = placement.R, placement.centres, placement.forward, placement.up
     radius, scale = samples.radius, ground.inverse_resolution
     x = (centres[wheel, 0] + across * R[0, 1] - ground.x0) * scale
@@ -45,9 +56,9 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
         gap = z - c * down_z - height
         rise = slope_x * forward[0] + slope_y * forward[1]
         fall = up[2] - slope_x * up[0] - slope_y * up[1]
-        turn = s * fall - c * rise
+        tilt = s * fall - c * rise
         straight = s * rise + c * fall
-        converged = not abs(turn) > TURN_TOLERANCE * straight
+        converged = not abs(tilt) > TURN_TOLERANCE * straight
         if gap < best:
             best, best_s, best_c, best_x, best_y = gap, s, c, slope_x, slope_y
             if converged:
@@ -63,10 +74,10 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
                 back_s, back_c = s * turn_c - c * turn_s, c * turn_c + s * turn_s
             if c * turn_c - s * turn_s > 0.0:
                 ahead_s, ahead_c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
-        if turn > 0.0:
-            ahead_s, ahead_c, ahead_gap, ahead_rate = s, c, gap, radius * turn
+        if tilt > 0.0:
+            ahead_s, ahead_c, ahead_gap, ahead_rate = s, c, gap, radius * tilt
         else:
-            back_s, back_c, back_gap, back_rate = s, c, gap, radius * turn
+            back_s, back_c, back_gap, back_rate = s, c, gap, radius * tilt
         share = 0.5
         if back_gap < np.inf and ahead_gap < np.inf:
             between = ahead_s * back_c - ahead_c * back_s
@@ -83,35 +94,36 @@ def search_circle(ground, samples, placement, wheel, across, s, c):
             s, c = back_s + share * (ahead_s - back_s), back_c + share * (ahead_c - back_c)
             inverse = 1.0 / np.sqrt(s * s + c * c)
             s, c = s * inverse, c * inverse
-    return best, best_s, best_c, best_x, best_y
+    return best, (best_s, best_c), (best_x, best_y)
 
 
 @kernel
-def refine_from(ground, samples, placement, wheel, m, s, c, contacts):
-    """Search circle m near (s, c), keep what is nearer than before, and return the gap found."""
-    gap, s, c, slope_x, slope_y = search_circle(
-        ground, samples, placement, wheel, samples.laterals[m], s, c
-    )
+def refine_from(model, work, wheel, m, turn):
+    """Search circle m near `turn`, keep what is nearer than before, and return the gap found."""
+    contacts = work.contacts
+    gap, turn, slope = search_circle(model, work, (wheel, model.samples.laterals[m]), turn)
     if gap < contacts.circle_gap[wheel, m]:
         contacts.circle_gap[wheel, m] = gap
-        contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m] = s, c
-        contacts.circle_slope[wheel, m, 0], contacts.circle_slope[wheel, m, 1] = slope_x, slope_y
+        contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m] = turn
+        contacts.circle_slope[wheel, m, 0], contacts.circle_slope[wheel, m, 1] = slope
     return gap
 
 
 @kernel
-def refine_circle(ground, samples, placement, wheel, m, contacts):
+def refine_circle(model, work, wheel, m):
     """Search circle m anew from where it was nearest."""
-    s, c = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
+    contacts = work.contacts
+    turn = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
     contacts.circle_gap[wheel, m] = np.inf
-    refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+    refine_from(model, work, wheel, m, turn)
     if contacts.circle_gap[wheel, m] == np.inf:
         contacts.circle_gap[wheel, m] = np.nan
 
 
 @kernel
-def refine_others(ground, samples, placement, wheel, contacts):
+def refine_others(model, work, wheel):
     """Look closer at the circles with samples that come near to the smallest gap."""
+    samples, contacts = model.samples, work.contacts
     reach = contacts.noted_gap[wheel] + CIRCLE_REACH * samples.radius
     nearest = contacts.nearest[wheel]
     s0, c0 = contacts.circle_sine[wheel, nearest], contacts.circle_cosine[wheel, nearest]
@@ -125,28 +137,30 @@ def refine_others(ground, samples, placement, wheel, contacts):
             if abs(s * c0 - c * s0) < samples.spacing_sine and not lower:
                 s, c = s0, c0
             if m != nearest or s != s0:
-                refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+                refine_from(model, work, wheel, m, (s, c))
         if contacts.second_gap[wheel, m] <= reach:
             k = contacts.second_row[wheel, m]
             s, c = samples.sines[k], samples.cosines[k]
-            refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+            refine_from(model, work, wheel, m, (s, c))
         if contacts.circle_gap[wheel, m] < contacts.circle_gap[wheel, contacts.nearest[wheel]]:
             contacts.nearest[wheel] = m
     reach = contacts.circle_gap[wheel, contacts.nearest[wheel]] + BESIDE_REACH * samples.radius
     for m in range(samples.circles):
         if contacts.circle_gap[wheel, m] <= reach:
-            _look_beside(ground, samples, placement, wheel, m, contacts)
+            _look_beside(model, work, wheel, m)
             if contacts.circle_gap[wheel, m] < contacts.circle_gap[wheel, contacts.nearest[wheel]]:
                 contacts.nearest[wheel] = m
 
 
 @kernel
-def _look_beside(ground, samples, placement, wheel, m, contacts):
+def _look_beside(model, work, wheel, m):
     """Search circle m from between the samples, too, where the ground comes nearer there.
 
     Over a plane the gap grows away from the smallest with the rise of the circle; where it grows
     less, a wheel that bridges a hollow may come nearer to the hollow's other side.
     """
+    ground, samples = model.ground, model.samples
+    placement, contacts = work.placement, work.contacts
     R, forward, up = placement.R, placement.forward, placement.up
     centres, radius, across = placement.centres, samples.radius, samples.laterals[m]
     gap, s0, c0 = (
@@ -164,4 +178,4 @@ def _look_beside(ground, samples, placement, wheel, m, contacts):
         x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
         y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
         if lowest - look_up(ground, x, y)[0] < limit:
-            refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+            refine_from(model, work, wheel, m, (s, c))

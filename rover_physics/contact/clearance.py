@@ -59,13 +59,13 @@ def belly_clearance(ground, linkage, placement):
                 nearest, nearest_i, nearest_j = bound, bi, bj
     smallest = np.inf
     if nearest < np.inf:
-        smallest = _clear_block(ground, plane, belly, nearest_i, nearest_j, np.inf)
+        smallest = _clear_block(ground, plane, belly, (nearest_i, nearest_j), np.inf)
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
             if _lowest_above(plane, bi, bj) - _known_max_of(
                 ground, bi, bj
             ) < smallest and _is_below(plane, belly, bi, bj):
-                smallest = _clear_block(ground, plane, belly, bi, bj, smallest)
+                smallest = _clear_block(ground, plane, belly, (bi, bj), smallest)
     return smallest if smallest < np.inf else _clear_points(ground, R, origin, belly)
 
 
@@ -142,8 +142,9 @@ def _is_below(plane, belly, bi, bj):
 
 
 @kernel
-def _clear_block(ground, plane, belly, bi, bj, smallest):
+def _clear_block(ground, plane, belly, block, smallest):
     """Return the smaller of `smallest` and the clearance [m] above the cells of a block."""
+    bi, bj = block
     for i in range(BLOCK * bi, min(BLOCK * (bi + 1), ground.rows)):
         z = plane.z + plane.z_i * i
         for j in range(BLOCK * bj, min(BLOCK * (bj + 1), ground.columns)):

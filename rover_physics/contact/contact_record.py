@@ -1,5 +1,6 @@
 """The record of where the wheels touch the ground, and how thoroughly that is looked for."""
 
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -7,9 +8,24 @@ import numpy as np
 from rover_physics.contact.wheel_samples import MAX_CIRCLES
 from rover_physics.numerics.records import new_record, record_type
 
-IN_CONTACT, OFF_MAP, UNKNOWN_GROUND = 0, 1, 2
-COARSE, QUICK, NEAR, FULL, AGAIN, EXACT = np.arange(6)
-"""Scopes of `find_touch`. Not plain integers, or each value would be compiled apart."""
+
+class SearchScope(IntEnum):
+    """How thoroughly `find_contact` looks for the place of a wheel that is nearest the ground."""
+
+    COARSE = 0
+    """Every other sample of the middle circle."""
+    QUICK = 1
+    """All samples, and closer at the nearest."""
+    NEAR = 2
+    """Only around the direction found last."""
+    FULL = 3
+    """All samples, and closer at each other circle that comes near."""
+    AGAIN = 4
+    """Closer only at the circles that FULL found near."""
+    EXACT = 5
+    """Closer at each local minimum of each circle."""
+
+
 CIRCLE_REACH = 2e-2
 """How far above the nearest circle, in wheel radii, another one is looked at more closely."""
 FAR_ROW = -9

@@ -3,17 +3,9 @@
 import numpy as np
 
 from rover_physics.contact.circle_search import refine_from
-from rover_physics.contact.contact_record import (
-    CIRCLE_REACH,
-    COARSE,
-    EXACT,
-    FAR_ROW,
-    FULL,
-    IN_CONTACT,
-    OFF_MAP,
-    UNKNOWN_GROUND,
-)
+from rover_physics.contact.contact_record import CIRCLE_REACH, FAR_ROW, SearchScope
 from rover_physics.numerics.kernels import kernel
+from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import (
     elevation_of,
     find_block_max,
@@ -28,38 +20,35 @@ a face much can lie between two samples."""
 
 
 @kernel
-def scan_rim(ground, samples, placement, wheel, scope, contacts):
+def scan_rim(model, work, wheel, scope):
     """Sample the rim; write the nearest samples into `touch` and return the worst status."""
+    samples, contacts = model.samples, work.contacts
     start = samples.rows // 2
-    if scope == FULL:
+    if scope == SearchScope.FULL:
         start = contacts.first_row[wheel, contacts.noted_circle[wheel]]
     for m in range(samples.circles):
         contacts.first_row[wheel, m] = contacts.second_row[wheel, m] = FAR_ROW
         contacts.first_gap[wheel, m] = contacts.second_gap[wheel, m] = np.inf
     contacts.block_max[wheel] = np.inf
-    if scope == COARSE:
-        middle = samples.circles // 2
-        return _scan_carefully(
-            ground, samples, placement, wheel, False, middle, middle, 2, contacts
-        )
-    if scope != EXACT:
-        rear = _find_max_below_half(ground, samples, placement, wheel, -0.5)
-        front = _find_max_below_half(ground, samples, placement, wheel, 0.5)
-        if rear < np.inf and front < np.inf:
-            contacts.block_max[wheel] = max(rear, front)
-            reach = CIRCLE_REACH * samples.radius if scope == FULL else 0.0
-            _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, contacts)
-            return IN_CONTACT
-    last = samples.circles - 1
-    return _scan_carefully(ground, samples, placement, wheel, scope == EXACT, 0, last, 1, contacts)
+    if scope == SearchScope.COARSE or scope == SearchScope.EXACT:
+        return _scan_carefully(model, work, wheel, scope)
+    rear = _find_max_below_half(model, work, wheel, -0.5)
+    front = _find_max_below_half(model, work, wheel, 0.5)
+    if rear < np.inf and front < np.inf:
+        contacts.block_max[wheel] = max(rear, front)
+        reach = CIRCLE_REACH * samples.radius if scope == SearchScope.FULL else 0.0
+        _scan_inside(model, work, wheel, (rear, front), (reach, start))
+        return ContactStatus.IN_CONTACT
+    return _scan_carefully(model, work, wheel, scope)
 
 
 @kernel
-def _find_max_below_half(ground, samples, placement, wheel, half):
+def _find_max_below_half(model, work, wheel, half):
     """Return the highest ground [m] below the rear (half -0.5) or front (0.5) half of a rim.
 
     Infinite where any ground there is unknown.
     """
+    ground, samples, placement = model.ground, model.samples, work.placement
     forward, up, centres = placement.forward, placement.up, placement.centres
     scale = ground.inverse_resolution
     along = 0.5 * samples.radius
@@ -75,14 +64,25 @@ def _find_max_below_half(ground, samples, placement, wheel, half):
 
 
 @kernel
-def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, contacts):
-    """Sample a rim over known ground, none of it higher than `rear` and `front` [m].
+def _scan_inside(model, work, wheel, tops, near):
+    """Sample a rim over known ground.
 
-    Rows of samples at one angle are visited: `start`, where the wheel was nearest before, then
-    from the lowest one to the rear and to the front, until even the highest ground
-    is farther below than the nearest sample, by `reach` [m]. What the loop reads is in local
-    variables: the compiler must take it that anything written may lie anywhere.
+    Rows of samples at one angle are visited: the start, where the wheel was nearest before, then
+    from the lowest one to the rear and to the front, until even the highest ground is farther
+    below than the nearest sample, by a reach. What the loop reads is in local variables: the
+    compiler must take it that anything written may lie anywhere.
+
+    Args:
+        model: A record with `ground` and `samples`.
+        work: A record with `placement` and `contacts`.
+        wheel: Index of the wheel.
+        tops: (below the rear half, below the front half) highest ground [m].
+        near: (reach [m], row of samples to start with).
     """
+    ground, samples = model.ground, model.samples
+    placement, contacts = work.placement, work.contacts
+    rear, front = tops
+    reach, start = near
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     scale, radius, circles = ground.inverse_resolution, samples.radius, samples.circles
     ahead_x, ahead_y = scale * radius * forward[0], scale * radius * forward[1]
@@ -117,7 +117,7 @@ def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, c
                 gy += step_y
                 gz += step_z
                 if gap < best + reach:
-                    _note_sample(wheel, m, k, 1, gap, contacts)
+                    _note_sample(contacts, (wheel, m), k, 1, gap)
                     if gap < best:
                         best, best_m = gap, m
             k += turn
@@ -125,8 +125,9 @@ def _scan_inside(ground, samples, placement, wheel, rear, front, reach, start, c
 
 
 @kernel
-def _note_sample(wheel, m, k, stride, gap, contacts):
+def _note_sample(contacts, circle, k, stride, gap):
     """Note a near sample of row k on circle m: the nearest, or the nearest away from that."""
+    wheel, m = circle
     if gap < contacts.first_gap[wheel, m]:
         if abs(k - contacts.first_row[wheel, m]) > stride:
             contacts.second_gap[wheel, m] = contacts.first_gap[wheel, m]
@@ -137,14 +138,21 @@ def _note_sample(wheel, m, k, stride, gap, contacts):
 
 
 @kernel
-def _scan_carefully(ground, samples, placement, wheel, exact, first, last, stride, contacts):
+def _scan_carefully(model, work, wheel, scope):
     """Sample a rim that may be over unknown ground, beyond the map or beside a face.
 
-    Where `exact`, each sample that may be near is refined at once. Returns the worst status.
+    COARSE looks at every other sample of the middle circle; EXACT refines each sample that may be
+    near at once. Returns the worst ContactStatus.
     """
+    ground, samples = model.ground, model.samples
+    placement, contacts = work.placement, work.contacts
+    exact = scope == SearchScope.EXACT
+    first, last, stride = 0, samples.circles - 1, 1
+    if scope == SearchScope.COARSE:
+        first, last, stride = samples.circles // 2, samples.circles // 2, 2
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
-    status, best, best_m = IN_CONTACT, np.inf, first
+    status, best, best_m = ContactStatus.IN_CONTACT, np.inf, first
     if exact:
         contacts.circle_gap[wheel, :] = np.inf
     middle = samples.rows // 2
@@ -157,20 +165,22 @@ def _scan_carefully(ground, samples, placement, wheel, exact, first, last, strid
             y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
             gx, gy = (x - ground.x0) * scale, (y - ground.y0) * scale
             if not is_cell_on_map(ground, gx, gy):
-                status = OFF_MAP
+                status = ContactStatus.OFF_MAP
                 continue
             gap = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
             gap -= height_at_cell(ground, gx, gy)
             if gap != gap:
-                if status == IN_CONTACT:
-                    status = UNKNOWN_GROUND
+                if status == ContactStatus.IN_CONTACT:
+                    status = ContactStatus.UNKNOWN_GROUND
                 continue
-            _note_sample(wheel, m, k, stride, gap, contacts)
-            if exact and gap < best + EXACT_REACH * radius and _may_come_near(
-                ground, samples, forward, up, gx, gy,
-                centres[wheel, 2] + across * R[2, 1], s, c, best,
-            ):  # fmt: skip
-                gap = refine_from(ground, samples, placement, wheel, m, s, c, contacts)
+            _note_sample(contacts, (wheel, m), k, stride, gap)
+            middle_z = centres[wheel, 2] + across * R[2, 1]
+            if (
+                exact
+                and gap < best + EXACT_REACH * radius
+                and _may_come_near(model, work, (gx, gy, middle_z), (s, c), best)
+            ):
+                gap = refine_from(model, work, wheel, m, (s, c))
             if gap < best:
                 best, best_m = gap, m
     contacts.noted_gap[wheel], contacts.noted_circle[wheel] = best, best_m
@@ -180,13 +190,23 @@ def _scan_carefully(ground, samples, placement, wheel, exact, first, last, strid
 
 
 @kernel
-def _may_come_near(ground, samples, forward, up, gx, gy, z, s, c, best):
-    """Tell whether a search of a circle from its sample at (s, c) may come near to `best` [m].
+def _may_come_near(model, work, place, turn, best):
+    """Tell whether a search of a circle from one of its samples may come near to `best` [m].
 
-    The sample is over (gx, gy), in cells, and the middle of the circle at the height z [m]. Not
-    where the highest cell below the stretch that is searched, a spacing to both sides, stays too
-    far below the lowest place of that stretch.
+    Not where the highest cell below the stretch that is searched, a spacing to both sides, stays
+    too far below the lowest place of that stretch.
+
+    Args:
+        model: A record with `ground` and `samples`.
+        work: A record with `placement`.
+        place: x and y of the sample in cells, height of the middle of its circle [m].
+        turn: (sine, cosine) of the sample's angle.
+        best: Smallest gap found so far [m].
     """
+    ground, samples = model.ground, model.samples
+    forward, up = work.placement.forward, work.placement.up
+    gx, gy, z = place
+    s, c = turn
     if not up[2] > 0.0:
         return True
     turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine

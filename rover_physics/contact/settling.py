@@ -5,23 +5,17 @@ conditions, the gaps of the wheels. This is the closure of the paper's eqs (1)-(
 small angles.
 """
 
+from enum import IntEnum
+
 import numpy as np
 
-from rover_physics.contact.contact_record import (
-    AGAIN,
-    COARSE,
-    EXACT,
-    FULL,
-    IN_CONTACT,
-    NEAR,
-    QUICK,
-)
+from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.rover.linkage import place, rocker_sign
+from rover_physics.status import ContactStatus, PoseStatus
 
-SETTLED, OFF_MAP, UNKNOWN_GROUND, NOT_SETTLED = 0, 1, 2, 3
 GAP_TOLERANCE = 3e-5
 """Largest gap left in a settled pose [m], found by a search of its own."""
 NEWTON_TOLERANCE = 5e-6
@@ -31,7 +25,6 @@ QUICK_ATTEMPTS = 5
 NOTES_HOLD = 1e-2
 """Gaps, in wheel radii, below which a step is too small to bring other circles near."""
 RECOVERIES = 6
-LEVEL, SLOPED = np.arange(2)
 RELAXATION_STEPS = 120
 RELAXED = 0.003
 """Largest gap, in wheel radii, at which relaxation hands over to Newton's method."""
@@ -42,73 +35,96 @@ TURNED_OVER = 1.45
 """Roll or pitch [rad] beyond which the search is given up: the rover is on its end or side."""
 
 
-@kernel
-def settle(ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step):
-    """Settle the rover with its body origin at (x, y) [m] heading `yaw` [rad]; q (6,) is written.
+class GroundSlope(IntEnum):
+    """How the ground counts in the derivatives of the gaps."""
 
-    Starts from the suspension at rest, so the answer depends on nothing but the pose. J (6, 6) and
-    step (6, 1) are work space. Returns SETTLED, OFF_MAP, UNKNOWN_GROUND or NOT_SETTLED.
+    LEVEL = 0
+    """As if it were level under each wheel."""
+    SLOPED = 1
+    """As it is."""
+
+
+@kernel
+def settle(model, work):
+    """Settle the rover at `work.pose`: write `work.q`, its placement and its contacts.
+
+    Starts from the suspension at rest, so the answer depends on nothing but the pose.
+
+    Args:
+        model: A record with `ground` GROUND, `linkage` LINKAGE and `samples` WHEEL_SAMPLES.
+        work: A record with `pose` (3,): x, y [m] and yaw [rad] of the body origin; `q` (6,),
+            `placement` PLACEMENT and `contacts` CONTACTS, which are written; and work space
+            `J` (6, 6), `step` (6, 1).
+
+    Returns:
+        A PoseStatus, other than NO_EQUILIBRIUM.
     """
-    q[:] = 0.0
-    place(linkage, x, y, yaw, q, placement)
-    status, worst = _find_contacts(ground, samples, placement, COARSE, contacts)
+    work.q[:] = 0.0
+    place(model.linkage, work.pose, work.q, work.placement)
+    status, worst = _find_contacts(model, work, SearchScope.COARSE)
     if np.isnan(worst):
-        return status
-    _descend(linkage, placement, contacts, q, 1.0, J, step)
-    return settle_from(ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step)
+        return _refuse(status)
+    _descend(model, work, 1.0)
+    return settle_from(model, work)
 
 
 @kernel
-def settle_from(ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step):
+def settle_from(model, work):
     """Settle the rover as `settle` does, but from the q that is given, such as a neighbour's.
 
     Faster than from rest, but over edges it depends on q which of several poses is found.
     """
-    place(linkage, x, y, yaw, q, placement)
-    status, worst = _find_contacts(ground, samples, placement, QUICK, contacts)
-    if status != IN_CONTACT:
-        return status
+    radius = model.linkage.radius
+    place(model.linkage, work.pose, work.q, work.placement)
+    status, worst = _find_contacts(model, work, SearchScope.QUICK)
+    if status != ContactStatus.IN_CONTACT:
+        return _refuse(status)
     worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
-        scope = AGAIN if worst <= NOTES_HOLD * linkage.radius else FULL
-        _newton(ground, linkage, samples, x, y, yaw, q, placement, NEAR, contacts, J, step)
-        status, worst = _find_contacts(ground, samples, placement, scope, contacts)
+        scope = SearchScope.AGAIN if worst <= NOTES_HOLD * radius else SearchScope.FULL
+        _newton(model, work, SearchScope.NEAR)
+        status, worst = _find_contacts(model, work, scope)
         if worst <= GAP_TOLERANCE or np.isnan(worst):
             break
     for attempt in range(RECOVERIES):
-        if worst <= GAP_TOLERANCE or np.isnan(worst) or status != IN_CONTACT:
+        if worst <= GAP_TOLERANCE or np.isnan(worst) or status != ContactStatus.IN_CONTACT:
             break
-        _find_contacts(ground, samples, placement, EXACT, contacts)
+        _find_contacts(model, work, SearchScope.EXACT)
         if attempt > 0:
-            relaxed = RELAXED * linkage.radius * RELAXED_FURTHER ** (attempt - 1)
-            scope = EXACT if attempt == RECOVERIES - 1 else QUICK
-            _relax(
-                relaxed, scope, ground, linkage, samples, x, y, yaw,
-                q, placement, contacts, J, step,
-            )  # fmt: skip
-        _newton(ground, linkage, samples, x, y, yaw, q, placement, EXACT, contacts, J, step)
-        status, worst = _find_contacts(ground, samples, placement, EXACT, contacts)
-        if _has_turned_over(q):
-            return NOT_SETTLED
-    if status != IN_CONTACT:
-        return status
-    if not worst <= GAP_TOLERANCE or _has_turned_over(q):
-        return NOT_SETTLED
+            relaxed = RELAXED * radius * RELAXED_FURTHER ** (attempt - 1)
+            last = attempt == RECOVERIES - 1
+            _relax(model, work, relaxed, SearchScope.EXACT if last else SearchScope.QUICK)
+        _newton(model, work, SearchScope.EXACT)
+        status, worst = _find_contacts(model, work, SearchScope.EXACT)
+        if _has_turned_over(work.q):
+            return PoseStatus.NOT_SETTLED
+    if status != ContactStatus.IN_CONTACT:
+        return _refuse(status)
+    if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
+        return PoseStatus.NOT_SETTLED
     for wheel in range(6):
-        blend_contact(samples, placement, wheel, contacts)
-    return SETTLED
+        blend_contact(model.samples, work, wheel)
+    return PoseStatus.SETTLED
 
 
 @kernel
-def _find_contacts(ground, samples, placement, scope, contacts):
-    """Return the status of the worst wheel and the largest absolute gap [m]."""
+def _refuse(status):
+    """Return the PoseStatus of a pose with a wheel off the known ground."""
+    if status == ContactStatus.OFF_MAP:
+        return PoseStatus.OFF_MAP
+    return PoseStatus.UNKNOWN_GROUND
+
+
+@kernel
+def _find_contacts(model, work, scope):
+    """Return the ContactStatus of the worst wheel and the largest absolute gap [m]."""
     worst = 0.0
-    status = IN_CONTACT
+    status = ContactStatus.IN_CONTACT
     for wheel in range(6):
-        of_wheel = find_contact(ground, samples, placement, wheel, scope, contacts)
-        if of_wheel == OFF_MAP or status == IN_CONTACT:
+        of_wheel = find_contact(model, work, wheel, scope)
+        if of_wheel == ContactStatus.OFF_MAP or status == ContactStatus.IN_CONTACT:
             status = of_wheel
-        gap = abs(contacts.gap[wheel])
+        gap = abs(work.contacts.gap[wheel])
         if gap > worst or gap != gap:
             worst = gap
         if worst != worst:
@@ -117,15 +133,16 @@ def _find_contacts(ground, samples, placement, scope, contacts):
 
 
 @kernel
-def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, contacts, J, step):
+def _newton(model, work, scope):
     """Newton's method on the gaps with a halving line search; returns the largest left."""
+    q, step = work.q, work.step
     worst = 0.0
     for wheel in range(6):
-        worst = max(worst, abs(contacts.gap[wheel]))
+        worst = max(worst, abs(work.contacts.gap[wheel]))
     for _ in range(NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE or np.isnan(worst):
             return worst
-        if not _find_step(linkage, placement, contacts, SLOPED, J, step):
+        if not _find_step(model.linkage, work, GroundSlope.SLOPED):
             return worst
         fraction = _limit_step(step)
         improved = np.inf
@@ -134,8 +151,8 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, contacts, 
             for i in range(6):
                 q[i] -= (fraction - taken) * step[i, 0]
             taken = fraction
-            place(linkage, x, y, yaw, q, placement)
-            status, improved = _find_contacts(ground, samples, placement, scope, contacts)
+            place(model.linkage, work.pose, q, work.placement)
+            status, improved = _find_contacts(model, work, scope)
             if improved < (1.0 - 0.1 * fraction) * worst:
                 break
             fraction *= 0.5
@@ -146,19 +163,19 @@ def _newton(ground, linkage, samples, x, y, yaw, q, placement, scope, contacts, 
 
 
 @kernel
-def _relax(relaxed, scope, ground, linkage, samples, x, y, yaw, q, placement, contacts, J, step):
+def _relax(model, work, relaxed, scope):
     """Let the wheels fall or rise by part of their gaps until none is above `relaxed` [m].
 
     Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
     its top, as it would on the ground.
     """
     for _ in range(RELAXATION_STEPS):
-        _descend(linkage, placement, contacts, q, RELAXATION, J, step)
-        place(linkage, x, y, yaw, q, placement)
-        status, worst = _find_contacts(ground, samples, placement, scope, contacts)
-        if not worst > relaxed or _has_turned_over(q):
+        _descend(model, work, RELAXATION)
+        place(model.linkage, work.pose, work.q, work.placement)
+        status, worst = _find_contacts(model, work, scope)
+        if not worst > relaxed or _has_turned_over(work.q):
             break
-    _find_contacts(ground, samples, placement, EXACT, contacts)
+    _find_contacts(model, work, SearchScope.EXACT)
 
 
 @kernel
@@ -167,12 +184,12 @@ def _has_turned_over(q):
 
 
 @kernel
-def _descend(linkage, placement, contacts, q, fraction, J, step):
+def _descend(model, work, fraction):
     """Take a fraction of the step that closes the gaps if the ground is level under each wheel."""
-    if _find_step(linkage, placement, contacts, LEVEL, J, step):
-        fraction *= _limit_step(step)
+    if _find_step(model.linkage, work, GroundSlope.LEVEL):
+        fraction *= _limit_step(work.step)
         for i in range(6):
-            q[i] -= fraction * step[i, 0]
+            work.q[i] -= fraction * work.step[i, 0]
 
 
 @kernel
@@ -185,45 +202,50 @@ def _limit_step(step):
 
 
 @kernel
-def _find_step(linkage, placement, contacts, ground_is, J, step):
-    """Solve J step = gaps; the ground counts as SLOPED as it is, or as LEVEL under each wheel."""
-    write_gap_rates(linkage, placement, contacts, ground_is, J)
+def _find_step(linkage, work, ground_is):
+    """Solve J step = gaps; `ground_is` a GroundSlope. False where J is singular."""
+    write_gap_rates(linkage, work.placement, work.contacts, ground_is, work.J)
     for i in range(6):
-        step[i, 0] = contacts.gap[i]
-    return solve_in_place(J, step, 6, 1)
+        work.step[i, 0] = work.contacts.gap[i]
+    return solve_in_place(work.J, work.step, 6, 1)
 
 
 @kernel
 def write_gap_rates(linkage, placement, contacts, ground_is, J):
-    """Write the derivatives of the gaps by q into J (6, 6); the ground is as in `_find_step`."""
+    """Write the derivatives of the gaps by q into J (6, 6); `ground_is` a GroundSlope."""
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
-    rocker_pivots, bogie_pivots = placement.rocker_pivots, placement.bogie_pivots
     point, normal = contacts.point, contacts.normal
     length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
-    cos_yaw, sin_yaw = R[0, 0] / length, R[1, 0] / length
-    nx, ny = 0.0, 0.0
+    body_x = R[0, 0], R[1, 0], R[2, 0]
+    body_y = R[0, 1], R[1, 1], R[2, 1]
+    level_y = -(R[1, 0] / length), R[0, 0] / length, 0.0
+    slope = 0.0, 0.0
     for i in range(6):
         side = i // 3
-        if ground_is == SLOPED:
-            nx, ny = normal[i, 0], normal[i, 1]
-        dx, dy, dz = point[i, 0] - origin[0], point[i, 1] - origin[1], point[i, 2] - origin[2]
+        if ground_is == GroundSlope.SLOPED:
+            slope = normal[i, 0], normal[i, 1]
+        arm = _arm_from(origin, point[i])
         J[i, 0] = 1.0
-        J[i, 1] = _gap_rate(R[0, 0], R[1, 0], R[2, 0], dx, dy, dz, nx, ny)
-        J[i, 2] = _gap_rate(-sin_yaw, cos_yaw, 0.0, dx, dy, dz, nx, ny)
-        dx = point[i, 0] - rocker_pivots[side, 0]
-        dy = point[i, 1] - rocker_pivots[side, 1]
-        dz = point[i, 2] - rocker_pivots[side, 2]
-        rate = _gap_rate(R[0, 1], R[1, 1], R[2, 1], dx, dy, dz, nx, ny)
-        J[i, 3] = rocker_sign(side) * rate
+        J[i, 1] = _gap_rate(body_x, arm, slope)
+        J[i, 2] = _gap_rate(level_y, arm, slope)
+        arm = _arm_from(placement.rocker_pivots[side], point[i])
+        J[i, 3] = rocker_sign(side) * _gap_rate(body_y, arm, slope)
         if linkage.on_bogie[i]:
-            dx = point[i, 0] - bogie_pivots[side, 0]
-            dy = point[i, 1] - bogie_pivots[side, 1]
-            dz = point[i, 2] - bogie_pivots[side, 2]
-            J[i, 4 + side] = _gap_rate(R[0, 1], R[1, 1], R[2, 1], dx, dy, dz, nx, ny)
+            arm = _arm_from(placement.bogie_pivots[side], point[i])
+            J[i, 4 + side] = _gap_rate(body_y, arm, slope)
 
 
 @kernel
-def _gap_rate(ax, ay, az, dx, dy, dz, nx, ny):
-    """Return how fast the gap at (dx, dy, dz) grows in a turn about the axis (ax, ay, az)."""
+def _arm_from(pivot, point):
+    """Return the way (x, y, z) [m] from a pivot (3,) to a point (3,)."""
+    return point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
+
+
+@kernel
+def _gap_rate(axis, arm, slope):
+    """Return how fast the gap at the end of `arm` grows in a turn about an axis; all tuples."""
+    ax, ay, az = axis
+    dx, dy, dz = arm
+    nx, ny = slope
     return nx * (ay * dz - az * dy) + ny * (az * dx - ax * dz) + (ax * dy - ay * dx)

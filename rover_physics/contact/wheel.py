@@ -10,9 +10,10 @@ angles.
 import numpy as np
 
 from rover_physics.contact.circle_search import refine_circle, refine_others
-from rover_physics.contact.contact_record import AGAIN, COARSE, FULL, IN_CONTACT, NEAR, QUICK
+from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.rim_scan import scan_rim
 from rover_physics.numerics.kernels import kernel
+from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import height_inside
 
 COMPLIANCE = 2e-3
@@ -21,41 +22,48 @@ that share the load. On a plane a wheel thus touches in its middle, not on an ed
 
 
 @kernel
-def find_contact(ground, samples, placement, wheel, scope, contacts):
-    """Find where `wheel` is nearest to the ground and write it into row `wheel` of `touch`.
+def find_contact(model, work, wheel, scope):
+    """Find where `wheel` is nearest to the ground and write it into row `wheel` of the contacts.
 
-    `scope` says how thoroughly: COARSE looks at every other sample of the middle circle, QUICK
-    at all samples and closer at the nearest, NEAR only around the direction found last, FULL also
-    at all samples and closer at each other circle that comes near to that, AGAIN only at those
-    that FULL found near, EXACT closer at each local minimum of each circle. FULL and AGAIN come
-    after QUICK or NEAR at the same placement, AGAIN after FULL at a placement that differs
-    little. Returns IN_CONTACT, or OFF_MAP or UNKNOWN_GROUND where any sample lies there; such
-    samples are passed over, and the gap is NaN where there is no other.
+    FULL and AGAIN come after QUICK or NEAR at the same placement, AGAIN after FULL at a placement
+    that differs little. Samples off the known ground are passed over; the gap is NaN where there
+    is no other.
+
+    Args:
+        model: A record with `ground` GROUND and `samples` WHEEL_SAMPLES.
+        work: A record with `placement` PLACEMENT, written by `place`, and `contacts` CONTACTS.
+        wheel: Index of the wheel.
+        scope: A SearchScope.
+
+    Returns:
+        The worst ContactStatus of the samples.
     """
-    status = IN_CONTACT
+    contacts = work.contacts
+    status = ContactStatus.IN_CONTACT
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
-        _hold(placement, wheel, contacts)
+        _hold(work, wheel)
         return status
-    if scope == COARSE and _guess(ground, samples, placement, wheel, contacts):
+    if scope == SearchScope.COARSE and _guess(model, work, wheel):
         return status
-    if scope != NEAR and scope != AGAIN:
-        status = scan_rim(ground, samples, placement, wheel, scope, contacts)
+    if scope != SearchScope.NEAR and scope != SearchScope.AGAIN:
+        status = scan_rim(model, work, wheel, scope)
         if contacts.noted_gap[wheel] == np.inf:
             contacts.gap[wheel] = np.nan
             return status
-        if scope in (COARSE, QUICK):
-            _take_sample(samples, wheel, contacts)
-    if scope in (QUICK, NEAR):
-        refine_circle(ground, samples, placement, wheel, contacts.nearest[wheel], contacts)
-    elif scope in (FULL, AGAIN):
-        refine_others(ground, samples, placement, wheel, contacts)
-    _write_contact(samples, placement, wheel, contacts)
+        if scope == SearchScope.COARSE or scope == SearchScope.QUICK:
+            _take_sample(model.samples, contacts, wheel)
+    if scope == SearchScope.QUICK or scope == SearchScope.NEAR:
+        refine_circle(model, work, wheel, contacts.nearest[wheel])
+    elif scope == SearchScope.FULL or scope == SearchScope.AGAIN:
+        refine_others(model, work, wheel)
+    _write_contact(model.samples, work, wheel)
     return status
 
 
 @kernel
-def _guess(ground, samples, placement, wheel, contacts):
+def _guess(model, work, wheel):
     """Write the nearest of some samples of the middle circle; False near unknown ground."""
+    ground, samples, placement = model.ground, model.samples, work.placement
     forward, up, centres = placement.forward, placement.up, placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
     gx, gy = (centres[wheel, 0] - ground.x0) * scale, (centres[wheel, 1] - ground.y0) * scale
@@ -80,13 +88,13 @@ def _guess(ground, samples, placement, wheel, contacts):
         nearest = min(nearest, gap)
     if total != total:
         return False
-    contacts.gap[wheel] = centres[wheel, 2] + nearest
-    write_point(samples, placement, wheel, samples.sines[row], samples.cosines[row], 0.0, contacts)
+    work.contacts.gap[wheel] = centres[wheel, 2] + nearest
+    write_point(samples, work, wheel, (samples.sines[row], samples.cosines[row]), 0.0)
     return True
 
 
 @kernel
-def _take_sample(samples, wheel, contacts):
+def _take_sample(samples, contacts, wheel):
     """Take the nearest sample for the place where the wheel touches."""
     m = contacts.noted_circle[wheel]
     k = contacts.first_row[wheel, m]
@@ -98,36 +106,39 @@ def _take_sample(samples, wheel, contacts):
 
 
 @kernel
-def _write_contact(samples, placement, wheel, contacts):
+def _write_contact(samples, work, wheel):
     """Write gap, point and normal of a wheel on its nearest circle."""
+    contacts = work.contacts
     m = contacts.nearest[wheel]
     contacts.gap[wheel] = contacts.circle_gap[wheel, m]
-    s, c = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
-    write_point(samples, placement, wheel, s, c, samples.laterals[m], contacts)
+    turn = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
+    write_point(samples, work, wheel, turn, samples.laterals[m])
     slope = contacts.circle_slope[wheel, m]
-    write_normal(placement, wheel, s, c, slope[0], slope[1], contacts)
+    write_normal(work, wheel, turn, (slope[0], slope[1]))
 
 
 @kernel
-def _hold(placement, wheel, contacts):
-    """Write the touch of a wheel whose centre is held at a height, whatever the ground."""
-    contacts.gap[wheel] = placement.centres[wheel, 2] - contacts.held_height[wheel]
+def _hold(work, wheel):
+    """Write the contact of a wheel whose centre is held at a height, whatever the ground."""
+    centres, contacts = work.placement.centres, work.contacts
+    contacts.gap[wheel] = centres[wheel, 2] - contacts.held_height[wheel]
     for i in range(3):
-        contacts.point[wheel, i] = placement.centres[wheel, i]
+        contacts.point[wheel, i] = centres[wheel, i]
         contacts.normal[wheel, i] = 0.0
     contacts.normal[wheel, 2] = 1.0
 
 
 @kernel
-def blend_contact(samples, placement, wheel, contacts):
-    """Replace the touch of `wheel` by the mean contact over the circles that share the load.
+def blend_contact(samples, work, wheel):
+    """Replace the contact of `wheel` by the mean over the circles that share the load.
 
-    Each circle counts by how far its own touching point stays below the lowest plus COMPLIANCE
+    Each circle counts by how far its own nearest point stays below the lowest plus COMPLIANCE
     radii. The contact has to come from a FULL or EXACT `find_contact`.
     """
+    contacts = work.contacts
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
         s, c = np.sin(contacts.held_angle[wheel]), np.cos(contacts.held_angle[wheel])
-        write_point(samples, placement, wheel, s, c, 0.0, contacts)
+        write_point(samples, work, wheel, (s, c), 0.0)
         return
     allowance = COMPLIANCE * samples.radius
     total, sine_sum, cosine_sum, lateral_sum = 0.0, 0.0, 0.0, 0.0
@@ -139,14 +150,19 @@ def blend_contact(samples, placement, wheel, contacts):
             cosine_sum += weight * contacts.circle_cosine[wheel, m]
             lateral_sum += weight * samples.laterals[m]
     length = np.sqrt(sine_sum * sine_sum + cosine_sum * cosine_sum)
-    s, c = sine_sum / length, cosine_sum / length
-    write_point(samples, placement, wheel, s, c, lateral_sum / total, contacts)
+    turn = sine_sum / length, cosine_sum / length
+    write_point(samples, work, wheel, turn, lateral_sum / total)
 
 
 @kernel
-def write_point(samples, placement, wheel, s, c, lateral, contacts):
-    """Write the point of the cylinder at the angle of sine s and cosine c and at `lateral`."""
+def write_point(samples, work, wheel, turn, lateral):
+    """Write the point of the cylinder at the angle of `turn` and at `lateral` [m].
+
+    `turn` is (sine, cosine) of the contact angle, `lateral` the distance from the middle plane.
+    """
+    placement, contacts = work.placement, work.contacts
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    s, c = turn
     contacts.sine[wheel], contacts.cosine[wheel] = s, c
     for i in range(3):
         radial = samples.radius * (s * forward[i] - c * up[i])
@@ -154,14 +170,17 @@ def write_point(samples, placement, wheel, s, c, lateral, contacts):
 
 
 @kernel
-def write_normal(placement, wheel, s, c, slope_x, slope_y, contacts):
+def write_normal(work, wheel, turn, slope):
     """Write the wheel's radial direction with the terrain's slope along the axis, scaled to z = 1.
 
-    The part of the terrain's normal along the circle is left out: it vanishes where wheel and
-    ground are tangent, and where the wheel rests on an edge the wheel's own radius is the
-    normal.
+    `turn` is (sine, cosine) of the contact angle, `slope` that of the ground along x and y. The
+    part of the terrain's normal along the circle is left out: it vanishes where wheel and ground
+    are tangent, and where the wheel rests on an edge the wheel's own radius is the normal.
     """
-    R, forward, up, normal = placement.R, placement.forward, placement.up, contacts.normal
+    placement, normal = work.placement, work.contacts.normal
+    R, forward, up = placement.R, placement.forward, placement.up
+    s, c = turn
+    slope_x, slope_y = slope
     radial_x = -s * forward[0] + c * up[0]
     radial_y = -s * forward[1] + c * up[1]
     radial_z = c * up[2]

@@ -102,30 +102,26 @@ def _write_equations(linkage, placement, contacts, columns, balance):
         ry = (point[wheel, 1] - origin[1]) / length
         rz = (point[wheel, 2] - origin[2]) / length
         for kind in range(3):
-            fx, fy, fz = frames[wheel, kind, 0], frames[wheel, kind, 1], frames[wheel, kind, 2]
+            force = frames[wheel, kind, 0], frames[wheel, kind, 1], frames[wheel, kind, 2]
+            fx, fy, fz = force
             mx, my, mz = ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx
             about_axis = mx * R[0, 1] + my * R[1, 1] + mz * R[2, 1]
             about_rocker = about_axis - _moment_about(
-                rocker_pivots, side, origin, length, R, fx, fy, fz
+                linkage, placement, rocker_pivots[side], force
             )
             about_bogie = 0.0
             if linkage.on_bogie[wheel]:
                 about_bogie = about_axis - _moment_about(
-                    bogie_pivots, side, origin, length, R, fx, fy, fz
+                    linkage, placement, bogie_pivots[side], force
                 )
-            for target in range(2):
-                column, share = wheel, 1.0
-                if kind == 1:
-                    column = 8
-                elif kind == 2:
-                    column = 6 + target
-                    share = 1.0 if target == 0 else axle
-                if kind < 2 and target == 1:
-                    continue
-                _add_column(
-                    A, column, share, fx, fy, fz, mx, my, mz, side, about_bogie,
-                    sign * about_rocker,
-                )  # fmt: skip
+            wrench = fx, fy, fz, mx, my, mz, about_bogie, sign * about_rocker
+            if kind == 0:
+                _add_column(A, wheel, 1.0, wrench, side)
+            elif kind == 1:
+                _add_column(A, 8, 1.0, wrench, side)
+            else:
+                _add_column(A, 6, 1.0, wrench, side)
+                _add_column(A, 7, axle, wrench, side)
             own = 0
             if kind == 1 and wheel < FREE_TORQUES:
                 own = 1 + wheel
@@ -134,18 +130,20 @@ def _write_equations(linkage, placement, contacts, columns, balance):
                     if FREE_LATERAL[k] == wheel:
                         own = 1 + FREE_TORQUES + k
             if 0 < own < columns:
-                _add_column(
-                    B, own, -1.0, fx, fy, fz, mx, my, mz, side, about_bogie, sign * about_rocker
-                )
+                _add_column(B, own, -1.0, wrench, side)
     _add_weights(linkage, placement, B)
     if linkage.has_tool_load:
         _add_tool_load(linkage, placement, B)
 
 
 @kernel
-def _add_column(
-    matrix, column, share, fx, fy, fz, mx, my, mz, side, about_bogie, about_differential
-):
+def _add_column(matrix, column, share, wrench, side):
+    """Add `share` of a wheel's unit force to a column of the nine equations.
+
+    `wrench` holds force (3) and moment about the origin (3), the moment about the bogie pivot of
+    its side, and its part of the differential's equation.
+    """
+    fx, fy, fz, mx, my, mz, about_bogie, about_differential = wrench
     matrix[0, column] += share * fx
     matrix[1, column] += share * fy
     matrix[2, column] += share * fz
@@ -157,11 +155,13 @@ def _add_column(
 
 
 @kernel
-def _moment_about(pivots, side, origin, length, R, fx, fy, fz):
-    """Return the moment about the wheel axes of a force at the pivot of `side`."""
-    px = (pivots[side, 0] - origin[0]) / length
-    py = (pivots[side, 1] - origin[1]) / length
-    pz = (pivots[side, 2] - origin[2]) / length
+def _moment_about(linkage, placement, pivot, force):
+    """Return the moment about the wheel axes of a force (x, y, z) at a pivot (3,)."""
+    R, origin, length = placement.R, placement.origin, linkage.length
+    fx, fy, fz = force
+    px = (pivot[0] - origin[0]) / length
+    py = (pivot[1] - origin[1]) / length
+    pz = (pivot[2] - origin[2]) / length
     return (
         (py * fz - pz * fy) * R[0, 1]
         + (pz * fx - px * fz) * R[1, 1]
@@ -172,20 +172,18 @@ def _moment_about(pivots, side, origin, length, R, fx, fy, fz):
 @kernel
 def _add_weights(linkage, placement, B):
     """Add what the weights of all parts ask of the ground to the right-hand side."""
-    centres, part_coms = placement.centres, placement.part_coms
     for part in range(5):
         mass = linkage.body_mass
         if part > 2:
             mass = linkage.bogie_mass
         elif part > 0:
             mass = linkage.rocker_mass
-        _add_weight(
-            linkage, placement, B, part_coms, part, mass, (part - 1) % 2, part > 0, part > 2
-        )
+        hangs = (part - 1) % 2, part > 0, part > 2
+        _add_weight(linkage, placement, B, (mass, placement.part_coms[part]), hangs)
     for wheel in range(6):
-        on_bogie = linkage.on_bogie[wheel] > 0
-        mass = linkage.wheel_mass
-        _add_weight(linkage, placement, B, centres, wheel, mass, wheel // 3, wheel >= 0, on_bogie)
+        hangs = wheel // 3, wheel >= 0, linkage.on_bogie[wheel] > 0
+        load = linkage.wheel_mass, placement.centres[wheel]
+        _add_weight(linkage, placement, B, load, hangs)
 
 
 @kernel
@@ -211,11 +209,22 @@ def tool_load(R, tool, i):
 
 
 @kernel
-def _add_weight(linkage, placement, B, points, row, mass, side, on_rocker, on_bogie):
+def _add_weight(linkage, placement, B, load, hangs):
+    """Add the weight of one part to the right-hand side.
+
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT.
+        B: Right-hand sides, of which column 0 is added to.
+        load: (mass [kg], centre of mass (3,) [m]).
+        hangs: (side, whether the part hangs on the rocker, whether on the bogie).
+    """
     R, origin, length = placement.R, placement.origin, linkage.length
+    mass, point = load
+    side, on_rocker, on_bogie = hangs
     weight = mass / linkage.mass
-    rx = (points[row, 0] - origin[0]) / length
-    ry = (points[row, 1] - origin[1]) / length
+    rx = (point[0] - origin[0]) / length
+    ry = (point[1] - origin[1]) / length
     B[2, 0] += weight
     B[3, 0] += ry * weight
     B[4, 0] -= rx * weight

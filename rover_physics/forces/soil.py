@@ -7,6 +7,7 @@ Source: Wong, Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 2.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,36 @@ def _write_soil(soil: Soil, row: NDArray[np.float64]) -> None:
     row[SHEAR_MODULUS] = soil.shear_modulus
 
 
+class SoilWheel(NamedTuple):
+    """A wheel as the soil models need it."""
+
+    radius: float
+    """Radius r [m]."""
+    width: float
+    """Width b [m]."""
+    friction: float
+    """Coulomb coefficient where a Coulomb soil has none of its own."""
+
+
+class WheelOnSoil(NamedTuple):
+    """How a wheel gives the forces that are asked of it."""
+
+    slip_ratio: float
+    """i = 1 - v / (r omega), from -1 (braked) to 1 (spins on the spot), both also where the soil
+    cannot give the forces."""
+    sinkage: float
+    """Sinkage [m]."""
+    resistance: float
+    """Motion resistance [N]."""
+    drawbar_pull: float
+    """Largest drawbar pull [N], negative where the wheel cannot even pull itself."""
+    torque: float
+    """Wheel torque [N m] that the forces need."""
+    utilisation: float
+    """(T, S) relative to the largest forces in its direction, above 1 where they are beyond what
+    the soil can give, infinite where no forces in that direction are within."""
+
+
 @kernel
 def coulomb_slip(utilisation):
     """Return the slip ratio i = 1 - v / (r omega) on Coulomb ground.
@@ -75,32 +106,27 @@ def coulomb_slip(utilisation):
 
 
 @kernel
-def solve_wheel(soil, mu, radius, width, N, T, S):
+def solve_wheel(soil, wheel, N, T, S):
     """Find how a wheel gives the forces that the balance asks of it.
 
     Args:
         soil: (8,) a row of `pack_soils`.
-        mu: Coulomb coefficient where a Coulomb soil has none of its own.
-        radius: Wheel radius r [m].
-        width: Wheel width b [m].
+        wheel: SoilWheel.
         N: Load along the contact normal [N].
         T: Net traction forward along the ground (drawbar pull) [N]; negative brakes.
         S: Lateral force [N].
 
     Returns:
-        Slip ratio i = 1 - v / (r omega), from -1 (braked) to 1 (spins on the spot), both also
-        where the soil can't give the forces; sinkage [m]; motion resistance [N]; largest drawbar
-        pull [N], negative where the wheel can't even pull itself; wheel torque [N m], as needed;
-        utilisation: (T, S) relative to the largest forces in its direction, above 1 where they
-        are beyond what the soil can give, infinite where no forces in that direction are within.
-        A wheel without load has slip 1, infinite utilisation, and zeros else.
+        WheelOnSoil. A wheel without load has slip 1, infinite utilisation, and zeros else.
     """
+    mu, radius, width = wheel.friction, wheel.radius, wheel.width
     if not N > 0.0:
-        return 1.0, 0.0, 0.0, 0.0, radius * T, np.inf
+        return WheelOnSoil(1.0, 0.0, 0.0, 0.0, radius * T, np.inf)
     if soil[MODEL] == COULOMB:
         largest = _own_friction(soil, mu) * N
         utilisation = np.sqrt(T * T + S * S) / largest
-        return coulomb_slip(utilisation), 0.0, 0.0, largest, radius * T, utilisation
+        slip = coulomb_slip(utilisation)
+        return WheelOnSoil(slip, 0.0, 0.0, largest, radius * T, utilisation)
     sinkage = find_sinkage(soil, radius, width, N)
     resistance = motion_resistance(soil, width, sinkage)
     length = contact_length(radius, sinkage)
@@ -111,16 +137,19 @@ def solve_wheel(soil, mu, radius, width, N, T, S):
     slip = 1.0 if thrust >= 0.0 else -1.0
     if utilisation <= 1.0:
         slip = _slip_of_thrust(thrust, S, strength, soil[SHEAR_MODULUS] / length)
-    return slip, sinkage, resistance, largest - resistance, radius * thrust, utilisation
+    return WheelOnSoil(
+        slip, sinkage, resistance, largest - resistance, radius * thrust, utilisation
+    )
 
 
 @kernel
-def effective_friction(soil, mu, radius, width, N):
+def effective_friction(soil, wheel, N):
     """Return the largest drawbar pull over the load N [N], at least MIN_FRICTION.
 
     All forces with sqrt(T^2 + S^2) up to this coefficient times N are within the soil's strength.
-    For Bekker-Wong it depends on the load.
+    For Bekker-Wong it depends on the load. `wheel` is a SoilWheel.
     """
+    mu, radius, width = wheel.friction, wheel.radius, wheel.width
     if soil[MODEL] == COULOMB:
         return _own_friction(soil, mu)
     if not N > 0.0:

@@ -1,8 +1,9 @@
 """Wheel forces where the ground may be soil: friction and resistance depend on the loads there."""
 
-from rover_physics.forces.soil import effective_friction, solve_wheel
-from rover_physics.forces.torques import EQUAL, minimise_friction, take_equal_torques
+from rover_physics.forces.soil import SoilWheel, effective_friction, solve_wheel
+from rover_physics.forces.torques import minimise_friction, take_equal_torques
 from rover_physics.numerics.kernels import kernel
+from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import copy_soil, soil_row_at
 
 ROUNDS = 3
@@ -10,19 +11,20 @@ ROUNDS = 3
 
 
 @kernel
-def share_forces_on_soil(ground, linkage, settings, work):
+def share_forces_on_soil(model, work):
     """Find the wheel forces for the policy asked for; leave them in `work.search`.
 
     The search takes friction and resistance as they are under the loads of equal torques, then
     under the loads that it has found; the best of all these sets, equal torques included, is kept.
     """
+    ground, linkage, settings = model.ground, model.linkage, model.settings
     search, best = work.search, work.best
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         copy_soil(ground, soil_row_at(ground, x, y), work.soils[wheel])
     take_equal_torques(work.balance, search)
-    if settings.policy == EQUAL:
+    if settings.policy == TorquePolicy.EQUAL:
         return
     least = _needed(linkage, settings, work)
     _copy(search, best)
@@ -54,10 +56,11 @@ def _write_grip(linkage, settings, work):
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         soil = work.soils[wheel]
-        N, mu = weight * search.wheel_loads[wheel], search.mu[wheel]
-        solved = solve_wheel(soil, mu, linkage.radius, linkage.width, N, 0.0, 0.0)
-        search.mu[wheel] = effective_friction(soil, mu, linkage.radius, linkage.width, N)
-        search.resistance[wheel] = settings.direction * solved[2] / weight
+        N = weight * search.wheel_loads[wheel]
+        own = SoilWheel(linkage.radius, linkage.width, search.mu[wheel])
+        solved = solve_wheel(soil, own, N, 0.0, 0.0)
+        search.mu[wheel] = effective_friction(soil, own, N)
+        search.resistance[wheel] = settings.direction * solved.resistance / weight
 
 
 @kernel
@@ -70,13 +73,11 @@ def _needed(linkage, settings, work):
         soil = work.soils[wheel]
         solved = solve_wheel(
             soil,
-            search.mu[wheel],
-            linkage.radius,
-            linkage.width,
+            SoilWheel(linkage.radius, linkage.width, search.mu[wheel]),
             weight * search.wheel_loads[wheel],
             settings.direction * weight * search.tangential[wheel],
             weight * search.lateral[wheel],
         )
-        saturation = abs(solved[4]) / settings.allowed_torque
-        worst = max(worst, solved[5], saturation if saturation > 1.0 else 0.0)
+        saturation = abs(solved.torque) / settings.allowed_torque
+        worst = max(worst, solved.utilisation, saturation if saturation > 1.0 else 0.0)
     return worst

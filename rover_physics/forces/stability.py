@@ -21,12 +21,12 @@ CORNERS = 4
 def find_support(linkage, placement, contacts, corners):
     """Write the support polygon into corners (4, 3) [m]: counter-clockwise from the rear right."""
     for side in range(2):
-        first = 3 * side
-        _write_side(linkage, placement, contacts, side, first, corners)
+        _write_side(linkage, placement, contacts, side, corners)
 
 
 @kernel
-def _write_side(linkage, placement, contacts, side, first, corners):
+def _write_side(linkage, placement, contacts, side, corners):
+    first = 3 * side
     point, pivot = contacts.point, placement.bogie_pivots
     rocker_is_rear = not linkage.on_bogie[first]
     on_rocker = first if rocker_is_rear else first + 2
@@ -65,15 +65,19 @@ def tip_over_angles(corners, centre, force, moment):
     smallest_measure = np.inf
     count = corners.shape[0]
     for edge in range(count):
-        angle, measure = measure_edge(corners, edge, (edge + 1) % count, centre, force, moment)
+        angle, measure = measure_edge(corners, edge, centre, force, moment)
         smallest_angle = min(smallest_angle, angle)
         smallest_measure = min(smallest_measure, measure)
     return smallest_angle, smallest_measure
 
 
 @kernel
-def measure_edge(corners, start, end, centre, force, moment):
-    """Return tip-over angle [rad] and force-angle measure [N m] of one edge of the polygon."""
+def measure_edge(corners, edge, centre, force, moment):
+    """Return tip-over angle [rad] and force-angle measure [N m] of one edge of the polygon.
+
+    The edge leads from corner `edge` to the next one; the rest is as for `tip_over_angles`.
+    """
+    start, end = edge, (edge + 1) % corners.shape[0]
     ax, ay, az = (
         corners[end, 0] - corners[start, 0],
         corners[end, 1] - corners[start, 1],
@@ -83,15 +87,14 @@ def measure_edge(corners, start, end, centre, force, moment):
     if not length > 0.0:
         return np.inf, np.inf
     ax, ay, az = ax / length, ay / length, az / length
-    lx, ly, lz = _normal_to(
-        ax,
-        ay,
-        az,
+    axis = ax, ay, az
+    from_centre = (
         corners[end, 0] - centre[0],
         corners[end, 1] - centre[1],
         corners[end, 2] - centre[2],
     )
-    fx, fy, fz = _normal_to(ax, ay, az, force[0], force[1], force[2])
+    lx, ly, lz = _normal_to(axis, from_centre)
+    fx, fy, fz = _normal_to(axis, (force[0], force[1], force[2]))
     about = ax * moment[0] + ay * moment[1] + az * moment[2]
     arm = lx * lx + ly * ly + lz * lz
     if not arm > 0.0:
@@ -110,7 +113,9 @@ def measure_edge(corners, start, end, centre, force, moment):
 
 
 @kernel
-def _normal_to(ax, ay, az, x, y, z):
-    """Return the part of (x, y, z) normal to the unit vector (ax, ay, az)."""
+def _normal_to(axis, vector):
+    """Return the part of a vector (x, y, z) normal to a unit vector (x, y, z)."""
+    ax, ay, az = axis
+    x, y, z = vector
     along = ax * x + ay * y + az * z
     return x - along * ax, y - along * ay, z - along * az

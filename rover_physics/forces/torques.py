@@ -11,6 +11,8 @@ Source: Boyd and El Ghaoui, "Method of centers for minimizing generalized eigenv
 Algebra and its Applications 188, 1993.
 """
 
+from enum import IntEnum
+
 import numpy as np
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
@@ -18,10 +20,6 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
 
-EQUAL, OPTIMAL = 0, 1
-"""Torque policies."""
-LOAD, TORQUE, FRICTION = np.arange(3)
-FOUND, LIFTS, SATURATES = np.arange(3)
 LEVELS = 60
 NEWTON_STEPS = 12
 STAY = 0.25
@@ -34,12 +32,35 @@ PRECISION = 5e-5
 """Relative precision of the smallest level."""
 
 
+class SearchGoal(IntEnum):
+    """What a search lowers the level of."""
+
+    LOAD = 0
+    """The largest -N: the wheels are to stay on the ground."""
+    TORQUE = 1
+    """The largest torque."""
+    FRICTION = 2
+    """The largest friction utilisation."""
+
+
+class SearchOutcome(IntEnum):
+    """What a search for the best torques came to."""
+
+    FOUND = 0
+    """Torques within their limit that keep all wheels on the ground."""
+    LIFTS = 1
+    """No torques keep all wheels on the ground."""
+    SATURATES = 2
+    """None of those that do are within the limit."""
+
+
 TORQUE_SEARCH = record_type(
     ("y", float, (FREE_FORCES,)),  # the free degrees, in the order of the columns of BALANCE
     ("wheel_loads", float, (6,)),  # N at y
     ("tangential", float, (6,)),  # T at y
     ("lateral", float, (6,)),  # S at y
     ("mu", float, (6,)),  # friction coefficients
+    ("max_traction", float),  # largest torque over wheel radius; infinite: no limit
     ("resistance", float, (6,)),  # motion resistances, against the forward way, beside T
     ("H", float, (FREE_FORCES, FREE_FORCES)),  # Hessian of the barrier
     ("g", float, (FREE_FORCES, 1)),  # gradient of the barrier, then the Newton step
@@ -75,13 +96,12 @@ def minimise_friction(balance, max_traction, search):
     """Find the torques that need least friction, starting from equal ones; leave them in `search`.
 
     `max_traction` is the largest torque over wheel radius and weight; torque also overcomes the
-    motion resistances in `search`. Returns FOUND; LIFTS where
-    no torques keep all wheels on the ground, or SATURATES where none of those are within the
-    limit: then the set that comes nearest is left. Lateral forces keep their equal shares where
-    that does; where it does not, friction passes them on to wheels that still hold.
+    motion resistances in `search`. Lateral forces keep their equal shares where that does; where
+    it does not, friction passes them on to wheels that still hold. Returns a SearchOutcome; where
+    it is not FOUND, the set that comes nearest is left.
     """
     outcome = _search(balance, np.int64(FREE_TORQUES), max_traction, search)
-    if outcome != FOUND or _needed(search, FRICTION) > 1.0:
+    if outcome != SearchOutcome.FOUND or _needed(search, SearchGoal.FRICTION) > 1.0:
         outcome = _search(balance, np.int64(FREE_FORCES), max_traction, search)
     return outcome
 
@@ -90,16 +110,18 @@ def minimise_friction(balance, max_traction, search):
 def _search(balance, free, max_traction, search):
     search.y[:] = 0.0
     apply_torques(balance, free, search)
-    if _needed(search, LOAD) > -LOAD_KEPT:
-        _lower(balance, free, LOAD, -LOAD_KEPT, np.inf, search)
-        if _needed(search, LOAD) > -LOAD_KEPT:
-            return LIFTS
-    if _needed(search, TORQUE) >= max_traction:
-        _lower(balance, free, TORQUE, 0.999 * max_traction, np.inf, search)
-        if _needed(search, TORQUE) >= max_traction:
-            return SATURATES
-    _lower(balance, free, FRICTION, 1e-6, max_traction, search)
-    return FOUND
+    search.max_traction = np.inf
+    if _needed(search, SearchGoal.LOAD) > -LOAD_KEPT:
+        _lower(balance, free, SearchGoal.LOAD, -LOAD_KEPT, search)
+        if _needed(search, SearchGoal.LOAD) > -LOAD_KEPT:
+            return SearchOutcome.LIFTS
+    if _needed(search, SearchGoal.TORQUE) >= max_traction:
+        _lower(balance, free, SearchGoal.TORQUE, 0.999 * max_traction, search)
+        if _needed(search, SearchGoal.TORQUE) >= max_traction:
+            return SearchOutcome.SATURATES
+    search.max_traction = max_traction
+    _lower(balance, free, SearchGoal.FRICTION, 1e-6, search)
+    return SearchOutcome.FOUND
 
 
 @kernel
@@ -107,9 +129,9 @@ def _needed(search, goal):
     """Return the level that the present forces need."""
     worst = -np.inf
     for i in range(6):
-        if goal == LOAD:
+        if goal == SearchGoal.LOAD:
             level = -search.wheel_loads[i]
-        elif goal == TORQUE:
+        elif goal == SearchGoal.TORQUE:
             level = abs(search.tangential[i] + search.resistance[i])
         else:
             T, S = search.tangential[i], search.lateral[i]
@@ -119,7 +141,7 @@ def _needed(search, goal):
 
 
 @kernel
-def _lower(balance, free, goal, enough, max_traction, search):
+def _lower(balance, free, goal, enough, search):
     """Lower the level of `goal` until it is `enough` or the smallest."""
     needed = _needed(search, goal)
     level = needed + 0.1 * abs(needed) + 1e-3
@@ -128,7 +150,7 @@ def _lower(balance, free, goal, enough, max_traction, search):
         if needed <= enough or stalled == 3:
             return
         for _ in range(NEWTON_STEPS):
-            _write_barrier(balance, free, goal, level, max_traction, search)
+            _write_barrier(balance, free, goal, level, search)
             if not _take_newton_step(balance, free, search):
                 break
         now = _needed(search, goal)
@@ -157,23 +179,23 @@ def _take_newton_step(balance, free, search):
 
 
 @kernel
-def _write_barrier(balance, free, goal, level, max_traction, search):
+def _write_barrier(balance, free, goal, level, search):
     """Write gradient and Hessian of the barrier of the set at `level`."""
     search.H[:, :] = 0.0
     search.g[:, :] = 0.0
-    traction = level if goal == TORQUE else max_traction
+    traction = level if goal == SearchGoal.TORQUE else search.max_traction
     for i in range(6):
-        if goal == FRICTION:
+        if goal == SearchGoal.FRICTION:
             _add_cone(balance, free, i, level * search.mu[i], search)
         else:
-            room = search.wheel_loads[i] + (level if goal == LOAD else 0.0)
-            _add_log(free, balance.normal, i, 1.0 / room, 1.0 / (room * room), search)
+            room = search.wheel_loads[i] + (level if goal == SearchGoal.LOAD else 0.0)
+            _add_log(free, balance.normal[i], 1.0 / room, 1.0 / (room * room), search)
         if traction < np.inf:
             thrust = search.tangential[i] + search.resistance[i]
             above, below = traction - thrust, traction + thrust
             slope = 1.0 / below - 1.0 / above
             curvature = 1.0 / (below * below) + 1.0 / (above * above)
-            _add_log(free, balance.tangential, i, slope, curvature, search)
+            _add_log(free, balance.tangential[i], slope, curvature, search)
 
     for j in range(free):
         for k in range(j):
@@ -181,12 +203,12 @@ def _write_barrier(balance, free, goal, level, max_traction, search):
 
 
 @kernel
-def _add_log(free, rows, i, slope, curvature, search):
-    """Add -log of a linear function's room, rows[i] its gradient; of H the lower half."""
+def _add_log(free, row, slope, curvature, search):
+    """Add -log of a linear function's room, row[1:] its gradient; of H the lower half."""
     for j in range(free):
-        search.g[j, 0] -= slope * rows[i, 1 + j]
+        search.g[j, 0] -= slope * row[1 + j]
         for k in range(j + 1):
-            search.H[j, k] += curvature * rows[i, 1 + j] * rows[i, 1 + k]
+            search.H[j, k] += curvature * row[1 + j] * row[1 + k]
 
 
 @kernel

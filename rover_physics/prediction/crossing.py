@@ -13,9 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.contact.settling import NOT_SETTLED, SETTLED
 from rover_physics.prediction.evaluation import NONE_HELD, RESULT, new_results
-from rover_physics.prediction.path_kernels import divide_stretches, find_jumps, sort_pieces
+from rover_physics.prediction.path_kernels import (
+    JumpLimits,
+    PathPoints,
+    divide_stretches,
+    find_jumps,
+    sort_pieces,
+)
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 HEIGHT_JUMP = 0.25
@@ -43,6 +49,11 @@ class Crossings:
     """(m, 3) x, y [m], yaw [rad]."""
     results: Any
     """(m,) RESULT of each pose."""
+
+    @property
+    def points(self) -> PathPoints:
+        """The same as kernels take it."""
+        return PathPoints(self.place, self.waypoint, self.poses, self.results)
 
     def select(self, rows: np.ndarray) -> "Crossings":
         """Return the poses in some rows, in their order, or those that a mask (m,) has."""
@@ -74,6 +85,11 @@ def _numbers(results: Any) -> np.ndarray:
     return results.view(np.float64).reshape(len(results), _NUMBERS)
 
 
+def limits_of(radius: float) -> JumpLimits:
+    """Return what counts as a jump for wheels of a radius [m]."""
+    return JumpLimits(float(radius), MIN_SPACING, HEIGHT_JUMP * radius)
+
+
 def find_crossings(
     terrain: Terrain,
     radius: float,
@@ -97,7 +113,7 @@ def find_crossings(
     """
     jumps = np.empty((len(poses), 2), np.int64)
     joined = np.broadcast_to(joined, len(poses) - 1)
-    jumps = jumps[: find_jumps(results, poses, joined, radius, HEIGHT_JUMP * radius, jumps)]
+    jumps = jumps[: find_jumps(results, poses, joined, limits_of(radius), jumps)]
     if not len(jumps):
         return _NOTHING
     rows = jumps.ravel()
@@ -111,7 +127,7 @@ def find_crossings(
             climbs = _climb(terrain, radius, known, closed, evaluate, direction)
             climbed.append(slice(len(known.place), len(known.place) + len(climbs.place)))
             known = known.followed_by(climbs)
-    kept = known.results["status"] != NOT_SETTLED
+    kept = known.results["status"] != PoseStatus.NOT_SETTLED
     kept[: len(rows)] = False
     for climb in climbed:
         kept[climb] = True
@@ -126,9 +142,7 @@ def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings
     """Return PIECES - 1 poses between each two rows `ends` (k, 2), stretch by stretch."""
     n = len(ends) * (PIECES - 1)
     place, waypoint, poses = np.empty(n), np.empty(n, np.int64), np.empty((n, 3))
-    divide_stretches(
-        ends, PIECES, known.place, known.waypoint, known.poses, place, waypoint, poses
-    )
+    divide_stretches(ends, PIECES, known.points, (place, waypoint, poses))
     return Crossings(place, waypoint, poses, evaluate(poses, NONE_HELD))
 
 
@@ -140,9 +154,7 @@ def _sort_pieces(
     The last rows are those between `ends`; `sort_pieces` says which pieces are closed.
     """
     pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
-    n_open, n_closed = sort_pieces(
-        ends, PIECES, known.results, known.poses, HEIGHT_JUMP * radius, MIN_SPACING, *pieces
-    )
+    n_open, n_closed = sort_pieces(ends, PIECES, known.points, limits_of(radius), pieces)
     return pieces[0, :n_open], pieces[1, :n_closed]
 
 
@@ -178,7 +190,7 @@ def _climb(
     poses = np.repeat(known.poses[foot], stages, axis=0)
     results = evaluate(poses, held.reshape(-1, 6, 2))
     start, end = known.place[ends[at]].T[:, :, None]
-    settled = (results["status"] == SETTLED).reshape(-1, stages)
+    settled = (results["status"] == PoseStatus.SETTLED).reshape(-1, stages)
     climbs = Crossings(
         (start + CLIMB_STAGES * (end - start)).ravel(),
         np.repeat(known.waypoint[foot], stages),

@@ -49,27 +49,24 @@ def find_falls(
 
     `direction` is 1 where the rover drives forwards along the path, -1 backwards.
     """
-    found = _find_falls(
-        float(radius), float(direction), poses, results,
-        crossings.place, crossings.waypoint, crossings.poses, crossings.results,
-    )  # fmt: skip
+    found = _find_falls(float(radius), float(direction), poses, results, crossings.points)
     return Falls(*found)
 
 
 @allocating_kernel
-def _find_falls(radius, direction, poses, results, place, waypoint, poses_between, between):
-    """Return the fields of `Falls`."""
-    n, m = len(poses), len(place)
+def _find_falls(radius, direction, poses, results, between):
+    """Return the fields of `Falls`; `between` holds PathPoints."""
+    n, m = len(poses), len(between.place)
     order = np.empty(n + m, np.int64)
-    _merge(n, place, order)
+    _merge(n, between.place, order)
     steps, distance = np.zeros(n + m), np.zeros(n + m)
     angle, height = np.empty((n + m, 6)), np.empty((n + m, 6))
     steep, turning = np.zeros((n + m, 6), np.bool_), np.zeros((n + m, 6), np.bool_)
     last = poses[0]
     for k in range(n + m):
         i = order[k]
-        here = poses[i] if i < n else poses_between[i - n]
-        result = results[i] if i < n else between[i - n]
+        here = poses[i] if i < n else between.poses[i - n]
+        result = results[i] if i < n else between.results[i - n]
         steps[k] = np.hypot(here[0] - last[0], here[1] - last[1])
         distance[k] = steps[k] + (distance[k - 1] if k > 0 else 0.0)
         if _read_contacts(result, direction, angle[k], height[k]) < -MIN_ANGLE:
@@ -82,7 +79,7 @@ def _find_falls(radius, direction, poses, results, place, waypoint, poses_betwee
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
     for k in range(n + m):
         i = order[k]
-        owner = i if i < n else waypoint[i - n]
+        owner = i if i < n else between.waypoint[i - n]
         for wheel in range(6):
             drops[owner, wheel] = max(drops[owner, wheel], fallen[k, wheel])
             if i < n:

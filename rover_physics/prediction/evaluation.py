@@ -7,24 +7,24 @@ from numba import prange
 
 from rover_physics.contact.clearance import belly_clearance
 from rover_physics.contact.contact_record import CONTACTS
-from rover_physics.contact.settling import SETTLED, settle
+from rover_physics.contact.settling import settle
+from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
-from rover_physics.forces.soil import coulomb_slip, effective_friction, solve_wheel
+from rover_physics.forces.soil import SoilWheel, coulomb_slip, effective_friction, solve_wheel
 from rover_physics.forces.soil_sharing import share_forces_on_soil
 from rover_physics.forces.stability import CORNERS, find_support, tip_over_angles
 from rover_physics.forces.torques import (
-    EQUAL,
     TORQUE_SEARCH,
     minimise_friction,
     take_equal_torques,
 )
 from rover_physics.numerics.kernels import kernel, sweep_kernel
-from rover_physics.numerics.records import new_record, record_type, shared_array_of
+from rover_physics.numerics.records import new_record, record_type
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.rover.linkage import PLACEMENT, place_masses
-from rover_physics.terrain.ground import SOIL_NUMBERS, friction_at
+from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
+from rover_physics.status import PoseStatus, TorquePolicy
+from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
 
-NO_EQUILIBRIUM = 4
 CHUNK, MAX_CHUNKS = 16, 64
 """Poses that share one work space at least, and most such chunks: enough to keep cores busy."""
 OPTIMAL_EFFORT = 5
@@ -34,7 +34,7 @@ NONE_HELD = np.empty((0, 6, 2))
 
 
 SETTINGS = record_type(
-    ("policy", np.int64),  # EQUAL or OPTIMAL
+    ("policy", np.int64),  # TorquePolicy.EQUAL or OPTIMAL
     ("friction", float),  # friction coefficient where the terrain gives none
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest wheel torque within the safety limit [N m]
@@ -46,6 +46,14 @@ SETTINGS = record_type(
     ("flat_measure", float),  # force-angle measure on flat ground [N m]
 )
 """What a sweep is asked for."""
+
+MODEL = record_type(
+    ("ground", GROUND),
+    ("linkage", LINKAGE),
+    ("samples", WHEEL_SAMPLES),
+    ("settings", SETTINGS),
+)
+"""All that kernels read: terrain, rover with arm and payload, points of a wheel, options."""
 
 RESULT = record_type(
     ("status", np.int8),
@@ -71,20 +79,23 @@ RESULT = record_type(
 """The results of one pose; all but q are as in `PathPrediction`."""
 
 WORK = record_type(
-    ("placement", PLACEMENT),
-    ("contacts", CONTACTS),
-    ("balance", BALANCE),
-    ("search", TORQUE_SEARCH),
-    ("J", float, (6, 6)),
-    ("step", float, (6, 1)),
-    ("corners", float, (CORNERS, 3)),
-    ("centre", float, (3,)),
-    ("force", float, (3,)),
-    ("moment", float, (3,)),
-    ("soils", float, (6, SOIL_NUMBERS)),
-    ("best", float, (3, 6)),
+    ("pose", float, (3,)),  # x, y [m] and yaw [rad] of the body origin
+    ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie angle [rad]
+    ("placement", PLACEMENT),  # where the parts are at q
+    ("contacts", CONTACTS),  # where the wheels touch
+    ("balance", BALANCE),  # forces over torques
+    ("search", TORQUE_SEARCH),  # the forces that are taken
+    ("J", float, (6, 6)),  # derivatives of the gaps by q
+    ("step", float, (6, 1)),  # Newton step
+    ("corners", float, (CORNERS, 3)),  # support polygon [m]
+    ("centre", float, (3,)),  # centre of mass [m]
+    ("force", float, (3,)),  # net force but for the ground's [N]
+    ("moment", float, (3,)),  # net moment about the centre but for the ground's [N m]
+    ("soils", float, (6, SOIL_NUMBERS)),  # soil under each wheel
+    ("best", float, (3, 6)),  # best N, T, S so far, in weights
+    ("result", RESULT),  # result of a pose of which only a score is kept
 )
-"""Work space of one thread."""
+"""All that kernels write at one pose: work space of one thread."""
 
 
 def new_results(n: int) -> Any:
@@ -106,17 +117,18 @@ _NEW_WORK = np.array([new_work()], WORK).view(np.float64)
 """As numbers, for numpy copies records field by field."""
 
 
-def evaluate(ground, linkage, samples, settings, poses, held=NONE_HELD) -> Any:
-    """Evaluate the model at poses (n, 3) and return the results (n,), a RESULT each.
+def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
+    """Evaluate the model at poses and return the results (n,), a RESULT each.
 
-    held (n, 6, 2) gives height [m] and contact angle [rad] of wheels that climb a face, NaN for
-    those that rest on the ground; (0, 6, 2) where none climbs. The others are those of `Setup`.
+    Args:
+        model: (1,) MODEL.
+        poses: (n, 3) x, y [m] and yaw [rad].
+        held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
+            those that rest on the ground; (0, 6, 2) where none climbs.
     """
     results = new_results(len(poses))
-    records = [shared_array_of(record) for record in (linkage, samples, settings)]
-    with limit_threads(effort(settings, len(poses))) as threads:
-        works = new_works(threads, len(poses))
-        evaluate_poses(ground.records, *records, poses, held, works, results)
+    with limit_threads(effort(model[0].settings, len(poses))) as threads:
+        evaluate_poses(model, poses, held, new_works(threads, len(poses)), results)
     return results
 
 
@@ -128,50 +140,61 @@ def new_works(threads: int, poses: int) -> Any:
 
 def effort(settings, poses: int) -> int:
     """Return how long so many poses take, in that of one under equal torques."""
-    return poses * (1 if settings["policy"] == EQUAL else OPTIMAL_EFFORT)
+    return poses * (1 if settings["policy"] == TorquePolicy.EQUAL else OPTIMAL_EFFORT)
 
 
 @sweep_kernel
-def evaluate_poses(grounds, linkages, samplings, settings, poses, held, works, results):
+def evaluate_poses(models, poses, held, works, results):
     """Evaluate the poses into `results` in chunks, as many as there are work spaces.
 
-    Records can't be handed to the threads but as arrays, here of one element.
+    Records can't be handed to the threads but as arrays, here (1,) MODEL.
     """
     n, chunks = poses.shape[0], works.size
     for chunk in prange(chunks):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            evaluate_pose(
-                grounds[0], linkages[0], samplings[0], settings[0],
-                poses, held, i, works[chunk], results[i],
-            )  # fmt: skip
+            set_pose(poses, i, works[chunk])
+            hold_wheels(held, i, works[chunk].contacts)
+            evaluate_pose(models[0], works[chunk], results[i])
 
 
 @kernel
-def evaluate_pose(ground, linkage, samples, settings, poses, held, i, work, result):
-    """Evaluate the model at pose i into `result`; where it does not settle only the status."""
-    q, placement, contacts = result.q, work.placement, work.contacts
+def set_pose(poses, i, work):
+    """Write pose i of (n, 3) into the work space."""
+    for k in range(3):
+        work.pose[k] = poses[i, k]
+
+
+@kernel
+def hold_wheels(held, i, contacts):
+    """Write which wheels are held at pose i, and how, into the contacts."""
     for wheel in range(6 if held.shape[0] > 0 else 0):
         contacts.held_height[wheel] = held[i, wheel, 0]
         contacts.held_angle[wheel] = held[i, wheel, 1]
-    status = settle(
-        ground, linkage, samples, poses[i, 0], poses[i, 1], poses[i, 2],
-        q, placement, contacts, work.J, work.step,
-    )  # fmt: skip
-    if status == SETTLED:
-        place_masses(linkage, q, placement)
-        columns_needed = 1 if settings.policy == EQUAL else 1 + FREE_FORCES
-        if not balance_forces(linkage, placement, contacts, columns_needed, work.balance):
-            status = NO_EQUILIBRIUM
+
+
+@kernel
+def evaluate_pose(model, work, result):
+    """Evaluate the model at `work.pose` into a RESULT; only its status where it fails."""
+    linkage = model.linkage
+    status = settle(model, work)
+    if status == PoseStatus.SETTLED:
+        place_masses(linkage, work.q, work.placement)
+        equal = model.settings.policy == TorquePolicy.EQUAL
+        columns = 1 if equal else 1 + FREE_FORCES
+        if not balance_forces(linkage, work.placement, work.contacts, columns, work.balance):
+            status = PoseStatus.NO_EQUILIBRIUM
     result.status = status
-    if status != SETTLED:
-        q[:] = np.nan
+    if status != PoseStatus.SETTLED:
+        result.q[:] = np.nan
         return
-    _write_geometry(placement, contacts, result)
-    _write_forces(ground, linkage, settings, work, result)
+    for k in range(6):
+        result.q[k] = work.q[k]
+    _write_geometry(work.placement, work.contacts, result)
+    _write_forces(model, work, result)
     angle, measure = find_tip_over(linkage, work)
-    result.tip_over_ratio = angle / settings.flat_angle
-    result.tip_over_force_angle = measure / settings.flat_measure
-    result.belly_clearance = belly_clearance(ground, linkage, placement)
+    result.tip_over_ratio = angle / model.settings.flat_angle
+    result.tip_over_force_angle = measure / model.settings.flat_measure
+    result.belly_clearance = belly_clearance(model.ground, linkage, work.placement)
 
 
 @kernel
@@ -184,14 +207,15 @@ def _write_geometry(placement, contacts, result):
 
 
 @kernel
-def _write_forces(ground, linkage, settings, work, result):
+def _write_forces(model, work, result):
+    ground, linkage, settings = model.ground, model.linkage, model.settings
     search, point = work.search, work.contacts.point
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
         search.mu[wheel] = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
     if settings.on_soil:
-        share_forces_on_soil(ground, linkage, settings, work)
-    elif settings.policy == EQUAL:
+        share_forces_on_soil(model, work)
+    elif settings.policy == TorquePolicy.EQUAL:
         take_equal_torques(work.balance, search)
     else:
         largest = settings.allowed_torque / (linkage.radius * weight)
@@ -205,11 +229,12 @@ def _write_forces(ground, linkage, settings, work, result):
         sinkage, resistance = 0.0, 0.0
         if settings.on_soil:
             soil = work.soils[wheel]
-            slip, sinkage, resistance, pull, torque, utilisation = solve_wheel(
-                soil, mu, linkage.radius, linkage.width, N, settings.direction * T, S
-            )
-            torque *= settings.direction
-            mu = effective_friction(soil, mu, linkage.radius, linkage.width, N)
+            own = SoilWheel(linkage.radius, linkage.width, mu)
+            solved = solve_wheel(soil, own, N, settings.direction * T, S)
+            slip, utilisation = solved.slip_ratio, solved.utilisation
+            sinkage, resistance = solved.sinkage, solved.resistance
+            torque = settings.direction * solved.torque
+            mu = effective_friction(soil, own, N)
         else:
             torque = linkage.radius * T
             utilisation = np.sqrt(T * T + S * S) / (mu * N) if N > 0.0 else np.inf

@@ -7,26 +7,19 @@ rover can stand and drive there.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.contact.settling import SETTLED
 from rover_physics.numerics.kernels import kernel, sweep_kernel
-from rover_physics.numerics.records import shared_array_of
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.evaluation import (
-    NONE_HELD,
-    effort,
-    evaluate_pose,
-    new_results,
-    new_works,
-)
-from rover_physics.prediction.model_setup import Setup, set_up
+from rover_physics.prediction.evaluation import effort, evaluate_pose, new_works, set_pose
+from rover_physics.prediction.model_setup import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses, sweep_lock
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 BATCH = 32_768
@@ -42,7 +35,7 @@ class PoseScores:
     """What decides about poses; arrays of one shape, NaN where the rover does not settle."""
 
     status: NDArray[np.int8]
-    """SETTLED, OFF_MAP, UNKNOWN_GROUND, NOT_SETTLED or NO_EQUILIBRIUM of `sweep`."""
+    """A PoseStatus each."""
     friction_utilisation: Floats
     """Largest of the six wheels; infinite where one lifts off."""
     torque_saturation: Floats
@@ -60,7 +53,7 @@ class PoseScores:
         """Tell where the rover keeps the limits of its file, but for sinkage and suspension."""
         limits = rover.limits
         return np.asarray(
-            (self.status == SETTLED)
+            (self.status == PoseStatus.SETTLED)
             & (self.friction_utilisation <= limits.friction_utilisation)
             & (self.torque_saturation <= limits.torque_saturation)
             & (self.least_load >= 0.0)
@@ -70,14 +63,16 @@ class PoseScores:
         )
 
 
-def score_poses(rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: Any) -> PoseScores:
+def score_poses(
+    rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
+) -> PoseScores:
     """Score poses each for itself, with nothing between them.
 
     Args:
         rover: The rover.
         terrain: The ground.
         poses: (..., 3) x, y [m] and yaw [rad] of base_link in the map frame, of any shape.
-        arguments: Further arguments of `sweep_path`.
+        options: As for `sweep_path`.
 
     Returns:
         Arrays of the shape of the poses without the last axis.
@@ -88,11 +83,11 @@ def score_poses(rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: A
     """
     given = np.asarray(poses)
     flat = check_poses(given.reshape(-1, 3) if given.shape[-1:] == (3,) else given)
-    return _score(set_up(rover, terrain, **arguments), flat, given.shape[:-1])
+    return _score(pack_model(rover, terrain, options), flat, given.shape[:-1])
 
 
 def sweep_map(
-    rover: Rover, terrain: Terrain, headings: int = 8, **arguments: Any
+    rover: Rover, terrain: Terrain, headings: int = 8, options: SweepOptions = DEFAULT_OPTIONS
 ) -> Iterator[tuple[int, PoseScores]]:
     """Score the rover over each cell of a map at headings all around, a few rows at a time.
 
@@ -100,7 +95,7 @@ def sweep_map(
         rover: The rover.
         terrain: The map of (ny, nx) cells.
         headings: Number of headings, the first along x, then equally spaced to the left.
-        arguments: Further arguments of `sweep_path`.
+        options: As for `sweep_path`.
 
     Yields:
         The first row, and scores (rows, nx, headings) of that row and those that follow. Whoever
@@ -112,49 +107,40 @@ def sweep_map(
     ny, nx = terrain.elevation.shape
     x = terrain.origin[0] + terrain.resolution * np.arange(nx)
     yaw = np.arange(headings) * (2.0 * np.pi / headings)
-    setup = set_up(rover, terrain, **arguments)
+    model = pack_model(rover, terrain, options)
     rows = max(1, BATCH // (nx * headings))
     for first in range(0, ny, rows):
         y = terrain.origin[1] + terrain.resolution * np.arange(first, min(first + rows, ny))
         grid = np.stack(np.broadcast_arrays(x[:, None], y[:, None, None], yaw), axis=-1)
         poses = np.ascontiguousarray(grid.reshape(-1, 3))
-        yield first, _score(setup, poses, grid.shape[:-1])
+        yield first, _score(model, poses, grid.shape[:-1])
 
 
-def _score(setup: Setup, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
+def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
     """Score poses (n, 3); the scores have another shape of n elements."""
     n = len(poses)
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
-    records = [shared_array_of(record) for record in setup[1:]]
-    with sweep_lock, limit_threads(effort(setup.settings, n)) as threads:
-        works = new_works(threads, n)
-        results = new_results(len(works))
-        score_all(
-            setup.ground.records, *records, poses, NONE_HELD, works, results, status, numbers
-        )
+    with sweep_lock, limit_threads(effort(model.settings, n)) as threads:
+        score_all(model.records, poses, new_works(threads, n), status, numbers)
     return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
 
 
 @sweep_kernel
-def score_all(
-    grounds, linkages, samplings, settings, poses, held, works, results, status, numbers
-):
-    """Score the poses in chunks, as many as there are work spaces and results."""
+def score_all(models, poses, works, status, numbers):
+    """Score the poses in chunks, as many as there are work spaces."""
     n, chunks = poses.shape[0], works.size
     for chunk in prange(chunks):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            evaluate_pose(
-                grounds[0], linkages[0], samplings[0], settings[0],
-                poses, held, i, works[chunk], results[chunk],
-            )  # fmt: skip
-            status[i] = results[chunk].status
-            _write_score(results[chunk], i, numbers)
+            set_pose(poses, i, works[chunk])
+            evaluate_pose(models[0], works[chunk], works[chunk].result)
+            status[i] = works[chunk].result.status
+            _write_score(works[chunk].result, i, numbers)
 
 
 @kernel
 def _write_score(result, i, numbers):
     """Write column i of numbers (NUMBERS, n), in the order of `PoseScores`."""
-    if result.status != SETTLED:
+    if result.status != PoseStatus.SETTLED:
         for k in range(NUMBERS):
             numbers[k, i] = np.nan
         return

@@ -1,75 +1,66 @@
 """What a sweep needs in the form that the kernels read, from checked arguments."""
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rover_physics.contact.wheel_samples import sample_wheel
 from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
-from rover_physics.forces.torques import EQUAL, OPTIMAL
-from rover_physics.numerics.records import new_record
-from rover_physics.prediction.evaluation import SETTINGS, find_tip_over, new_work
+from rover_physics.numerics.records import new_record, shared_array_of
+from rover_physics.prediction.evaluation import MODEL, SETTINGS, find_tip_over, new_work
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com, pack_tool
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import Ground, pack_ground, with_soils
 
-POLICIES = {"equal": EQUAL, "optimal": OPTIMAL}
 
+@dataclass(frozen=True, eq=False)
+class PackedModel:
+    """A rover on a terrain with options, in the form that the kernels read."""
 
-class Setup(NamedTuple):
-    """The arguments that all kernels of a sweep share."""
-
+    records: np.ndarray
+    """(1,) MODEL."""
     ground: Ground
-    """The terrain."""
-    linkage: Any
-    """LINKAGE: the rover with its arm, payload and tool load."""
-    samples: Any
-    """WHEEL_SAMPLES: points of a wheel's rim."""
-    settings: Any
-    """SETTINGS: what is asked for."""
+    """The terrain that the record points to; it lives as long as this."""
+
+    @property
+    def record(self) -> Any:
+        """The MODEL itself."""
+        return self.records[0]
+
+    @property
+    def settings(self) -> Any:
+        """SETTINGS of the MODEL."""
+        return self.records[0].settings
 
 
-def set_up(
-    rover: Rover,
-    terrain: Terrain,
-    *,
-    friction: float | None = None,
-    max_torque: float | None = None,
-    policy: str = "equal",
-    joint_angles: Mapping[str, float] | None = None,
-    payload: float | None = None,
-    tool_force: ArrayLike | None = None,
-    tool_moment: ArrayLike | None = None,
-    soil: str | None = None,
-    backward: bool = False,
-) -> Setup:
-    """Check the arguments of a sweep and pack them; `sweep_path` says what they are.
+def pack_model(
+    rover: Rover, terrain: Terrain, options: SweepOptions = DEFAULT_OPTIONS
+) -> PackedModel:
+    """Check rover, terrain and options and pack them for the kernels, once for the same request.
 
     Raises:
-        ModelError: An argument that makes no sense.
-        SoilError: A soil of the terrain, or `soil`, that is not among the presets.
+        ModelError: An option that this rover cannot have, such as a payload without an arm.
+        SoilError: A soil of the terrain, or `options.soil`, that is not among the presets.
     """
-    same, on_soil = _SameRover(rover), bool(terrain.soil_names or soil is not None)
-    angles = None if joint_angles is None else tuple(joint_angles.items())
-    tool_loads = () if tool_force is None and tool_moment is None else (tool_force, tool_moment)
-    pack = _pack_request.__wrapped__ if tool_loads else _pack_request
-    packed = pack(
-        same, terrain.resolution, policy, friction, max_torque, angles, payload, on_soil, backward,
-        *tool_loads,
-    )  # fmt: skip
-    soils = _pack_soils(terrain.soil_names, soil)
-    return Setup(with_soils(pack_ground(terrain), soils), *packed)
+    return _pack_model(_SameRover(rover), terrain, options)
 
 
-@lru_cache(maxsize=16)
-def _pack_soils(names: tuple[str, ...], default: str | None) -> np.ndarray:
-    return pack_soils(names, default=default)
+@lru_cache(maxsize=8)
+def _pack_model(same: "_SameRover", terrain: Terrain, options: SweepOptions) -> PackedModel:
+    on_soil = bool(terrain.soil_names or options.soil is not None)
+    linkage, samples, settings = _pack_request(same, terrain.resolution, on_soil, options)
+    soils = pack_soils(terrain.soil_names, default=options.soil)
+    ground = with_soils(pack_ground(terrain), soils)
+    record = new_record(
+        MODEL, ground=ground.records[0], linkage=linkage, samples=samples, settings=settings
+    )
+    return PackedModel(shared_array_of(record), ground)
 
 
 class _SameRover:
@@ -87,38 +78,23 @@ class _SameRover:
 
 @lru_cache(maxsize=16)
 def _pack_request(
-    same: _SameRover,
-    resolution: float,
-    policy: str,
-    friction: float | None,
-    max_torque: float | None,
-    angles: tuple[tuple[str, float], ...] | None,
-    payload: float | None,
-    on_soil: bool,
-    backward: bool,
-    tool_force: ArrayLike | None = None,
-    tool_moment: ArrayLike | None = None,
+    same: _SameRover, resolution: float, on_soil: bool, options: SweepOptions
 ) -> tuple[Any, Any, Any]:
-    """Return the fields of `Setup` after the ground, the same ones where the same is asked."""
-    rover, joint_angles = same.rover, None if angles is None else dict(angles)
-    if policy not in POLICIES:
-        raise ModelError(f"no torque policy {policy!r}; policies are {', '.join(POLICIES)}")
-    mu = rover.friction if friction is None else friction
-    torque = rover.wheel.max_torque if max_torque is None else max_torque
-    for name, value in (("friction", mu), ("max_torque", torque)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise ModelError(f"{name} is {value}; it must be above 0")
-    mass, com = body_mass_and_com(rover, joint_angles, payload)
-    tool = pack_tool(rover, joint_angles, tool_force, tool_moment)
+    """Return LINKAGE, WHEEL_SAMPLES and SETTINGS, the same ones where the same is asked."""
+    rover, angles = same.rover, options.arm_angles
+    mu = rover.friction if options.friction is None else options.friction
+    torque = rover.wheel.max_torque if options.max_torque is None else options.max_torque
+    mass, com = body_mass_and_com(rover, angles, options.payload)
+    tool = pack_tool(rover, angles, options.tool_force, options.tool_moment)
     flat_angle, flat_measure = _tip_over_on_flat_ground(same)
     settings = new_record(
         SETTINGS,
-        policy=POLICIES[policy],
+        policy=POLICIES[options.policy],
         friction=float(mu),
         max_torque=float(torque),
         allowed_torque=float(torque * rover.limits.torque_saturation),
         on_soil=on_soil,
-        direction=-1.0 if backward else 1.0,
+        direction=options.direction,
         speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),
         max_wheel_speed=float(rover.wheel.max_speed),
         flat_angle=flat_angle,
@@ -133,7 +109,7 @@ def _tip_over_on_flat_ground(same: _SameRover) -> tuple[float, float]:
     rover = same.rover
     linkage = pack_linkage(rover, *body_mass_and_com(rover))
     work, q = new_work(), np.zeros(6)
-    place(linkage, 0.0, 0.0, 0.0, q, work.placement)
+    place(linkage, work.pose, q, work.placement)
     place_masses(linkage, q, work.placement)
     work.contacts.point[:] = work.placement.centres
     work.contacts.point[:, 2] -= linkage.radius

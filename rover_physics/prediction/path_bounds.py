@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.status import BoundStatus
+
 Floats = NDArray[np.float64]
-BOUNDED = 0
-"""Status of a waypoint that has bounds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class PathBounds:
     sigmas: float
     """Standard deviations of the map that are allowed for."""
     status: NDArray[np.int8]
-    """(n,) BOUNDED, or of `bounds_pose` why not."""
+    """(n,) a BoundStatus each."""
     roll: Floats
     """(n, 2) [rad]."""
     pitch: Floats
@@ -45,7 +45,7 @@ class PathBounds:
     @property
     def bounded(self) -> NDArray[np.bool_]:
         """(n,) True for the waypoints that have bounds."""
-        return np.asarray(self.status == BOUNDED)
+        return np.asarray(self.status == BoundStatus.BOUNDED)
 
     @property
     def tilt(self) -> Floats:

@@ -17,7 +17,7 @@ class PathPrediction:
     poses: Floats
     """(n, 3) x, y [m] and yaw [rad] of the body origin, map frame, as asked for."""
     status: NDArray[np.int8]
-    """(n,) SETTLED, OFF_MAP, UNKNOWN_GROUND, NOT_SETTLED or NO_EQUILIBRIUM of `sweep`."""
+    """(n,) a PoseStatus each."""
     settled: NDArray[np.bool_]
     """(n,) True where all wheels touch the ground and the forces balance."""
     position: Floats

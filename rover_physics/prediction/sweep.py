@@ -1,36 +1,26 @@
 """The quasi-static model along a path: poses in, `PathPrediction` out."""
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.contact.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
 from rover_physics.errors import PoseError
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, find_crossings
 from rover_physics.prediction.drops import find_falls
-from rover_physics.prediction.evaluation import NO_EQUILIBRIUM, NONE_HELD, RESULT, effort, evaluate
-from rover_physics.prediction.model_setup import POLICIES, Setup, set_up
+from rover_physics.prediction.evaluation import NONE_HELD, RESULT, effort, evaluate
+from rover_physics.prediction.model_setup import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import add_up
 from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.rover.model import Rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
-__all__ = [
-    "NOT_SETTLED",
-    "NO_EQUILIBRIUM",
-    "OFF_MAP",
-    "POLICIES",
-    "SETTLED",
-    "UNKNOWN_GROUND",
-    "sweep_path",
-    "sweep_paths",
-]
-
-POLICY_NAMES = {number: name for name, number in POLICIES.items()}
+POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
 
 sweep_lock = threading.Lock()  # not all of numba's threading layers allow two callers
 
@@ -39,16 +29,7 @@ def sweep_path(
     rover: Rover,
     terrain: Terrain,
     poses: ArrayLike,
-    *,
-    friction: float | None = None,
-    max_torque: float | None = None,
-    policy: str = "equal",
-    joint_angles: Mapping[str, float] | None = None,
-    payload: float | None = None,
-    tool_force: ArrayLike | None = None,
-    tool_moment: ArrayLike | None = None,
-    soil: str | None = None,
-    backward: bool = False,
+    options: SweepOptions = DEFAULT_OPTIONS,
 ) -> PathPrediction:
     """Predict the rover at each pose of a path.
 
@@ -56,40 +37,21 @@ def sweep_path(
         rover: The rover.
         terrain: The ground; its layers of friction and soil hold where it has them.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        friction: Friction coefficient instead of the rover's own.
-        max_torque: Largest wheel torque [N m] instead of the rover's own.
-        policy: "equal": all wheels pull alike; "optimal": the torques that need least friction.
-        joint_angles: Arm angles [rad] by joint name; stowed where not given.
-        payload: Mass at the arm's tip [kg] instead of the rover's own.
-        tool_force: (3,) force [N] that the surroundings exert on the arm's tip, body frame.
-        tool_moment: (3,) moment [N m] that they exert on it, body frame.
-        soil: Preset soil where the terrain's soil layer has none or there is no layer; None:
-            Coulomb friction. docs/soil.md has the presets.
-        backward: The rover drives backwards along the poses.
+        options: Torque policy, friction, soil, arm and direction.
 
     Raises:
-        PoseError: poses of wrong shape, or not finite.
-        ModelError: an argument that makes no sense.
-        SoilError: a soil of the terrain, or `soil`, that is not among the presets.
+        PoseError: Poses of wrong shape, or not finite.
+        ModelError: An option that this rover cannot have.
+        SoilError: A soil of the terrain, or of the options, that is not among the presets.
     """
-    setup = set_up(
-        rover,
-        terrain,
-        friction=friction,
-        max_torque=max_torque,
-        policy=policy,
-        joint_angles=joint_angles,
-        payload=payload,
-        tool_force=tool_force,
-        tool_moment=tool_moment,
-        soil=soil,
-        backward=backward,
-    )
-    return _sweep(rover, terrain, setup, [check_poses(poses)])[0]
+    return sweep_paths(rover, terrain, [poses], options)[0]
 
 
 def sweep_paths(
-    rover: Rover, terrain: Terrain, paths: Sequence[ArrayLike], **arguments: Any
+    rover: Rover,
+    terrain: Terrain,
+    paths: Sequence[ArrayLike],
+    options: SweepOptions = DEFAULT_OPTIONS,
 ) -> list[PathPrediction]:
     """Predict the rover along several paths at once, which is faster than one after the other.
 
@@ -97,21 +59,21 @@ def sweep_paths(
         rover: The rover.
         terrain: The ground.
         paths: Poses of each path, as `sweep_path` takes them.
-        arguments: Further arguments of `sweep_path`.
+        options: As for `sweep_path`.
 
     Raises:
         PoseError, ModelError, SoilError: As `sweep_path`.
     """
-    setup = set_up(rover, terrain, **arguments)
-    return _sweep(rover, terrain, setup, [check_poses(poses) for poses in paths])
+    model = pack_model(rover, terrain, options)
+    return _sweep(rover, terrain, model, [check_poses(poses) for poses in paths])
 
 
 def _sweep(
-    rover: Rover, terrain: Terrain, setup: Setup, paths: Sequence[np.ndarray]
+    rover: Rover, terrain: Terrain, model: PackedModel, paths: Sequence[np.ndarray]
 ) -> list[PathPrediction]:
     def evaluate_at(at: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
         with sweep_lock:
-            return evaluate(*setup, at, held)
+            return evaluate(model.records, at, held)
 
     if not paths:
         return []
@@ -119,15 +81,15 @@ def _sweep(
     poses = np.concatenate(paths)
     joined = np.ones(len(poses) - 1, bool)
     joined[ends[:-1] - 1] = False
-    radius, direction = rover.wheel.radius, float(setup.settings["direction"])
-    with limit_threads(effort(setup.settings, len(poses))):  # told once, not for each round
+    radius, direction = rover.wheel.radius, float(model.settings["direction"])
+    with limit_threads(effort(model.settings, len(poses))):  # told once, not for each round
         results = evaluate_at(poses)
         crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
         part = crossings.between(first, end) if len(paths) > 1 else crossings
         predictions.append(
-            _predict(setup.settings, radius, poses[first:end], results[first:end], part)
+            _predict(model.settings, radius, poses[first:end], results[first:end], part)
         )
     return predictions
 
@@ -179,7 +141,7 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
 
 def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any) -> PathPrediction:
     same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
-    q, settled = results["q"], results["status"] == SETTLED
+    q, settled = results["q"], results["status"] == PoseStatus.SETTLED
     position = np.empty((len(poses), 3))
     position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
     position[~settled] = np.nan

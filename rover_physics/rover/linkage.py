@@ -115,8 +115,10 @@ PLACEMENT = record_type(
 
 
 @kernel
-def to_map(R, origin, x, y, z, out, row):
+def to_map(placement, point, out, row):
     """Write the point (x, y, z) of the body frame in the map frame into row `row` of `out`."""
+    R, origin = placement.R, placement.origin
+    x, y, z = point
     for i in range(3):
         out[row, i] = origin[i] + R[i, 0] * x + R[i, 1] * y + R[i, 2] * z
 
@@ -128,25 +130,29 @@ def rocker_sign(side):
 
 
 @kernel
-def place(linkage, x, y, yaw, q, placement):
-    """Write where all parts are into `placement`.
+def place(linkage, pose, q, placement):
+    """Write where all parts are into `placement`, but for the centres of mass.
 
-    q (6,): z of the body origin [m], roll, pitch, right rocker angle, right and left bogie angle
-    [rad].
+    Args:
+        linkage: LINKAGE.
+        pose: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
+        q: (6,) z of the body origin [m], roll, pitch, right rocker angle, right and left bogie
+            angle [rad].
+        placement: PLACEMENT to be written.
     """
     R, origin, wheels = placement.R, placement.origin, linkage.wheels
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
-    attitude_matrix(q[1], q[2], yaw, R)
-    origin[0], origin[1], origin[2] = x, y, q[0]
+    attitude_matrix(q[1], q[2], pose[2], R)
+    origin[0], origin[1], origin[2] = pose[0], pose[1], q[0]
     for side in range(2):
         px, py, pz = pivots[side, 0], pivots[side, 1], pivots[side, 2]
         angle = rocker_sign(side) * q[3]
         rocker_c, rocker_s = np.cos(angle), np.sin(angle)
         bogie_c, bogie_s = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
-        to_map(R, origin, px, py, pz, placement.rocker_pivots, side)
+        to_map(placement, (px, py, pz), placement.rocker_pivots, side)
         dx, dz = bogie_pivots[side, 0] - px, bogie_pivots[side, 2] - pz
         bx, bz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
-        to_map(R, origin, bx, bogie_pivots[side, 1], bz, placement.bogie_pivots, side)
+        to_map(placement, (bx, bogie_pivots[side, 1], bz), placement.bogie_pivots, side)
         for i in range(3 * side, 3 * side + 3):
             if linkage.on_bogie[i]:
                 dx, dz = wheels[i, 0] - bogie_pivots[side, 0], wheels[i, 2] - bogie_pivots[side, 2]
@@ -154,33 +160,31 @@ def place(linkage, x, y, yaw, q, placement):
             else:
                 dx, dz = wheels[i, 0] - px, wheels[i, 2] - pz
                 wx, wz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
-            to_map(R, origin, wx, wheels[i, 1], wz, placement.centres, i)
+            to_map(placement, (wx, wheels[i, 1], wz), placement.centres, i)
     _span_wheel_plane(R, placement.forward, placement.up)
 
 
 @kernel
 def place_masses(linkage, q, placement):
     """Write where the centres of mass are into a placement written by `place` with q (6,)."""
-    R, origin, coms = placement.R, placement.origin, placement.part_coms
+    coms, body = placement.part_coms, linkage.body_com
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
-    to_map(R, origin, linkage.body_com[0], linkage.body_com[1], linkage.body_com[2], coms, 0)
+    to_map(placement, (body[0], body[1], body[2]), coms, 0)
     for side in range(2):
         px, pz = pivots[side, 0], pivots[side, 2]
         angle = rocker_sign(side) * q[3]
         c, s = np.cos(angle), np.sin(angle)
         point = linkage.rocker_coms
         dx, dz = point[side, 0] - px, point[side, 2] - pz
-        to_map(
-            R, origin, px + c * dx + s * dz, point[side, 1], pz - s * dx + c * dz, coms, 1 + side
-        )
+        com = px + c * dx + s * dz, point[side, 1], pz - s * dx + c * dz
+        to_map(placement, com, coms, 1 + side)
         dx, dz = bogie_pivots[side, 0] - px, bogie_pivots[side, 2] - pz
         bx, bz = px + c * dx + s * dz, pz - s * dx + c * dz
         c, s = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
         point = linkage.bogie_coms
         dx, dz = point[side, 0] - bogie_pivots[side, 0], point[side, 2] - bogie_pivots[side, 2]
-        to_map(
-            R, origin, bx + c * dx + s * dz, point[side, 1], bz - s * dx + c * dz, coms, 3 + side
-        )
+        com = bx + c * dx + s * dz, point[side, 1], bz - s * dx + c * dz
+        to_map(placement, com, coms, 3 + side)
 
 
 @kernel

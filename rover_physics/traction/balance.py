@@ -86,6 +86,7 @@ ROWS_WORK = record_type(
     ("placement", PLACEMENT),
     ("contacts", CONTACTS),
     ("balance", BALANCE),
+    ("pose", float, (3,)),
     ("q", float, (6,)),
     ("angles", float, (6,)),
     ("offsets", float, (6,)),
@@ -181,7 +182,7 @@ def _write_rows(linkage, work, A, b, along):
     """Write the nine equations at what `work` was given; False where they are singular."""
     placement, contacts, balance = work.placement, work.contacts, work.balance
     linkage.tool[1, 0] = -work.push
-    place(linkage, 0.0, 0.0, 0.0, work.q, placement)
+    place(linkage, work.pose, work.q, placement)
     place_masses(linkage, work.q, placement)
     _write_contact(linkage.radius, placement, work.angles, work.offsets, contacts)
     if not balance_forces(linkage, placement, contacts, 1 + FREE_TORQUES, balance):

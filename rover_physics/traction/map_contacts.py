@@ -62,7 +62,7 @@ class MapContactFinder:
         angles, gaps, pose = np.zeros(6), np.empty(6), np.asarray(pose, dtype=float)
         _find_angles(
             self._ground.records, self._linkages, self._placements,
-            1.0 if forward else -1.0, pose, q, self._found, gaps, angles,
+            1.0 if forward else -1.0, pose[[0, 1, 3]], q, self._found, gaps, angles,
         )  # fmt: skip
         known = np.isfinite(gaps) & np.isfinite(angles)
         if not known.all():
@@ -78,11 +78,11 @@ class MapContactFinder:
 def _find_angles(grounds, linkages, placements, ahead, pose, q, found, gaps, angles):
     """Write gaps [m] at the given height, and angles [rad] at the height that the map tells."""
     ground, linkage, placement = grounds[0], linkages[0], placements[0]
-    place(linkage, pose[0], pose[1], pose[3], q, placement)
+    place(linkage, pose, q, placement)
     _measure_gaps(ground, linkage, placement, found, gaps)
     q[0] -= _median(gaps)
     if np.isfinite(q[0]):
-        place(linkage, pose[0], pose[1], pose[3], q, placement)
+        place(linkage, pose, q, placement)
         _find_nearest(ground, linkage, placement, ahead, found, angles)
 
 

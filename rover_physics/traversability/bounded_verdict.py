@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from rover_physics.bounds.pose import OFF_MAP_NEAR, ON_EDGE, SINGULAR, UNKNOWN_NEAR
 from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import Floats, PathPrediction
 from rover_physics.rover.model import Rover
+from rover_physics.status import BoundStatus
 from rover_physics.traversability.verdict import Verdict, find_reasons
 
 _UNBOUNDED = {
-    ON_EDGE: ("not_settled", "a wheel may climb or fall off an edge"),
-    UNKNOWN_NEAR: ("unknown_ground", "a wheel may reach unknown ground"),
-    OFF_MAP_NEAR: ("off_map", "a wheel may leave the map"),
-    SINGULAR: ("no_equilibrium", "the wheel loads may not be determined"),
+    BoundStatus.ON_EDGE: ("not_settled", "a wheel may climb or fall off an edge"),
+    BoundStatus.UNKNOWN_NEAR: ("unknown_ground", "a wheel may reach unknown ground"),
+    BoundStatus.OFF_MAP_NEAR: ("off_map", "a wheel may leave the map"),
+    BoundStatus.SINGULAR: ("no_equilibrium", "the wheel loads may not be determined"),
 }
 
 

@@ -1,14 +1,16 @@
 """How passable each waypoint is: with equal torques, only with traction control, or not at all."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import WHEELS
 from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_path
@@ -43,7 +45,12 @@ class ClassifiedWaypoint:
 
 
 def classify_path(
-    rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: Any
+    rover: Rover,
+    terrain: Terrain,
+    poses: ArrayLike,
+    options: SweepOptions = DEFAULT_OPTIONS,
+    *,
+    sigmas: float | None = SIGMAS,
 ) -> tuple[ClassifiedWaypoint, ...]:
     """ClassifiedWaypoint each waypoint of a path by what both torque policies make of it.
 
@@ -51,7 +58,8 @@ def classify_path(
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        arguments: Further arguments of `judge_path`, except `policy`.
+        options: As for `sweep_path`; its policy is not looked at.
+        sigmas: As for `judge_path`.
 
     Returns:
         A class per waypoint; a limit broken on the way to a waypoint counts there, and so does
@@ -60,8 +68,9 @@ def classify_path(
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
     """
-    equal = judge_path(rover, terrain, poses, policy="equal", **arguments)
-    return classify_judged(rover, terrain, *equal, **arguments)
+    equal = replace(options, policy="equal")
+    judged = judge_path(rover, terrain, poses, equal, sigmas=sigmas)
+    return classify_judged(rover, terrain, *judged, equal, sigmas=sigmas)
 
 
 def classify_judged(
@@ -69,7 +78,9 @@ def classify_judged(
     terrain: Terrain,
     prediction: PathPrediction,
     verdict: Verdict,
-    **arguments: Any,
+    options: SweepOptions = DEFAULT_OPTIONS,
+    *,
+    sigmas: float | None = SIGMAS,
 ) -> tuple[ClassifiedWaypoint, ...]:
     """ClassifiedWaypoint each waypoint of a path that `judge_path` has judged under one policy.
 
@@ -80,7 +91,8 @@ def classify_judged(
         terrain: The ground.
         prediction: The path under either policy, from `judge_path`.
         verdict: What was said of it.
-        arguments: The arguments it was judged with, except `policy`.
+        options: The options it was judged with; their policy is not looked at.
+        sigmas: The standard deviations of the map it was judged with.
 
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
@@ -88,9 +100,8 @@ def classify_judged(
     judged = {prediction.policy: (prediction, verdict)}
     for policy in ("equal", "optimal"):
         if policy not in judged:
-            judged[policy] = judge_path(
-                rover, terrain, prediction.poses, policy=policy, **arguments
-            )
+            asked = replace(options, policy=policy)
+            judged[policy] = judge_path(rover, terrain, prediction.poses, asked, sigmas=sigmas)
         if judged[policy][1].traversable:
             break
     equal = _decide(rover, *judged["equal"])

@@ -13,13 +13,13 @@ just behind the point of no return.
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from rover_physics.forces.soil import use_of_shear
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.limit_checks import TOLERANCE, largest_of
@@ -44,30 +44,28 @@ def ask_for_ways_out(
     terrain: Terrain,
     prediction: PathPrediction,
     verdict: Verdict,
-    arguments: dict[str, Any],
+    options: SweepOptions,
 ) -> Verdict:
     """Return the verdict, refused as trapped where there is neither a way on nor back."""
     end = len(prediction.poses) if verdict.first_failure < 0 else verdict.first_failure
-    one_way = np.flatnonzero(_find_one_way(rover, prediction, arguments)[:end])
+    one_way = np.flatnonzero(_find_one_way(rover, prediction, options)[:end])
     if not one_way.size:
         return verdict
     run_up = prediction.distance[one_way[0]] - RUN_UP * _wheelbase(rover)
     first = int(np.searchsorted(prediction.distance, max(run_up, 0.0)))
-    reverse = {**arguments, "backward": not arguments.get("backward", False)}
+    reverse = replace(options, backward=not options.backward)
     back = _judge_way(rover, terrain, prediction.poses[first:end][::-1], reverse)
     if back.traversable:
         return verdict
     stop = end - 1 - back.first_failure  # the way back is blocked here
-    on = _find_way_on(rover, terrain, prediction, stop, end - 1, arguments)
+    on = _find_way_on(rover, terrain, prediction, stop, end - 1, options)
     if not on:
         return verdict
     on = verdict.reason or on
     return _refuse(rover, prediction, verdict, stop, end, f"{on}; no way back: {back.reason}")
 
 
-def _find_one_way(
-    rover: Rover, prediction: PathPrediction, arguments: dict[str, Any]
-) -> np.ndarray:
+def _find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
     """Return (n,) True where, or just before where, the forces of the way in do not do for back.
 
     Another set of torques may do, under policy "optimal"; this only tells where to ask.
@@ -75,13 +73,13 @@ def _find_one_way(
     one_way = np.any(prediction.wheel_drop > DROP * rover.wheel.radius, axis=1)
     for part in (prediction, prediction.between):
         if part is not None:
-            rows = _resists_way_back(rover, part, arguments)
+            rows = _resists_way_back(rover, part, options)
             one_way[part.waypoint[rows]] = True
     return np.asarray(one_way)
 
 
 def _resists_way_back(
-    rover: Rover, prediction: PathPrediction, arguments: dict[str, Any]
+    rover: Rover, prediction: PathPrediction, options: SweepOptions
 ) -> np.ndarray:
     """Return (n,) True where driving back with the same forces breaks a limit on some soil."""
     resistance = prediction.motion_resistance
@@ -89,12 +87,12 @@ def _resists_way_back(
         return np.zeros(len(resistance), dtype=bool)
     broken = np.zeros(resistance.shape, dtype=bool)
     wheels = np.nonzero(resistance > 0.0)
-    direction = -1.0 if arguments.get("backward", False) else 1.0
+    direction = options.direction
     R, N = resistance[wheels], prediction.wheel_loads[wheels]
     T, S = -direction * prediction.tangential[wheels], prediction.lateral[wheels]
     largest = prediction.friction[wheels] * N + R
     use = np.vectorize(use_of_shear, otypes=[float])(T, S, R, largest)
-    most = arguments.get("max_torque") or rover.wheel.max_torque
+    most = options.max_torque or rover.wheel.max_torque
     saturation = rover.wheel.radius * np.abs(T + R) / most
     limits = rover.limits
     broken[wheels] = (use > limits.friction_utilisation + TOLERANCE) | (
@@ -104,13 +102,14 @@ def _resists_way_back(
 
 
 def _judge_way(
-    rover: Rover, terrain: Terrain, poses: np.ndarray, arguments: dict[str, Any]
+    rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
 ) -> Verdict:
     """Judge a way; under whatever policy, equal torques are asked first: that is much faster."""
-    verdict = judge(rover, sweep_path(rover, terrain, poses, **{**arguments, "policy": "equal"}))
-    if verdict.traversable or arguments.get("policy", "equal") == "equal":
+    equal = replace(options, policy="equal")
+    verdict = judge(rover, sweep_path(rover, terrain, poses, equal))
+    if verdict.traversable or options.policy == "equal":
         return verdict
-    return judge(rover, sweep_path(rover, terrain, poses, **arguments))
+    return judge(rover, sweep_path(rover, terrain, poses, options))
 
 
 def _wheelbase(rover: Rover) -> float:
@@ -124,7 +123,7 @@ def _find_way_on(
     prediction: PathPrediction,
     stop: int,
     end: int,
-    arguments: dict[str, Any],
+    options: SweepOptions,
 ) -> str:
     """Return why the rover can't go on straight ahead from the end, empty if any way on is open.
 
@@ -140,8 +139,8 @@ def _find_way_on(
     spacing = _spacing(prediction)
     closed = ""
     for start in starts:
-        for poses in _ways_ahead(prediction.poses[start], wheelbase, length, spacing, arguments):
-            verdict = _judge_way(rover, terrain, poses, arguments)
+        for poses in _ways_ahead(prediction.poses[start], wheelbase, length, spacing, options):
+            verdict = _judge_way(rover, terrain, poses, options)
             if verdict.traversable:
                 return ""
             far = verdict.first_failure * spacing > LOOK_AHEAD * wheelbase
@@ -152,10 +151,10 @@ def _find_way_on(
 
 
 def _ways_ahead(
-    pose: np.ndarray, wheelbase: float, length: float, spacing: float, arguments: dict[str, Any]
+    pose: np.ndarray, wheelbase: float, length: float, spacing: float, options: SweepOptions
 ) -> Iterator[np.ndarray]:
     """Yield ways (m, 3) on from a pose: straight on, and in curves that then go straight on."""
-    direction = -1.0 if arguments.get("backward", False) else 1.0
+    direction = options.direction
     ahead = np.arange(0.0, length + spacing, spacing)
     turning = np.minimum(ahead, LOOK_AHEAD * wheelbase) / wheelbase
     for curve in CURVES:

@@ -11,11 +11,14 @@ from rover_physics.errors import ModelError, PoseError
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import check_poses, sweep_path
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.manipulator import as_vector, distance_to_reach, inverse_kinematics
 from rover_physics.rover.model import Manipulator, Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict, judge
 
+NO_LOAD = (0.0, 0.0, 0.0)
+"""Neither force nor moment on the tool."""
 OF_THE_VERDICT = (
     "policy",
     "min_tip_over_ratio",
@@ -70,37 +73,29 @@ def judge_reach(
     terrain: Terrain,
     pose: ArrayLike,
     target: ArrayLike,
+    options: SweepOptions = DEFAULT_OPTIONS,
     *,
-    tool_force: ArrayLike | None = None,
-    tool_moment: ArrayLike | None = None,
-    payload: float | None = None,
-    friction: float | None = None,
-    max_torque: float | None = None,
-    policy: str = "equal",
-    soil: str | None = None,
+    force: ArrayLike | None = None,
+    moment: ArrayLike | None = None,
 ) -> ReachAnswer:
     """Tell whether the arm can reach a point, and whether the rover holds a load there.
 
-    The rover stands still; its wheels hold it with torques as `policy` has them. Neither what the
-    arm's own joints can bear nor whether its links hit something is looked at.
+    The rover stands still; its wheels hold it with torques as the policy has them. Neither what
+    the arm's own joints can bear nor whether its links hit something is looked at.
 
     Args:
         rover: The rover; it must have a manipulator.
         terrain: The ground.
         pose: (3,) x, y [m] and yaw [rad] of base_link, map frame.
         target: (3,) where the tip of the arm shall be [m], map frame.
-        tool_force: (3,) force [N] that the surroundings exert on the tip there, map frame: a
-            tool that presses on the ground is pushed up.
-        tool_moment: (3,) moment [N m] that they exert on it, map frame.
-        payload: Mass at the tip [kg] instead of the rover's own.
-        friction: Friction coefficient instead of the rover's own.
-        max_torque: Largest wheel torque [N m] instead of the rover's own.
-        policy: Torque policy, "equal" or "optimal".
-        soil: Preset soil, see `sweep_path`.
+        options: As for `sweep_path`; arm angles and tool load follow from the other arguments.
+        force: (3,) force [N] that the surroundings exert on the tip there, map frame: a tool that
+            presses on the ground is pushed up; None: none.
+        moment: (3,) moment [N m] that they exert on it, map frame; None: none.
 
     Raises:
         PoseError: A pose of wrong shape, or not finite.
-        ModelError: A rover without an arm, or an argument that makes no sense.
+        ModelError: A rover without an arm, or an option that this rover cannot have.
         SoilError: A soil that is not among the presets.
     """
     arm = rover.manipulator
@@ -110,24 +105,14 @@ def judge_reach(
     if len(poses) != 1:
         raise PoseError(f"pose has shape {np.shape(pose)}; it must be one pose (3,): x, y, yaw")
     point = as_vector("target", target)
-    force, moment = (
-        as_vector(name, [0.0, 0.0, 0.0] if value is None else value)
-        for name, value in (("tool_force", tool_force), ("tool_moment", tool_moment))
-    )
-    ground: dict[str, Any] = {
-        "friction": friction,
-        "max_torque": max_torque,
-        "policy": policy,
-        "soil": soil,
-        "payload": payload,
-    }
-    standing = sweep_path(rover, terrain, poses, **ground)
+    load = [
+        as_vector(name, NO_LOAD if value is None else value)
+        for name, value in (("force", force), ("moment", moment))
+    ]
+    at_rest = replace(options, joint_angles=None, tool_force=None, tool_moment=None)
+    standing = sweep_path(rover, terrain, poses, at_rest)
     if not standing.settled[0]:
-        verdict = judge(rover, standing)
-        unknown = np.full(3, np.nan)
-        return ReachAnswer(
-            False, False, verdict.code, verdict.reason, unknown, np.nan, None, verdict, None
-        )
+        return _refuse_to_stand(judge(rover, standing))
     to_map = _attitude(standing)
     local = to_map.T @ (point - standing.position[0])
     solutions = inverse_kinematics(arm, local)
@@ -135,24 +120,45 @@ def judge_reach(
         return _refuse_reach(arm, local)
     answers = []
     for angles in solutions:
-        joints = dict(zip(arm.joints, angles.tolist(), strict=True))
-        prediction = sweep_path(
-            rover,
-            terrain,
-            poses,
-            joint_angles=joints,
-            tool_force=to_map.T @ force,
-            tool_moment=to_map.T @ moment,
-            **ground,
+        reaching = replace(
+            at_rest,
+            joint_angles=dict(zip(arm.joints, angles.tolist(), strict=True)),
+            tool_force=to_map.T @ load[0],
+            tool_moment=to_map.T @ load[1],
         )
-        verdict = judge(rover, prediction)
-        answers.append(
-            ReachAnswer(
-                verdict.traversable, True, verdict.code, verdict.reason, local, 0.0, joints,
-                verdict, prediction,
-            )
-        )  # fmt: skip
+        prediction = sweep_path(rover, terrain, poses, reaching)
+        answers.append(_answer(judge(rover, prediction), local, reaching, prediction))
     return max(answers, key=_safety)
+
+
+def _answer(
+    verdict: Verdict, local: np.ndarray, reaching: SweepOptions, prediction: PathPrediction
+) -> ReachAnswer:
+    return ReachAnswer(
+        possible=verdict.traversable,
+        reachable=True,
+        code=verdict.code,
+        reason=verdict.reason,
+        target=local,
+        out_of_reach=0.0,
+        joint_angles=reaching.arm_angles,
+        verdict=verdict,
+        prediction=prediction,
+    )
+
+
+def _refuse_to_stand(verdict: Verdict) -> ReachAnswer:
+    return ReachAnswer(
+        possible=False,
+        reachable=False,
+        code=verdict.code,
+        reason=verdict.reason,
+        target=np.full(3, np.nan),
+        out_of_reach=np.nan,
+        joint_angles=None,
+        verdict=verdict,
+        prediction=None,
+    )
 
 
 def _safety(answer: ReachAnswer) -> tuple[bool, float]:

@@ -7,19 +7,20 @@ self-concordant barrier from its analytic centre.
 Source: Boyd and Vandenberghe, Convex Optimization, Cambridge 2004, section 11.3.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.contact.settling import SETTLED
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
-from rover_physics.prediction.evaluation import NONE_HELD, evaluate_pose, new_results, new_work
-from rover_physics.prediction.model_setup import Setup, set_up
+from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work
+from rover_physics.prediction.model_setup import PackedModel, pack_model
 from rover_physics.prediction.path_prediction import Floats
 from rover_physics.prediction.sweep import check_poses, sweep_lock
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 PRECISION = 1e-5
@@ -60,7 +61,7 @@ class _FeasibleSet:
 
 
 def find_torque_ranges(
-    rover: Rover, terrain: Terrain, poses: ArrayLike, **arguments: Any
+    rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
 ) -> TorqueRanges:
     """Find for each wheel the torques that keep all constraints, whatever the others then do.
 
@@ -74,7 +75,7 @@ def find_torque_ranges(
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        arguments: Further arguments of `sweep_path`, except `policy`.
+        options: As for `sweep_path`; its policy is not looked at.
 
     Raises:
         PoseError: Poses of wrong shape, or not finite.
@@ -82,36 +83,35 @@ def find_torque_ranges(
         SoilError: A soil that is not among the presets.
     """
     poses = check_poses(poses)
-    setup = set_up(rover, terrain, policy="optimal", **arguments)
+    model = pack_model(rover, terrain, replace(options, policy="optimal"))
     n = len(poses)
     results, work = new_results(n), new_work()
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
         with sweep_lock:
-            evaluate_pose(
-                setup.ground.records[0], *setup[1:], poses, NONE_HELD, i, work, results[i]
-            )
-        if results[i].status != SETTLED or not _is_within(rover, setup, results[i]):
+            work.pose[:] = poses[i]
+            evaluate_pose(model.record, work, results[i])
+        if results[i].status != PoseStatus.SETTLED or not _is_within(rover, model, results[i]):
             continue
         feasible[i] = True
-        forces, start = _describe_set(rover, setup, work.balance, results[i])
+        forces, start = _describe_set(rover, model, work.balance, results[i])
         lowest[i], highest[i] = _find_extremes(forces, start)
-    scale = setup.linkage.radius * setup.linkage.mass * setup.linkage.gravity
+    scale = model.record.linkage.radius * model.record.linkage.mass * model.record.linkage.gravity
     return TorqueRanges(feasible, scale * lowest, scale * highest)
 
 
-def _is_within(rover: Rover, setup: Setup, result: Any) -> bool:
+def _is_within(rover: Rover, model: PackedModel, result: Any) -> bool:
     friction = result.friction_utilisation.max() < rover.limits.friction_utilisation
-    torque = np.abs(result.torque).max() < setup.settings.allowed_torque
+    torque = np.abs(result.torque).max() < model.settings.allowed_torque
     return bool(friction and torque and result.wheel_loads.min() > 0.0)
 
 
 def _describe_set(
-    rover: Rover, setup: Setup, balance: Any, result: Any
+    rover: Rover, model: PackedModel, balance: Any, result: Any
 ) -> tuple[_FeasibleSet, np.ndarray]:
     """Return the feasible set of a waypoint in units of the weight, and a point x (k,) in it."""
-    weight = setup.linkage.mass * setup.linkage.gravity
+    weight = model.record.linkage.mass * model.record.linkage.gravity
     known = np.concatenate([result.tangential, result.lateral]) / weight
     slopes = np.vstack([balance.tangential, balance.lateral])
     start = np.linalg.lstsq(slopes[:, 1:], known - slopes[:, 0], rcond=None)[0]
@@ -123,13 +123,13 @@ def _describe_set(
     used = rover.limits.friction_utilisation
     resistance = (result.motion_resistance / result.wheel_loads)[:, None] * normal
     strength = result.friction[:, None] * normal + resistance
-    resistance = setup.settings.direction * resistance
+    resistance = model.settings.direction * resistance
     forces = _FeasibleSet(
         load=used * strength,
         along=tangential + used * resistance,
         across=lateral.copy(),
         thrust=tangential + resistance,
-        most=setup.settings.allowed_torque / (setup.linkage.radius * weight),
+        most=model.settings.allowed_torque / (model.record.linkage.radius * weight),
     )
     return forces, start[:free]
 

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.contact.settling import NOT_SETTLED, OFF_MAP, SETTLED, UNKNOWN_GROUND
 from rover_physics.numerics.plain_values import to_plain
-from rover_physics.prediction.evaluation import NO_EQUILIBRIUM
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
+from rover_physics.status import PoseStatus
 from rover_physics.traversability.limit_checks import check_limits, largest_of
 
 CODES = (
@@ -32,13 +31,16 @@ UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Limits that do not count while a wheel rolls off an edge."""
 _LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
 _PLACELESS = {
-    OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
-    UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
-    NOT_SETTLED: (
+    PoseStatus.OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
+    PoseStatus.UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
+    PoseStatus.NOT_SETTLED: (
         "not_settled",
         "no configuration found in which all six wheels touch the ground",
     ),
-    NO_EQUILIBRIUM: ("no_equilibrium", "the wheel loads are not determined in this configuration"),
+    PoseStatus.NO_EQUILIBRIUM: (
+        "no_equilibrium",
+        "the wheel loads are not determined in this configuration",
+    ),
 }
 
 
@@ -148,8 +150,8 @@ def _hold_against_limits(
 ) -> tuple[dict[int, tuple[str, str]], dict[str, float]]:
     """Return code and reason of the rows that aren't passable, and the extreme of each limit."""
     found = {
-        row: _PLACELESS[int(prediction.status[row])]
-        for row in np.flatnonzero(prediction.status != SETTLED).tolist()
+        row: _PLACELESS[PoseStatus(prediction.status[row])]
+        for row in np.flatnonzero(prediction.status != PoseStatus.SETTLED).tolist()
     }
     checks = check_limits(rover, prediction)
     extremes = {check.code: check.extreme for check in checks}

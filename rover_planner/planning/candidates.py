@@ -12,7 +12,12 @@ is always a candidate.
 import numpy as np
 
 from rover_planner.errors import PlanningError
-from rover_planner.planning.curve_kernels import follow_curve, interpolate, turns_within
+from rover_planner.planning.curve_kernels import (
+    BumpedCurve,
+    follow_curve,
+    interpolate,
+    turns_within,
+)
 from rover_planner.planning.dubins import dubins_paths
 
 MIN_RADIUS = 0.8
@@ -162,7 +167,8 @@ class _Curve:
         t, poses, slope = np.empty(steps + 1), np.empty((steps + 1, 3)), np.empty((2, steps + 1))
         interpolate(marks, driven, _FINE[::2], 1 / ends, t)
         fan = self._fan
-        follow_curve(t, fan.start, fan.chord, fan.m0, fan.m1, fan.left, self._offset, poses, slope)
+        curve = BumpedCurve(fan.start, fan.chord, fan.m0, fan.m1, fan.left, self._offset)
+        follow_curve(t, curve, poses, slope)
         poses[:, 2] = np.arctan2(slope[1], slope[0])
         return poses
 

@@ -1,5 +1,7 @@
 """Loops over the samples of a candidate's curve."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rover_physics.numerics.kernels import exact_kernel
@@ -41,13 +43,28 @@ def turns_within(slopes, speeds, min_radius):
     return True
 
 
-@exact_kernel
-def follow_curve(t, start, chord, m0, m1, left, offset, poses, slopes):
-    """Write places [m] into poses (n, 3) and first derivatives (2, n) at parameters t (n,).
+class BumpedCurve(NamedTuple):
+    """The Hermite cubic between two places, and beside it a cosine bump; vectors (2,) in [m]."""
 
-    The curve is the Hermite cubic from `start` along `chord` with end tangents m0 and m1 [m] and
-    beside it, in the direction of `left`, a cosine bump that is `offset` [m] high; vectors (2,).
-    """
+    start: np.ndarray
+    """Where it begins."""
+    chord: np.ndarray
+    """From there to its end."""
+    m0: np.ndarray
+    """Tangent at the start."""
+    m1: np.ndarray
+    """Tangent at the end."""
+    left: np.ndarray
+    """Unit vector across the chord, to the left."""
+    offset: float
+    """Height of the bump to the left [m]."""
+
+
+@exact_kernel
+def follow_curve(t, curve, poses, slopes):
+    """Write places [m] into poses (n, 3) and first derivatives (2, n) at parameters t (n,)."""
+    start, chord, m0, m1 = curve.start, curve.chord, curve.m0, curve.m1
+    left, offset = curve.left, curve.offset
     for k in range(t.size):
         u, rest = t[k], 1 - t[k]
         sine, cosine = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)

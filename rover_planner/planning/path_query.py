@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_paths
@@ -42,14 +42,16 @@ class PathQueryOptions:
     map_sigmas: float = SIGMAS
     """Standard deviations of an uncertain map to allow for; 0 takes its heights as exact."""
 
-    def ground_and_load(self) -> dict[str, Any]:
-        """Return the arguments of `sweep_path` that these options set, but for the policy."""
-        return {
-            "friction": self.friction,
-            "max_torque": self.max_torque,
-            "soil": self.soil,
-            "payload": self.payload,
-        }
+    def sweep_options(self, joint_angles: Mapping[str, float] | None = None) -> SweepOptions:
+        """Return what of these options the model is asked with; angles [rad] are the arm's."""
+        return SweepOptions(
+            policy=self.policy,
+            friction=self.friction,
+            max_torque=self.max_torque,
+            soil=self.soil,
+            payload=self.payload,
+            joint_angles=joint_angles,
+        )
 
 
 @dataclass(frozen=True)
@@ -175,15 +177,8 @@ def _check_paths(
     options: PathQueryOptions,
     joint_angles: Mapping[str, float] | None,
 ) -> list[Candidate]:
-    judged = judge_paths(
-        rover,
-        terrain,
-        paths,
-        policy=options.policy,
-        joint_angles=joint_angles,
-        sigmas=options.map_sigmas,
-        **options.ground_and_load(),
-    )
+    asked = options.sweep_options(joint_angles)
+    judged = judge_paths(rover, terrain, paths, asked, sigmas=options.map_sigmas)
     return [
         Candidate(prediction.poses, prediction, verdict, path_cost(rover, prediction, verdict))
         for prediction, verdict in judged

@@ -76,10 +76,9 @@ class ReachQuery:
             service.terrain,
             service.path[-1],
             self._target,
-            tool_force=self._force,
-            tool_moment=self._moment,
-            policy=settings.query.policy,
-            **settings.query.ground_and_load(),
+            settings.query.sweep_options(),
+            force=self._force,
+            moment=self._moment,
         ).to_dict()
 
 

@@ -273,15 +273,15 @@ class TraverseService:
     ) -> Judgement:
         """Make a judgement of a judged path, with all that describing it later takes."""
         assert self._terrain is not None
+        query = self._settings.query
         classify = partial(
             classify_judged,
             self._settings.rover,
             self._terrain,
             candidate.prediction,
             candidate.verdict,
-            joint_angles=self._manipulator_angles(),
-            sigmas=self._settings.query.map_sigmas,
-            **self._settings.query.ground_and_load(),
+            query.sweep_options(self._manipulator_angles()),
+            sigmas=query.map_sigmas,
         )
         verdict = candidate.verdict
         suspension = self._compare_suspension(candidate)  # with the joints as they are now

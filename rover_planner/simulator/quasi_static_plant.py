@@ -15,6 +15,7 @@ from rover_physics.forces.soil import coulomb_slip
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceWriter
@@ -159,9 +160,11 @@ class QuasiStaticPlant:
         """Ask the model; about a rover that is pulled, what the best of torques could do."""
         policy = "optimal" if pulled else self._policy
         return sweep_path(
-            self._rover, self._terrain, poses,
-            friction=self._friction, policy=policy, soil=self._soil,
-        )  # fmt: skip
+            self._rover,
+            self._terrain,
+            poses,
+            SweepOptions(friction=self._friction, policy=policy, soil=self._soil),
+        )
 
     def _why_not(self, prediction: PathPrediction, pulled: bool = False) -> str:
         """Return why the way to the last of some poses is not open, empty where it is.

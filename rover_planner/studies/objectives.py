@@ -6,8 +6,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.model_setup import pack_model
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge_path import judge_path
@@ -72,9 +73,11 @@ def _score_drive(study: Study, rover: Rover, k: int) -> Score:
     )
     ground = _ground(rover, drive)
     prediction, verdict = judge_path(
-        _lift_limit(study, rover), ground, poses,
-        friction=study.friction, policy=study.policy, soil=study.soil,
-    )  # fmt: skip
+        _lift_limit(study, rover),
+        ground,
+        poses,
+        SweepOptions(friction=study.friction, policy=study.policy, soil=study.soil),
+    )
     if not verdict.traversable:
         return Score(float("nan"), f"{where}: {verdict.reason}")
     if study.objective == "worst_utilisation":
@@ -82,7 +85,7 @@ def _score_drive(study: Study, rover: Rover, k: int) -> Score:
     if study.objective == "drive_energy":
         return Score(float(prediction.energy[-1] / prediction.distance[-1]), where)
     # The verdict's ratio is to the same rover on flat ground, so it does not compare rovers.
-    flat_angle = float(set_up(rover, ground).settings.flat_angle)
+    flat_angle = float(pack_model(rover, ground).settings.flat_angle)
     return Score(verdict.min_tip_over_ratio * flat_angle, where)
 
 
@@ -166,6 +169,6 @@ def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | 
     x = np.linspace(-reach, reach, round(2.0 * reach / SPACING) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
     prediction = sweep_path(
-        able, step_ground(rover, height), poses, policy=policy, friction=friction
+        able, step_ground(rover, height), poses, SweepOptions(policy=policy, friction=friction)
     )
     return judge(able, prediction).reason

@@ -81,8 +81,8 @@ def test_the_answer_is_that_of_the_model_at_the_end_of_the_path(level, tool):
         level.service.terrain,
         PATH[-1],
         TARGET,
-        tool_force=(3.0, 0.0, 5.0),
-        tool_moment=(0.0, 0.5, 0.0),
+        force=(3.0, 0.0, 5.0),
+        moment=(0.0, 0.5, 0.0),
     ).to_dict()
     assert success and answer == json.loads(json.dumps(expected))
 

@@ -13,6 +13,7 @@ from msg_adapters.imu import imu_to_attitude
 from rover_physics.errors import SoilError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.nodes.mission_planner import MissionPlanner
@@ -115,7 +116,10 @@ def test_soil_and_policy_are_those_of_the_model_that_moves_it(ros, terrain_file)
     given = {"soil": "dry_sand", "policy": "optimal"}
     plant = start_simulator(ros, terrain_file, **given).simulation.plant
     model = sweep_path(
-        load_rover("lsr1"), load_terrain(terrain_file), np.array([[START_X, 0.0, 0.0]]), **given
+        load_rover("lsr1"),
+        load_terrain(terrain_file),
+        np.array([[START_X, 0.0, 0.0]]),
+        SweepOptions(**given),
     )
     plant.drive(0.08, 0.0, 1e-9)
     assert (model.motion_resistance > 0.0).all()

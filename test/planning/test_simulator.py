@@ -5,6 +5,7 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter
 from rover_planner.errors import PlanningError
@@ -190,14 +191,16 @@ def test_torques_shared_well_carry_the_rover_where_equal_ones_would_slip():
     way = np.linspace(-0.6, 0.2, 81)
     poses = np.column_stack([way, np.zeros_like(way), np.zeros_like(way)])
     needed = {
-        policy: sweep_path(LSR1, ground, poses, friction=0.4, policy=policy)
+        policy: sweep_path(LSR1, ground, poses, SweepOptions(friction=0.4, policy=policy))
         for policy in ("equal", "optimal")
     }
     assert np.nanmax(needed["equal"].friction_utilisation) > 1.05
     assert np.nanmax(needed["optimal"].friction_utilisation) < 1.0
     plant = QuasiStaticPlant(LSR1, ground, (-0.5, 0.0, 0.0), friction=0.4)
     for _ in range(round(12.0 / STEP)):
-        here = sweep_path(LSR1, ground, plant.pose()[None], friction=0.4, policy="optimal")
+        here = sweep_path(
+            LSR1, ground, plant.pose()[None], SweepOptions(friction=0.4, policy="optimal")
+        )
         push = 6.0 * (0.08 - plant.state().velocity[0]) * LSR1.total_mass
         plant.pull(here.torque[0] + push * LSR1.wheel.radius / 6.0, 0.0, STEP)
     assert plant.pose()[0] > 0.1
@@ -215,7 +218,7 @@ def test_a_rover_whose_wheels_spin_says_so():
 
 def test_driving_forces_are_those_of_the_model_where_the_torques_are():
     ground = wavy()
-    here = sweep_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), policy="optimal")
+    here = sweep_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), SweepOptions(policy="optimal"))
     forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, here.torque[0], 0.0)
     assert forces.push == pytest.approx(0.0, abs=0.01)
     assert forces.loads == pytest.approx(here.wheel_loads[0], abs=0.05)

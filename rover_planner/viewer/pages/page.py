@@ -133,7 +133,7 @@ class Page(PageBase):
         session, tab = self.session, self.ground_tab
         heading = float(np.radians(tab.heading))
         ground = draw_ground(
-            session.rover, session.terrain, tab.layer, heading, session.model_arguments()
+            session.rover, session.terrain, tab.layer, heading, session.sweep_options()
         )
         self.scene.draw_ground(ground)
         tab.show_scale(ground)

@@ -2,7 +2,6 @@
 
 import json
 import struct
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.scene.colours import ramp
@@ -50,7 +50,7 @@ def draw_ground(
     terrain: Terrain,
     layer_name: str,
     heading: float = 0.0,
-    arguments: Mapping[str, Any] | None = None,
+    options: SweepOptions = DEFAULT_OPTIONS,
 ) -> Ground:
     """Return the ground in the colours of a layer; unknown cells are left out.
 
@@ -59,17 +59,17 @@ def draw_ground(
         terrain: The ground.
         layer_name: One of LAYERS.
         heading: Of the rover, where layers are predicted [rad].
-        arguments: Further arguments of `sweep_path` for those.
+        options: What the model is asked with for those.
 
     Raises:
-        RoverError: The model refuses an argument.
+        RoverError: The model refuses an option.
     """
     layer = LAYERS[layer_name]
     x, y, heights = _thin_out(terrain, MAX_CELLS)
     if layer.score is not None:
         coarse_x, coarse_y, _ = _thin_out(terrain, MAX_SCORED)
         at = (coarse_x, coarse_y)
-        values = predict_layer(layer, rover, terrain, heading, at, arguments or {})
+        values = predict_layer(layer, rover, terrain, heading, at, options)
         low, high = span_of(layer, rover, values)
         colours = _stretch(ramp(values, low, high), at, (x, y))
     else:

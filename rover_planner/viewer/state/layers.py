@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.prediction.map_sweep import PoseScores, score_poses
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 
 Floats = NDArray[np.float64]
@@ -82,7 +83,7 @@ def predict_layer(
     terrain: Any,
     heading: float,
     at: tuple[Floats, Floats],
-    arguments: Mapping[str, Any],
+    options: SweepOptions,
 ) -> Floats:
     """Return a predicted layer (ny, nx) with the rover over each place at a heading [rad].
 
@@ -92,15 +93,15 @@ def predict_layer(
         terrain: The ground.
         heading: Of the body [rad].
         at: x (nx,) and y (ny,) of the places [m].
-        arguments: Further arguments of `sweep_path`.
+        options: What the model is asked with.
 
     Raises:
-        RoverError: The model refuses an argument.
+        RoverError: The model refuses an option.
     """
     assert layer.score is not None
     x, y = np.meshgrid(*at)
     poses = np.stack([x, y, np.full_like(x, heading)], axis=-1)
-    return np.asarray(layer.score(rover, score_poses(rover, terrain, poses, **arguments)))
+    return np.asarray(layer.score(rover, score_poses(rover, terrain, poses, options)))
 
 
 def span_of(layer: Layer, rover: Rover, values: Floats) -> tuple[float, float]:

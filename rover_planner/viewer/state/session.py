@@ -4,13 +4,13 @@ import dataclasses
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import RoverError
 from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict, judge
@@ -97,14 +97,9 @@ class ViewSession:
         journey = Journey(self.rover, candidate.prediction, candidate.verdict)
         self.shown = Shown(candidate, journey, judged)
 
-    def model_arguments(self) -> dict[str, Any]:
-        """Return the arguments of `sweep_path` that hold now."""
-        options = self.options
-        return {
-            **options.ground_and_load(),
-            "policy": options.policy,
-            "joint_angles": self.arm_angles,
-        }
+    def sweep_options(self) -> SweepOptions:
+        """Return what the model is asked with now."""
+        return self.options.sweep_options(self.arm_angles)
 
     def show_candidate(self, index: int) -> None:
         """Show another candidate of the last answer, by its index."""

@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
-from rover_physics.bounds.pose import BOUNDED, OFF_MAP_NEAR, ON_EDGE, UNKNOWN_NEAR
 from rover_physics.errors import ModelError, TerrainError
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import BoundStatus
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_physics.traversability.bounded_verdict import judge_bounds
 from rover_physics.traversability.judge_path import judge_path
@@ -31,8 +32,10 @@ PATH = path_across(4)
 
 
 def bounds_on(rover, terrain, poses=PATH, sigmas=3.0, **arguments):
-    prediction = sweep_path(rover, terrain, poses, **arguments)
-    return prediction, bound_path(rover, terrain, prediction, sigmas, **arguments)
+    prediction = sweep_path(rover, terrain, poses, SweepOptions(**arguments))
+    return prediction, bound_path(
+        rover, terrain, prediction, SweepOptions(**arguments), sigmas=sigmas
+    )
 
 
 @pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
@@ -135,9 +138,11 @@ def test_only_errors_under_the_rover_matter():
 def test_the_verdict_is_never_less_cautious(seed, std, sigmas, rough, policy):
     ground = rocky(seed % 5) if rough else fractal(seed % 5, roughness=0.1)
     poses = path_across(seed, 10)
-    nominal = judge_path(LSR1, ground, poses, policy=policy)[1]
+    nominal = judge_path(LSR1, ground, poses, SweepOptions(policy=policy))[1]
     uncertain = with_std(ground, std)
-    prediction, cautious = judge_path(LSR1, uncertain, poses, sigmas=sigmas, policy=policy)
+    prediction, cautious = judge_path(
+        LSR1, uncertain, poses, SweepOptions(policy=policy), sigmas=sigmas
+    )
     assert prediction.bounds is not None
     for i, (code, reason) in enumerate(zip(nominal.codes, nominal.reasons, strict=True)):
         if code:
@@ -153,13 +158,13 @@ def test_the_verdict_is_never_less_cautious(seed, std, sigmas, rough, policy):
 
 def test_a_limit_that_may_be_broken_is_refused_and_says_so():
     terrain = with_std(plane(0.0, 0.0, half=3.0), 0.004)
-    slippery = judge_path(LSR1, terrain, PATH, friction=0.3)[1]
+    slippery = judge_path(LSR1, terrain, PATH, SweepOptions(friction=0.3))[1]
     assert not slippery.traversable
     assert slippery.code == "friction"
     assert "slips: friction utilisation" in slippery.reason
     assert slippery.reason.endswith("limit 1.00, at worst within 3 sigma of the map")
     assert slippery.friction_utilisation_bound > 1.0 > slippery.max_friction_utilisation
-    assert judge_path(LSR1, terrain, PATH, friction=0.3, sigmas=0.5)[1].traversable
+    assert judge_path(LSR1, terrain, PATH, SweepOptions(friction=0.3), sigmas=0.5)[1].traversable
 
 
 @pytest.mark.parametrize(
@@ -204,7 +209,7 @@ def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
     x = np.arange(-1.2, 0.0, 0.02)
     poses = np.column_stack([x, 0.0 * x + 0.05, 0.0 * x + 0.03])
     prediction, bounds = bounds_on(M2020, ground, poses)
-    edges = bounds.status == ON_EDGE
+    edges = bounds.status == BoundStatus.ON_EDGE
     assert 0 < edges.sum() < 0.2 * len(x)
     assert np.all(np.isnan(bounds.roll[edges]))
     verdict = judge_bounds(M2020, prediction, bounds, judge(M2020, prediction))
@@ -214,7 +219,7 @@ def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
 
 @pytest.mark.parametrize(
     ("last", "status", "code"),
-    [(49, UNKNOWN_NEAR, "unknown_ground"), (60, OFF_MAP_NEAR, "off_map")],
+    [(49, BoundStatus.UNKNOWN_NEAR, "unknown_ground"), (60, BoundStatus.OFF_MAP_NEAR, "off_map")],
 )
 def test_unknown_ground_and_the_end_of_the_map_within_reach_are_told_apart(last, status, code):
     """A wheel that stands just clear of them may be turned over them by errors of 5 cm."""
@@ -226,7 +231,7 @@ def test_unknown_ground_and_the_end_of_the_map_within_reach_are_told_apart(last,
     poses = np.array([[edge - 0.501, 0.0, 0.0], [edge - 0.7, 0.0, 0.0]])
     prediction, bounds = bounds_on(LSR1, ground, poses)
     assert prediction.settled.all()
-    assert bounds.status.tolist() == [status, BOUNDED]
+    assert bounds.status.tolist() == [status, BoundStatus.BOUNDED]
     verdict = judge_path(LSR1, ground, poses)[1]
     assert verdict.codes[0] == code
     assert verdict.reasons[0].endswith("within 3 sigma of the map")
@@ -282,7 +287,7 @@ def test_soil_and_its_sinkage_are_bounded(policy):
         rng = np.random.default_rng(seed)
         error = 0.001 * rng.standard_normal(terrain.elevation.shape)
         sample = replace(terrain, elevation=terrain.elevation + error)
-        swept = sweep_path(LSR1, sample, PATH, soil="dry_sand", policy=policy)
+        swept = sweep_path(LSR1, sample, PATH, SweepOptions(soil="dry_sand", policy=policy))
         assert np.all(swept.friction_utilisation <= bounds.friction_utilisation[..., 1])
         assert np.all(swept.torque_saturation <= outcome_limit)
 

@@ -7,8 +7,9 @@ import pytest
 
 from rover_physics.contact.wheel_samples import sample_wheel
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import NOT_SETTLED, SETTLED, sweep_path
+from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import judge
 from support.rough_grounds import bouldered, fractal, random_poses
@@ -45,8 +46,8 @@ def brute_force_gaps() -> np.ndarray:
 def test_of_20000_poses_999_in_1000_settle_and_the_others_say_that_they_do_not():
     statuses = np.concatenate([prediction.status for _, prediction in predictions()])
     assert statuses.size == 20_000
-    assert set(statuses.tolist()) <= {SETTLED, NOT_SETTLED}
-    assert (statuses == SETTLED).mean() >= 0.999
+    assert set(statuses.tolist()) <= {PoseStatus.SETTLED, PoseStatus.NOT_SETTLED}
+    assert (statuses == PoseStatus.SETTLED).mean() >= 0.999
 
 
 def test_a_pose_that_does_not_settle_is_refused_as_such():

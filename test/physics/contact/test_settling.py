@@ -6,14 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.contact.wheel_samples import sample_wheel
-from rover_physics.prediction.sweep import (
-    NOT_SETTLED,
-    OFF_MAP,
-    SETTLED,
-    UNKNOWN_GROUND,
-    sweep_path,
-)
+from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from support.reference_cases import reference_grounds, reference_predictions
 from support.rough_grounds import fractal, mirrored, plane, quarter_turn, random_poses, smooth
@@ -221,19 +216,23 @@ def known_to_the_left_of(x_edge: float) -> Terrain:
 
 def test_a_wheel_over_unknown_ground_is_told():
     prediction = sweep_path(LSR1, known_to_the_left_of(0.6), [[0.0, 0, 0], [0.3, 0, 0]])
-    assert prediction.status.tolist() == [SETTLED, UNKNOWN_GROUND]
+    assert prediction.status.tolist() == [PoseStatus.SETTLED, PoseStatus.UNKNOWN_GROUND]
     assert prediction.settled.tolist() == [True, False]
 
 
 def test_a_wheel_off_the_map_is_told():
     prediction = sweep_path(LSR1, plane(0.0, 0.0), [[0.0, 0, 0], [0.9, 0, 0], [40.0, 0, 0]])
-    assert prediction.status.tolist() == [SETTLED, OFF_MAP, OFF_MAP]
+    assert prediction.status.tolist() == [
+        PoseStatus.SETTLED,
+        PoseStatus.OFF_MAP,
+        PoseStatus.OFF_MAP,
+    ]
 
 
 def test_off_the_map_comes_before_unknown_ground():
     ground = known_to_the_left_of(1.0)
     prediction = sweep_path(LSR1, ground, [[0.95, 0.0, 0.0]])
-    assert prediction.status.tolist() == [OFF_MAP]
+    assert prediction.status.tolist() == [PoseStatus.OFF_MAP]
 
 
 def test_the_map_may_be_used_up_to_its_last_cell():
@@ -241,7 +240,7 @@ def test_the_map_may_be_used_up_to_its_last_cell():
     on_the_edge = sweep_path(
         LSR1, plane(0.0, 0.0), [[reach - 0.001, 0.0, 0.0], [reach + 0.001, 0.0, 0.0]]
     )
-    assert on_the_edge.status.tolist() == [SETTLED, OFF_MAP]
+    assert on_the_edge.status.tolist() == [PoseStatus.SETTLED, PoseStatus.OFF_MAP]
 
 
 def test_a_wall_across_the_rover_is_never_settled_by_a_guess():
@@ -253,13 +252,13 @@ def test_a_wall_across_the_rover_is_never_settled_by_a_guess():
     for i in np.flatnonzero(prediction.settled):
         gaps = wheel_gaps(LSR1, ground, prediction, i, circles_of_the_model(ground))
         assert np.abs(gaps).max() <= 5e-3
-    assert (prediction.status == NOT_SETTLED).any()
+    assert (prediction.status == PoseStatus.NOT_SETTLED).any()
 
 
 def test_a_rover_never_settles_turned_over():
     ground = fractal(3, roughness=0.5)
     prediction = sweep_path(LSR1, ground, random_poses(3, 600, 1.9))
-    assert (prediction.status == NOT_SETTLED).any()
+    assert (prediction.status == PoseStatus.NOT_SETTLED).any()
     turned = np.maximum(np.abs(prediction.roll), np.abs(prediction.pitch))
     assert np.nanmax(turned) < 0.5 * np.pi
 

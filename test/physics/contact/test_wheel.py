@@ -6,20 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rover_physics.contact.contact_record import (
-    EXACT,
-    FULL,
-    IN_CONTACT,
-    OFF_MAP,
-    QUICK,
-    UNKNOWN_GROUND,
-    new_contacts,
-)
+from rover_physics.contact.contact_record import EXACT, FULL, QUICK, new_contacts
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.contact.wheel_samples import sample_wheel
 from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import ContactStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky, smooth
@@ -81,7 +74,7 @@ def dense_gap(ground, centre, roll, pitch, yaw, laterals) -> float:
 @pytest.mark.parametrize("height", [0.05, 0.10, 0.30])
 def test_over_level_ground_the_gap_is_the_height_less_the_radius(scope, height):
     wheel = WheelOn(plane(0.0, 0.0, height=0.4), [0.013, -0.007, 0.4 + height], scope)
-    assert wheel.status == IN_CONTACT
+    assert wheel.status == ContactStatus.IN_CONTACT
     assert wheel.gap == pytest.approx(height - RADIUS, abs=1e-12)
     assert wheel.angle == pytest.approx(0.0, abs=1e-6)
 
@@ -199,10 +192,15 @@ def test_unknown_ground_and_the_map_edge_are_told_apart(scope):
     heights[:, heights.shape[1] // 2 + 10] = np.nan
     holed = Terrain(heights, ground.resolution, ground.origin)
     edge = ground.bounds[1]
-    assert WheelOn(holed, [0.0, 0.0, 0.1], scope).status == IN_CONTACT
-    assert WheelOn(holed, [10 * RESOLUTION - 0.12, 0.0, 0.1], scope).status == UNKNOWN_GROUND
-    assert WheelOn(holed, [10 * RESOLUTION, 0.0, 0.1], scope).status == UNKNOWN_GROUND
-    assert WheelOn(ground, [edge - 0.09, 0.0, 0.1], scope).status == OFF_MAP
+    assert WheelOn(holed, [0.0, 0.0, 0.1], scope).status == ContactStatus.IN_CONTACT
+    assert (
+        WheelOn(holed, [10 * RESOLUTION - 0.12, 0.0, 0.1], scope).status
+        == ContactStatus.UNKNOWN_GROUND
+    )
+    assert (
+        WheelOn(holed, [10 * RESOLUTION, 0.0, 0.1], scope).status == ContactStatus.UNKNOWN_GROUND
+    )
+    assert WheelOn(ground, [edge - 0.09, 0.0, 0.1], scope).status == ContactStatus.OFF_MAP
     assert np.isnan(WheelOn(ground, [edge + 5.0, 0.0, 0.1], scope).gap)
 
 

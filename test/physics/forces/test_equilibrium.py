@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from rover_physics.forces.equilibrium import balance_forces
 from rover_physics.prediction.evaluation import new_work
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.model import Part, Rover
 from rover_physics.rover.rover_file import load_rover
@@ -82,7 +83,7 @@ def test_on_level_ground_the_loads_sum_to_the_weight(yaw, gravity, com_x, com_y)
 )
 def test_all_nine_balance_equations_hold_on_rough_ground(rover, make, policy):
     poses = scaled_poses(rover, random_poses(5, 40, 0.5))
-    prediction = sweep_path(rover, scaled_for(rover, make(7)), poses, policy=policy)
+    prediction = sweep_path(rover, scaled_for(rover, make(7)), poses, SweepOptions(policy=policy))
     assert prediction.settled.mean() >= 0.95
     residuals = [
         balance_residuals(rover, prediction, i) for i in np.flatnonzero(prediction.settled)
@@ -146,8 +147,8 @@ def test_torque_is_traction_times_radius_and_saturation_its_share_of_the_largest
 
 def test_half_the_largest_torque_saturates_twice_as_much():
     case = reference_grounds()[5]
-    full = sweep_path(LSR1, case.terrain, case.poses, max_torque=2.0)
-    half = sweep_path(LSR1, case.terrain, case.poses, max_torque=1.0)
+    full = sweep_path(LSR1, case.terrain, case.poses, SweepOptions(max_torque=2.0))
+    half = sweep_path(LSR1, case.terrain, case.poses, SweepOptions(max_torque=1.0))
     assert full.torque_saturation.max() > 0.0
     assert half.torque_saturation == pytest.approx(2.0 * full.torque_saturation)
 
@@ -165,16 +166,16 @@ def test_friction_utilisation_is_the_share_of_coulomb_friction():
 @given(st.floats(0.05, 2.0), st.floats(-0.3, 0.3))
 def test_twice_the_friction_is_used_half_as_much_under_the_same_loads(mu, slope):
     ground, pose = plane(slope, 0.1), [[0.0, 0.0, 0.3]]
-    once = sweep_path(LSR1, ground, pose, friction=mu)
-    twice = sweep_path(LSR1, ground, pose, friction=2.0 * mu)
+    once = sweep_path(LSR1, ground, pose, SweepOptions(friction=mu))
+    twice = sweep_path(LSR1, ground, pose, SweepOptions(friction=2.0 * mu))
     assert twice.friction_utilisation == pytest.approx(0.5 * once.friction_utilisation)
     assert twice.wheel_loads.tolist() == once.wheel_loads.tolist()
 
 
 def test_a_wheel_that_needs_more_than_its_friction_spins():
     slope = np.tan(0.35)
-    grip = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, 0.0]], friction=1.0)
-    slide = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, 0.0]], friction=0.1)
+    grip = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, 0.0]], SweepOptions(friction=1.0))
+    slide = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, 0.0]], SweepOptions(friction=0.1))
     assert (grip.friction_utilisation < 1.0).all()
     assert (grip.slip_ratio < 1.0).all()
     assert (slide.friction_utilisation > 1.0).all()

@@ -15,6 +15,7 @@ import pytest
 
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Part, Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -49,7 +50,7 @@ ALONG_WAVES = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros(41), np.zero
 @lru_cache(maxsize=4)
 def on_rough_ground(policy: str) -> list[tuple[PathPrediction, int]]:
     predictions = [
-        sweep_path(LSR1, make(11), random_poses(2, 30, 0.5), policy=policy)
+        sweep_path(LSR1, make(11), random_poses(2, 30, 0.5), SweepOptions(policy=policy))
         for make in (smooth, fractal, rocky)
     ]
     return [(p, i) for p in predictions for i in np.flatnonzero(p.settled)]
@@ -261,7 +262,7 @@ def test_eqs_8_to_15_hold_in_3d_with_all_weights(rover, policy):
         origin=(size * ground.origin[0], size * ground.origin[1]),
     )
     poses = random_poses(2, 30, 0.5) * [size, size, 1.0]
-    prediction = sweep_path(rover, ground, poses, policy=policy)
+    prediction = sweep_path(rover, ground, poses, SweepOptions(policy=policy))
     base = rover.suspension.wheels["front"][0] - rover.suspension.wheels["rear"][0]
     body = rover.masses.body
     for i in np.flatnonzero(prediction.settled):

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.verdict import judge
 from support.best_torques import least_utilisation
@@ -20,7 +21,9 @@ few = settings(max_examples=20, deadline=None)
 @pytest.mark.parametrize("make", [smooth, fractal, rocky])
 def test_no_torques_within_the_limit_need_less_friction(make, max_torque):
     ground, poses = make(6), random_poses(6, 8, 0.6)
-    prediction = sweep_path(LSR1, ground, poses, policy="optimal", max_torque=max_torque)
+    prediction = sweep_path(
+        LSR1, ground, poses, SweepOptions(policy="optimal", max_torque=max_torque)
+    )
     compared = 0
     for i in np.flatnonzero(prediction.settled):
         bound = least_utilisation(LSR1, prediction, i, max_torque)
@@ -35,7 +38,7 @@ def test_no_torques_within_the_limit_need_less_friction(make, max_torque):
 
 def test_on_the_steps_of_the_reference_no_torques_need_less_friction():
     case = reference_ground("settled_a/step")
-    prediction = sweep_path(LSR1, case.terrain, case.poses, policy="optimal")
+    prediction = sweep_path(LSR1, case.terrain, case.poses, SweepOptions(policy="optimal"))
     for i in range(len(case.poses)):
         bound = least_utilisation(LSR1, prediction, i, LSR1.wheel.max_torque)
         used = prediction.friction_utilisation[i].max()
@@ -46,7 +49,7 @@ def test_on_the_steps_of_the_reference_no_torques_need_less_friction():
 @given(st.floats(0.05, 0.5), st.floats(-np.pi, np.pi))
 def test_on_a_plane_the_least_friction_is_at_least_the_slope(slope, yaw):
     ground, pose = plane(slope, 0.0), [[0.0, 0.0, yaw]]
-    optimal = sweep_path(LSR1, ground, pose, policy="optimal", friction=1.0)
+    optimal = sweep_path(LSR1, ground, pose, SweepOptions(policy="optimal", friction=1.0))
     assert optimal.friction_utilisation[0].max() >= slope * (1.0 - 1e-3)
 
 
@@ -54,21 +57,26 @@ def test_on_a_plane_the_least_friction_is_at_least_the_slope(slope, yaw):
 @pytest.mark.parametrize("slope", [0.1, 0.3, 0.5])
 def test_straight_up_or_down_a_plane_the_least_friction_is_the_slope(slope, yaw):
     optimal = sweep_path(
-        LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], policy="optimal", friction=1.0
+        LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], SweepOptions(policy="optimal", friction=1.0)
     )
     assert optimal.friction_utilisation[0] == pytest.approx(np.full(6, slope), rel=2e-3)
 
 
 def test_traction_control_passes_a_slope_that_equal_torques_do_not():
     ground, pose = plane(0.45, 0.0), [[0.0, 0.0, 0.0]]
-    assert judge(LSR1, sweep_path(LSR1, ground, pose, policy="equal")).code == "friction"
-    assert judge(LSR1, sweep_path(LSR1, ground, pose, policy="optimal")).traversable
+    assert (
+        judge(LSR1, sweep_path(LSR1, ground, pose, SweepOptions(policy="equal"))).code
+        == "friction"
+    )
+    assert judge(LSR1, sweep_path(LSR1, ground, pose, SweepOptions(policy="optimal"))).traversable
 
 
 def test_neither_policy_passes_a_slope_steeper_than_friction():
     ground, pose = plane(0.45, 0.0), [[0.0, 0.0, 0.0]]
     for policy in ("equal", "optimal"):
-        verdict = judge(LSR1, sweep_path(LSR1, ground, pose, policy=policy, friction=0.4))
+        verdict = judge(
+            LSR1, sweep_path(LSR1, ground, pose, SweepOptions(policy=policy, friction=0.4))
+        )
         assert verdict.code == "friction", policy
 
 
@@ -76,15 +84,17 @@ def test_too_weak_motors_are_told_as_such_under_both_policies():
     ground, pose = plane(0.45, 0.0), [[0.0, 0.0, 0.0]]
     for policy in ("equal", "optimal"):
         arguments = {"policy": policy, "friction": 5.0, "max_torque": 0.3}
-        assert judge(LSR1, sweep_path(LSR1, ground, pose, **arguments)).code == "torque", policy
+        assert (
+            judge(LSR1, sweep_path(LSR1, ground, pose, SweepOptions(**arguments))).code == "torque"
+        ), policy
 
 
 @few
 @given(st.integers(0, 19))
 def test_optimal_torques_never_use_more_friction_than_equal_ones(seed):
     ground, poses = rocky(seed), random_poses(seed, 20, 1.8)
-    equal = sweep_path(LSR1, ground, poses, policy="equal")
-    optimal = sweep_path(LSR1, ground, poses, policy="optimal")
+    equal = sweep_path(LSR1, ground, poses, SweepOptions(policy="equal"))
+    optimal = sweep_path(LSR1, ground, poses, SweepOptions(policy="optimal"))
     within = (equal.torque_saturation.max(axis=1) <= 1.0) & (equal.wheel_loads.min(axis=1) > 0.0)
     most, least = (p.friction_utilisation.max(axis=1)[within] for p in (equal, optimal))
     assert within.any()
@@ -93,8 +103,8 @@ def test_optimal_torques_never_use_more_friction_than_equal_ones(seed):
 
 def test_the_policy_changes_nothing_about_where_the_rover_is():
     ground, poses = rocky(4), random_poses(4, 30, 1.8)
-    equal = sweep_path(LSR1, ground, poses, policy="equal")
-    optimal = sweep_path(LSR1, ground, poses, policy="optimal")
+    equal = sweep_path(LSR1, ground, poses, SweepOptions(policy="equal"))
+    optimal = sweep_path(LSR1, ground, poses, SweepOptions(policy="optimal"))
     for name in ("status", "position", "roll", "pitch", "wheel_centres", "tip_over_ratio"):
         assert getattr(equal, name).tobytes() == getattr(optimal, name).tobytes(), name
     assert not np.array_equal(equal.torque, optimal.torque)

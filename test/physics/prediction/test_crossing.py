@@ -7,6 +7,7 @@ import pytest
 
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict, judge
@@ -32,7 +33,7 @@ def sharp(kind: str, size: float, resolution: float = 0.005) -> Terrain:
 
 
 def drive(ground: Terrain, spacing: float = 0.01, **options) -> tuple[PathPrediction, Verdict]:
-    prediction = sweep_path(FREE, ground, drive_path(spacing), **options)
+    prediction = sweep_path(FREE, ground, drive_path(spacing), SweepOptions(**options))
     return prediction, judge(FREE, prediction)
 
 
@@ -231,7 +232,9 @@ def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_w
     needed = []
     for shift in (0.0, 0.0034, 0.0068, 0.0071, 0.0142):
         poses = drive_path(0.02) + np.array([shift, 0.0, 0.0])
-        prediction = sweep_path(FREE, sharp("step", height), poses, policy="optimal", friction=0.5)
+        prediction = sweep_path(
+            FREE, sharp("step", height), poses, SweepOptions(policy="optimal", friction=0.5)
+        )
         between = prediction.between
         front = (between.poses[:, 0] < -0.3) & (between.contact_angle[:, 2] > 0.0)
         needed.append(between.friction_utilisation[front].max())

@@ -7,6 +7,7 @@ import pytest
 
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -30,7 +31,7 @@ def edge_down(height: float) -> Terrain:
 def drive(
     ground: Terrain, rover: Rover = FREE, spacing: float = 0.01, **options
 ) -> tuple[PathPrediction, Verdict]:
-    prediction = sweep_path(rover, ground, drive_path(spacing), **options)
+    prediction = sweep_path(rover, ground, drive_path(spacing), SweepOptions(**options))
     return prediction, judge(rover, prediction)
 
 

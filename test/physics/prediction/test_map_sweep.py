@@ -7,6 +7,7 @@ import rover_physics.prediction.map_sweep as map_sweep
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.prediction.map_sweep import score_poses, sweep_map
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.limit_checks import tilt_of
@@ -28,8 +29,8 @@ def poses_on(terrain: Terrain, shape) -> np.ndarray:
 def test_scores_are_those_of_a_sweep_on_one_thread_and_on_several(ground, shape):
     terrain = make_terrain(ground)
     poses = poses_on(terrain, shape)
-    scores = score_poses(ROVER, terrain, poses, friction=0.5)
-    path = sweep_path(ROVER, terrain, poses.reshape(-1, 3), friction=0.5)
+    scores = score_poses(ROVER, terrain, poses, SweepOptions(friction=0.5))
+    path = sweep_path(ROVER, terrain, poses.reshape(-1, 3), SweepOptions(friction=0.5))
     expected = {
         "status": path.status,
         "friction_utilisation": path.friction_utilisation.max(axis=1),
@@ -73,4 +74,4 @@ def test_bad_input_is_refused():
         with pytest.raises(PoseError):
             score_poses(ROVER, terrain, poses)
     with pytest.raises(ModelError):
-        next(sweep_map(ROVER, terrain, friction=-1.0))
+        next(sweep_map(ROVER, terrain, options=SweepOptions(friction=-1.0)))

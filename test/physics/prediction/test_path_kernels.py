@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from rover_physics.contact.settling import NOT_SETTLED, OFF_MAP, SETTLED
 from rover_physics.prediction.evaluation import new_results
 from rover_physics.prediction.path_kernels import add_up, divide_stretches, find_jumps, sort_pieces
+from rover_physics.status import PoseStatus
 
 HEIGHT_JUMP, MIN_SPACING = 0.025, 1e-4
 
 
-def results_with(contact_angles, statuses=SETTLED, heights=0.0):
+def results_with(contact_angles, statuses=PoseStatus.SETTLED, heights=0.0):
     """Return results of which the front right wheel has these contact angles and heights."""
     results = new_results(len(contact_angles))
     results["contact_angle"] = results["wheel_centres"] = 0.0
@@ -56,9 +56,12 @@ def test_no_jump_is_looked_for_where_the_path_is_not_one_way():
     assert jumps_of(results, spacing=0.0) == [] == jumps_of(results, spacing=0.11)
 
 
-@pytest.mark.parametrize("status", [OFF_MAP, NOT_SETTLED])
+@pytest.mark.parametrize("status", [PoseStatus.OFF_MAP, PoseStatus.NOT_SETTLED])
 def test_there_is_no_jump_to_a_waypoint_without_a_pose(status):
-    assert jumps_of(results_with([0.0, 0.5, 0.0], [SETTLED, status, SETTLED])) == []
+    assert (
+        jumps_of(results_with([0.0, 0.5, 0.0], [PoseStatus.SETTLED, status, PoseStatus.SETTLED]))
+        == []
+    )
 
 
 def test_stretches_are_divided_evenly_and_turned_the_shorter_way():
@@ -76,7 +79,13 @@ def test_a_piece_is_closed_only_where_it_is_short_or_holds_a_pose_that_does_not_
     angles, xs = [0.0, 0.6, 0.0, 0.6, 0.6], np.array([0.0, 0.02, 0.005, 0.01, 0.015])
     assert sorted_pieces(results_with(angles), xs) == ([[2, 3]], [])
     assert sorted_pieces(results_with(angles), 1e-3 * xs) == ([], [[2, 3]])
-    stuck = [SETTLED, SETTLED, SETTLED, NOT_SETTLED, SETTLED]
+    stuck = [
+        PoseStatus.SETTLED,
+        PoseStatus.SETTLED,
+        PoseStatus.SETTLED,
+        PoseStatus.NOT_SETTLED,
+        PoseStatus.SETTLED,
+    ]
     assert sorted_pieces(results_with(angles, stuck), xs) == ([], [[2, 4]])
 
 
@@ -86,7 +95,7 @@ def test_way_time_and_energy_are_summed_over_settled_stretches():
     results["q"], results["power"] = rng.normal(size=(50, 6)), rng.uniform(size=50)
     lost = np.zeros(50, bool)
     lost[[7, 8, 30]] = True
-    results["status"][lost] = NOT_SETTLED
+    results["status"][lost] = PoseStatus.NOT_SETTLED
     results["q"][lost] = results["power"][lost] = np.nan
     sums = np.empty((3, 50))
     add_up(poses, results, 0.03, sums)

@@ -9,8 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError, PoseError, RoverError
-from rover_physics.prediction.sweep import OFF_MAP, SETTLED, sweep_path, sweep_paths
+from rover_physics.prediction.sweep import sweep_path, sweep_paths
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 from support.rough_grounds import fractal, plane, random_poses, rocky
 
 LSR1 = load_rover("lsr1")
@@ -82,7 +84,7 @@ def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
 )
 def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
     with pytest.raises(ModelError, match=words):
-        sweep_path(LSR1, LEVEL, POSE, **arguments)
+        sweep_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))
 
 
 def test_refusals_have_one_root():
@@ -148,18 +150,18 @@ def test_any_choice_of_poses_gives_identical_rows(seed, count):
     everything = sweep_path(LSR1, ground, poses)
     chosen = sweep_path(LSR1, ground, poses[rows])
     assert_identical(chosen, everything, rows)
-    assert (everything.status == SETTLED).any()
-    assert (everything.status == OFF_MAP).any()
+    assert (everything.status == PoseStatus.SETTLED).any()
+    assert (everything.status == PoseStatus.OFF_MAP).any()
 
 
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_paths_swept_together_are_as_swept_one_by_one(policy):
     ground = rocky(3)
     paths = [random_poses(1, 1, 1.0), line(-1.0, 1.0, 101), line(1.0, -1.0, 60), line(9.0, 9.1, 4)]
-    together = sweep_paths(LSR1, ground, paths, policy=policy)
+    together = sweep_paths(LSR1, ground, paths, SweepOptions(policy=policy))
     assert sum(len(prediction.between.poses) for prediction in together) > 20
     for poses, prediction in zip(paths, together, strict=True):
-        alone = sweep_path(LSR1, ground, poses, policy=policy)
+        alone = sweep_path(LSR1, ground, poses, SweepOptions(policy=policy))
         for part, expected in ((prediction, alone), (prediction.between, alone.between)):
             assert_identical(part, expected)
             for name in sorted(ALONG_THE_PATH - {"between", "bounds"}):
@@ -214,7 +216,7 @@ def test_level_ground_costs_no_energy():
 
 
 def test_energy_uphill_is_the_weight_lifted():
-    prediction = sweep_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), friction=2.0)
+    prediction = sweep_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))
     lifted = LSR1.weight * np.ptp(prediction.position[:, 2])
     assert prediction.energy[0] == 0.0
     assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import arm_angles, body_mass_and_com, link_points
 from rover_physics.rover.model import Part
 from rover_physics.rover.rover_file import load_rover
@@ -106,7 +107,7 @@ def test_a_payload_without_an_arm_is_refused():
 
 
 def test_a_payload_too_heavy_for_the_rover_tips_it_on_flat_ground():
-    prediction = sweep_path(LSR1, LEVEL, POSE, joint_angles=pose_of(), payload=20.0)
+    prediction = sweep_path(LSR1, LEVEL, POSE, SweepOptions(joint_angles=pose_of(), payload=20.0))
     assert prediction.tip_over_ratio[0] < 0.0
     assert judge(LSR1, prediction).code == "tip_over"
 
@@ -119,7 +120,7 @@ def test_a_rover_that_tips_over_on_flat_ground_by_itself_is_refused():
 
 def test_an_arm_stretched_ahead_loads_the_front_wheels():
     stowed = sweep_path(LSR1, LEVEL, POSE)
-    stretched = sweep_path(LSR1, LEVEL, POSE, joint_angles=pose_of(), payload=0.5)
+    stretched = sweep_path(LSR1, LEVEL, POSE, SweepOptions(joint_angles=pose_of(), payload=0.5))
     loads, before = stretched.wheel_loads[0], stowed.wheel_loads[0]
     assert loads.sum() == pytest.approx(LSR1.weight + 0.5 * 9.81)
     assert (loads[[2, 5]] > before[[2, 5]] + 0.1).all()
@@ -128,8 +129,12 @@ def test_an_arm_stretched_ahead_loads_the_front_wheels():
 
 
 def test_an_arm_stretched_aside_loads_that_side_and_takes_from_the_margin():
-    left = sweep_path(LSR1, plane(0.0, -0.4), POSE, joint_angles=pose_of(yaw=np.pi / 2))
-    right = sweep_path(LSR1, plane(0.0, -0.4), POSE, joint_angles=pose_of(yaw=-np.pi / 2))
+    left = sweep_path(
+        LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=np.pi / 2))
+    )
+    right = sweep_path(
+        LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=-np.pi / 2))
+    )
     assert left.wheel_loads[0, 3:].sum() > right.wheel_loads[0, 3:].sum() + 1.0
     assert left.tip_over_ratio[0] < right.tip_over_ratio[0] - 0.01  # downhill is left
 
@@ -140,9 +145,14 @@ def test_arm_and_payload_are_as_a_body_with_their_mass_and_centre():
     body = Part(mass, tuple(com))
     alike = replace(LSR1, manipulator=None, masses=replace(LSR1.masses, body=body))
     held = {"joint_angles": pose_of(yaw=0.5, shoulder=-0.3), "payload": 0.6}
-    arm, lump = sweep_path(LSR1, ground, POSE, **held), sweep_path(alike, ground, POSE)
+    arm, lump = (
+        sweep_path(LSR1, ground, POSE, SweepOptions(**held)),
+        sweep_path(alike, ground, POSE),
+    )
     assert arm.wheel_loads == pytest.approx(lump.wheel_loads, abs=1e-9)
-    level = sweep_path(LSR1, LEVEL, POSE, **held)  # the lump's margins are relative to this
+    level = sweep_path(
+        LSR1, LEVEL, POSE, SweepOptions(**held)
+    )  # the lump's margins are relative to this
     for name in ("tip_over_ratio", "tip_over_force_angle"):
         relative = getattr(arm, name) / getattr(level, name)
         assert relative == pytest.approx(getattr(lump, name), abs=1e-5), name

@@ -2,6 +2,7 @@
 
 import pytest
 
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.classification import classify_path
 from support.reference_drives import drive_ground, drive_path, unlimited
@@ -18,7 +19,7 @@ def test_the_planner_calls_the_step_passable_only_with_traction_control():
     ground = drive_ground(STEP.kind, STEP.size)
     classes = [
         waypoint.traversability_class
-        for waypoint in classify_path(rover, ground, drive_path(), friction=0.5)
+        for waypoint in classify_path(rover, ground, drive_path(), SweepOptions(friction=0.5))
     ]
     assert "passable with traction control" in classes and "impassable" not in classes
 

@@ -7,6 +7,7 @@ import pytest
 
 from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability import classification
@@ -36,7 +37,7 @@ POSE = [[0.0, 0.0, 0.0]]
     ],
 )
 def test_a_slope_is_classified_by_what_it_needs(slope, friction, traversability_class):
-    found = classify_path(LSR1, plane(slope, 0.0), POSE, friction=friction)[0]
+    found = classify_path(LSR1, plane(slope, 0.0), POSE, SweepOptions(friction=friction))[0]
     assert found.traversability_class == traversability_class
     assert (found.reason == "") == (traversability_class == PASSABLE)
 
@@ -53,7 +54,7 @@ def test_a_passable_waypoint_names_its_tightest_constraint():
 
 def test_with_traction_control_the_margin_is_that_of_optimal_torques():
     found = classify_path(LSR1, plane(0.45, 0.0), POSE)[0]
-    optimal = sweep_path(LSR1, plane(0.45, 0.0), POSE, policy="optimal")
+    optimal = sweep_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(policy="optimal"))
     assert found.policy == "optimal"
     assert found.margin == pytest.approx(1.0 - optimal.friction_utilisation[0].max())
     assert found.margin > 0.0
@@ -61,7 +62,9 @@ def test_with_traction_control_the_margin_is_that_of_optimal_torques():
 
 
 def test_weak_motors_make_torque_the_constraint():
-    found = classify_path(LSR1, plane(0.45, 0.0), POSE, friction=5.0, max_torque=0.3)[0]
+    found = classify_path(
+        LSR1, plane(0.45, 0.0), POSE, SweepOptions(friction=5.0, max_torque=0.3)
+    )[0]
     assert (found.traversability_class, found.constraint) == (IMPASSABLE, "torque")
     assert found.margin < 0.0
     assert found.wheel in WHEELS
@@ -82,9 +85,9 @@ def test_a_waypoint_off_the_map_has_no_margin():
 
 def test_classes_agree_with_the_verdicts_of_both_policies():
     ground, poses = rocky(3), random_poses(3, 60, 1.8)
-    classes = classify_path(LSR1, ground, poses, friction=0.22)
+    classes = classify_path(LSR1, ground, poses, SweepOptions(friction=0.22))
     equal, optimal = (
-        judge(LSR1, sweep_path(LSR1, ground, poses, friction=0.22, policy=policy))
+        judge(LSR1, sweep_path(LSR1, ground, poses, SweepOptions(friction=0.22, policy=policy)))
         for policy in ("equal", "optimal")
     )
     seen = set()
@@ -111,7 +114,7 @@ def test_what_breaks_on_the_way_counts_at_the_waypoint_that_follows():
     step = replace(ground, elevation=np.where(ground.elevation + xs(ground) > 0.6, 0.12, 0.0))
     poses = np.column_stack([x[15:60], np.zeros(45), np.zeros(45)])
     classes = classify_path(LSR1, step, poses)
-    optimal = judge(LSR1, sweep_path(LSR1, step, poses, policy="optimal"))
+    optimal = judge(LSR1, sweep_path(LSR1, step, poses, SweepOptions(policy="optimal")))
     for waypoint, reason in zip(classes, optimal.reasons, strict=True):
         if waypoint.traversability_class == IMPASSABLE:
             assert waypoint.reason == reason
@@ -126,8 +129,8 @@ def xs(ground) -> np.ndarray:
 
 def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
     ground, poses = crater(), way_into_the_crater()
-    verdict = judge_path(LSR1, ground, poses, policy="optimal", soil="dry_sand")[1]
-    classes = classify_path(LSR1, ground, poses, soil="dry_sand")
+    verdict = judge_path(LSR1, ground, poses, SweepOptions(policy="optimal", soil="dry_sand"))[1]
+    classes = classify_path(LSR1, ground, poses, SweepOptions(soil="dry_sand"))
     assert verdict.code == "trapped"
     deciding = deciding_waypoint(classes)
     assert deciding == verdict.first_failure
@@ -141,9 +144,9 @@ def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_classes_do_not_depend_on_the_policy_that_was_judged_first(slope, friction, policy):
     ground = plane(slope, 0.0)
-    judged = judge_path(LSR1, ground, POSE, policy=policy, friction=friction)
-    found = classify_judged(LSR1, ground, *judged, friction=friction)
-    assert found == classify_path(LSR1, ground, POSE, friction=friction)
+    judged = judge_path(LSR1, ground, POSE, SweepOptions(policy=policy, friction=friction))
+    found = classify_judged(LSR1, ground, *judged, SweepOptions(friction=friction))
+    assert found == classify_path(LSR1, ground, POSE, SweepOptions(friction=friction))
 
 
 def test_what_equal_torques_pass_is_not_asked_about_again(monkeypatch):
@@ -151,7 +154,7 @@ def test_what_equal_torques_pass_is_not_asked_about_again(monkeypatch):
     monkeypatch.setattr(
         classification,
         "judge_path",
-        lambda *a, **k: asked.append(k["policy"]) or judge_path(*a, **k),
+        lambda *a, **k: asked.append(a[3].policy) or judge_path(*a, **k),
     )
     classify_path(LSR1, plane(0.2, 0.0), POSE)
     assert asked == ["equal"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability import entrapment as trap
@@ -35,7 +36,7 @@ def way(start: float, end: float) -> np.ndarray:
 
 
 def verdict_on(ground: Terrain, start: float, end: float, rover=DEEP_DROPS, **arguments):
-    return judge_path(rover, ground, way(start, end), **arguments)[1]
+    return judge_path(rover, ground, way(start, end), SweepOptions(**arguments))[1]
 
 
 def test_a_path_that_ends_in_a_hole_without_way_out_is_refused_as_trapped():
@@ -109,7 +110,7 @@ def bowl(depth: float, floor: float, slope: float, reach: float = 6.0) -> Terrai
 def verdict_in(ground: Terrain, start: float, end: float, **arguments):
     x = np.arange(start, end, 0.04)
     poses = np.column_stack([x, 0.0 * x, 0.0 * x])
-    return judge_path(LSR1, ground, poses, **arguments)[1]
+    return judge_path(LSR1, ground, poses, SweepOptions(**arguments))[1]
 
 
 CRATER = bowl(0.7, 1.2, np.radians(18.0))
@@ -144,9 +145,11 @@ def test_down_a_sandy_slope_to_open_ground_is_no_trap():
     ramp = Terrain(np.clip(-x * np.tan(0.3), 0.0, 0.7), 0.05, (-6.0, -6.0))
     assert verdict_in(ramp, -4.5, 1.5, soil="dry_sand").traversable
     assert not judge_path(
-        LSR1, ramp, np.column_stack([np.arange(1.5, -4.5, -0.04), *np.zeros((2, 150))]),
-        soil="dry_sand", backward=True,
-    )[1].traversable  # fmt: skip
+        LSR1,
+        ramp,
+        np.column_stack([np.arange(1.5, -4.5, -0.04), *np.zeros((2, 150))]),
+        SweepOptions(soil="dry_sand", backward=True),
+    )[1].traversable
 
 
 def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
@@ -171,13 +174,17 @@ def test_an_obstacle_ahead_on_level_ground_is_no_trap(soil):
 def test_backwards_into_a_crater_is_as_much_a_trap():
     x = np.arange(-5.0, 0.0, 0.04)
     poses = np.column_stack([x, 0.0 * x, np.full(len(x), np.pi)])
-    verdict = judge_path(LSR1, CRATER, poses, soil="dry_sand", backward=True)[1]
+    verdict = judge_path(LSR1, CRATER, poses, SweepOptions(soil="dry_sand", backward=True))[1]
     assert verdict.code == "trapped"
 
 
 def test_on_coulomb_ground_without_drops_nothing_more_is_swept(monkeypatch):
     asked = []
-    monkeypatch.setattr(trap, "sweep_path", lambda *a, **k: asked.append(a) or sweep_path(*a, **k))
+    monkeypatch.setattr(
+        trap,
+        "sweep_path",
+        lambda *asked_for: asked.append(asked_for) or sweep_path(*asked_for),
+    )
     assert verdict_in(CRATER, -5.0, 5.0).traversable
     assert verdict_in(edge(0.0), -2.0, 2.0, soil="dry_sand").traversable
     assert not asked
@@ -189,7 +196,7 @@ def test_forces_at_rest_are_the_same_both_ways_on_coulomb_ground():
     x = np.arange(-5.0, 5.0, 0.1)
     poses = np.column_stack([x, 0.0 * x, 0.0 * x])
     there, back = (
-        sweep_path(LSR1, CRATER, path, backward=backward)
+        sweep_path(LSR1, CRATER, path, SweepOptions(backward=backward))
         for path, backward in ((poses, False), (poses[::-1], True))
     )
     np.testing.assert_allclose(back.wheel_loads[::-1], there.wheel_loads, atol=1e-9)

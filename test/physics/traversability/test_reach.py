@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import (
     arm_angles,
     distance_to_reach,
@@ -95,7 +96,7 @@ def test_solutions_keep_the_joint_limits(x, y, z):
 def test_an_angle_beyond_its_joint_limits_is_refused_by_name():
     assert arm_angles(LIMITED, {"arm_shoulder": 1.0})[1] == 1.0
     with pytest.raises(ModelError, match=r"arm_shoulder.* 1\.1; it must be within -1 to 1 rad"):
-        sweep_path(limited(), LEVEL, [POSE], joint_angles={"arm_shoulder": 1.1})
+        sweep_path(limited(), LEVEL, [POSE], SweepOptions(joint_angles={"arm_shoulder": 1.1}))
 
 
 # The query
@@ -116,16 +117,16 @@ def test_the_tip_is_at_the_target_in_the_map_frame(seed, yaw, away, side):
 
 
 def test_a_point_before_the_rover_can_be_reached_and_pushed():
-    answer = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], tool_force=[0.0, 0.0, 5.0])
+    answer = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], force=[0.0, 0.0, 5.0])
     assert answer.possible
     assert (answer.code, answer.reason) == ("", "")
     assert answer.prediction.wheel_loads.sum() == pytest.approx(LSR1.weight - 5.0)
 
 
 def test_force_and_target_turn_with_the_rover():
-    here = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.1, 0.2], tool_force=[-4.0, 2.0, 3.0])
+    here = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.1, 0.2], force=[-4.0, 2.0, 3.0])
     turned = [0.0, 0.0, np.pi / 2]
-    there = judge_reach(LSR1, LEVEL, turned, [-0.1, 0.7, 0.2], tool_force=[-2.0, -4.0, 3.0])
+    there = judge_reach(LSR1, LEVEL, turned, [-0.1, 0.7, 0.2], force=[-2.0, -4.0, 3.0])
     assert there.joint_angles == pytest.approx(here.joint_angles)
     assert there.prediction.wheel_loads == pytest.approx(here.prediction.wheel_loads, abs=1e-4)
 
@@ -133,11 +134,11 @@ def test_force_and_target_turn_with_the_rover():
 def test_of_two_ways_the_safer_one_is_chosen():
     # Far back and high: the elbow hanging low keeps the centre of mass lower.
     target = [0.55, 0.30, 0.45]
-    answer = judge_reach(LSR1, LEVEL, POSE, target, payload=0.5)
+    answer = judge_reach(LSR1, LEVEL, POSE, target, SweepOptions(payload=0.5))
     margins = []
     for angles in inverse_kinematics(ARM, answer.target):
         joints = dict(zip(ARM.joints, angles, strict=True))
-        held = sweep_path(LSR1, LEVEL, [POSE], joint_angles=joints, payload=0.5)
+        held = sweep_path(LSR1, LEVEL, [POSE], SweepOptions(joint_angles=joints, payload=0.5))
         margins.append(held.tip_over_ratio[0])
     assert margins[0] != margins[1]
     assert answer.prediction.tip_over_ratio[0] == pytest.approx(max(margins))
@@ -169,15 +170,15 @@ def test_joint_limits_are_told_from_the_length_of_the_arm():
 
 
 def test_a_payload_too_heavy_is_reached_but_not_held():
-    answer = judge_reach(LSR1, LEVEL, POSE, [0.8, 0.0, 0.45], payload=4.0)
+    answer = judge_reach(LSR1, LEVEL, POSE, [0.8, 0.0, 0.45], SweepOptions(payload=4.0))
     assert (answer.possible, answer.reachable, answer.code) == (False, True, "tip_over")
     assert "tip-over ratio" in answer.reason
 
 
 def test_a_push_beyond_friction_is_told_as_such():
     target, force = [0.7, 0.0, 0.1], [-30.0, 0.0, 0.0]
-    slips = judge_reach(LSR1, LEVEL, POSE, target, tool_force=force, friction=0.3)
-    holds = judge_reach(LSR1, LEVEL, POSE, target, tool_force=force, friction=0.9)
+    slips = judge_reach(LSR1, LEVEL, POSE, target, SweepOptions(friction=0.3), force=force)
+    holds = judge_reach(LSR1, LEVEL, POSE, target, SweepOptions(friction=0.9), force=force)
     assert slips.code == "friction"
     assert holds.possible
 
@@ -185,13 +186,13 @@ def test_a_push_beyond_friction_is_told_as_such():
 def test_a_push_beyond_the_motors_is_told_as_such():
     force = [-30.0, 0.0, 0.0]
     answer = judge_reach(
-        LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], tool_force=force, friction=0.9, max_torque=0.4
+        LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], SweepOptions(friction=0.9, max_torque=0.4), force=force
     )
     assert answer.code == "torque"
 
 
 def test_pushing_hard_on_the_ground_lifts_the_rover_off_its_wheels():
-    answer = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], tool_force=[0.0, 0.0, 60.0])
+    answer = judge_reach(LSR1, LEVEL, POSE, [0.7, 0.0, 0.1], force=[0.0, 0.0, 60.0])
     assert not answer.possible
     assert answer.code in ("tip_over", "wheel_lift")
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.verdict import judge
@@ -34,7 +35,7 @@ def straight(start, end, spacing=0.02) -> np.ndarray:
 
 
 def verdict_of(ground, start, end, rover=LSR1, **arguments):
-    return judge(rover, sweep_path(rover, ground, straight(start, end), **arguments))
+    return judge(rover, sweep_path(rover, ground, straight(start, end), SweepOptions(**arguments)))
 
 
 # The Mars Yard

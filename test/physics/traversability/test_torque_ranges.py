@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 
-from rover_physics.errors import ModelError
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import judge
@@ -53,8 +53,10 @@ def range_by_programme(prediction, i, wheel, max_torque, inside: bool) -> np.nda
 )
 def test_ranges_lie_between_those_of_linear_programmes(ground, max_torque):
     poses = random_poses(2, 3, 0.5)
-    ranges = find_torque_ranges(LSR1, ground, poses, max_torque=max_torque)
-    optimal = sweep_path(LSR1, ground, poses, policy="optimal", max_torque=max_torque)
+    ranges = find_torque_ranges(LSR1, ground, poses, SweepOptions(max_torque=max_torque))
+    optimal = sweep_path(
+        LSR1, ground, poses, SweepOptions(policy="optimal", max_torque=max_torque)
+    )
     compared = 0
     for i in np.flatnonzero(ranges.feasible):
         if not has_equal_shares(optimal, i):
@@ -79,7 +81,7 @@ def has_equal_shares(prediction, i) -> bool:
 def test_a_general_solver_finds_no_torque_beyond_the_range():
     ground, pose = plane(0.3, 0.15), [[0.0, 0.0, 0.4]]
     ranges = find_torque_ranges(LSR1, ground, pose)
-    optimal = sweep_path(LSR1, ground, pose, policy="optimal")
+    optimal = sweep_path(LSR1, ground, pose, SweepOptions(policy="optimal"))
     A, b, along = balance_matrix(LSR1, optimal, 0)
     start = np.concatenate([optimal.wheel_loads[0], optimal.tangential[0]]) / LSR1.weight
     slope, middle = np.polyfit(along, optimal.lateral[0] / LSR1.weight, 1)
@@ -113,7 +115,7 @@ def test_torques_that_a_policy_uses_are_within_the_ranges(seed, yaw):
     ground, pose = smooth(seed), [[0.1, 0.2, yaw]]
     ranges = find_torque_ranges(LSR1, ground, pose)
     for policy in ("equal", "optimal"):
-        prediction = sweep_path(LSR1, ground, pose, policy=policy)
+        prediction = sweep_path(LSR1, ground, pose, SweepOptions(policy=policy))
         if judge(LSR1, prediction).code not in ("", "belly", "tilt"):
             continue
         assert ranges.feasible[0]
@@ -123,7 +125,7 @@ def test_torques_that_a_policy_uses_are_within_the_ranges(seed, yaw):
 
 def test_ranges_are_empty_where_no_torques_keep_the_constraints():
     poses = [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]
-    ranges = find_torque_ranges(LSR1, plane(0.45, 0.0), poses, friction=0.4)
+    ranges = find_torque_ranges(LSR1, plane(0.45, 0.0), poses, SweepOptions(friction=0.4))
     assert not ranges.feasible.any()
     assert np.isnan(ranges.lowest).all()
     assert np.isnan(ranges.highest).all()
@@ -136,8 +138,8 @@ def test_tighter_limits_leave_narrower_ranges():
         LSR1, limits=replace(LSR1.limits, friction_utilisation=0.8, torque_saturation=0.5)
     )
     for narrow in (
-        find_torque_ranges(LSR1, ground, pose, friction=0.5),
-        find_torque_ranges(LSR1, ground, pose, max_torque=0.7),
+        find_torque_ranges(LSR1, ground, pose, SweepOptions(friction=0.5)),
+        find_torque_ranges(LSR1, ground, pose, SweepOptions(max_torque=0.7)),
         find_torque_ranges(careful, ground, pose),
     ):
         assert narrow.feasible.all()
@@ -158,7 +160,7 @@ def test_mirrored_ground_swaps_the_ranges_of_right_and_left():
 def test_at_the_foot_of_a_step_ranges_hold_what_optimal_torques_use():
     case = reference_ground("settled_a/step")
     ranges = find_torque_ranges(LSR1, case.terrain, case.poses)
-    optimal = sweep_path(LSR1, case.terrain, case.poses, policy="optimal")
+    optimal = sweep_path(LSR1, case.terrain, case.poses, SweepOptions(policy="optimal"))
     for i in range(len(case.poses)):
         within = optimal.friction_utilisation[i].max() < 1.0
         within &= optimal.torque_saturation[i].max() < 1.0
@@ -171,13 +173,18 @@ def test_at_the_foot_of_a_step_ranges_hold_what_optimal_torques_use():
 def test_on_sand_the_ranges_are_narrower_and_hold_the_torques_used():
     ground, pose = plane(0.1, 0.0), [[0.0, 0.0, 0.0]]
     firm = find_torque_ranges(LSR1, ground, pose)
-    sand = find_torque_ranges(LSR1, ground, pose, soil="dry_sand")
-    used = sweep_path(LSR1, ground, pose, soil="dry_sand", policy="optimal").torque
+    sand = find_torque_ranges(LSR1, ground, pose, SweepOptions(soil="dry_sand"))
+    used = sweep_path(LSR1, ground, pose, SweepOptions(soil="dry_sand", policy="optimal")).torque
     assert (sand.highest - sand.lowest < firm.highest - firm.lowest).all()
     assert (sand.lowest <= used).all()
     assert (used <= sand.highest).all()
 
 
-def test_the_policy_is_not_an_argument():
-    with pytest.raises((TypeError, ModelError)):
-        find_torque_ranges(LSR1, plane(0.0, 0.0), [[0.0, 0.0, 0.0]], policy="equal")
+def test_the_policy_does_not_matter():
+    asked = LSR1, plane(0.1, 0.0), [[0.0, 0.0, 0.0]]
+    equal, optimal = (
+        find_torque_ranges(*asked, SweepOptions(policy=policy)) for policy in ("equal", "optimal")
+    )
+    assert equal.feasible.all()
+    np.testing.assert_array_equal(equal.lowest, optimal.lowest)
+    np.testing.assert_array_equal(equal.highest, optimal.highest)

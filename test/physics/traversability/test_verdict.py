@@ -6,14 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep import (
-    NO_EQUILIBRIUM,
-    NOT_SETTLED,
-    OFF_MAP,
-    UNKNOWN_GROUND,
-    sweep_path,
-)
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 from rover_physics.traversability.limit_checks import tilt_of
 from rover_physics.traversability.verdict import CODES, judge
 from support.rough_grounds import plane
@@ -113,10 +109,10 @@ def test_the_limits_are_those_of_the_rover(fine):
 @pytest.mark.parametrize(
     ("status", "code", "word"),
     [
-        (OFF_MAP, "off_map", "map"),
-        (UNKNOWN_GROUND, "unknown_ground", "unknown"),
-        (NOT_SETTLED, "not_settled", "six wheels"),
-        (NO_EQUILIBRIUM, "no_equilibrium", "loads"),
+        (PoseStatus.OFF_MAP, "off_map", "map"),
+        (PoseStatus.UNKNOWN_GROUND, "unknown_ground", "unknown"),
+        (PoseStatus.NOT_SETTLED, "not_settled", "six wheels"),
+        (PoseStatus.NO_EQUILIBRIUM, "no_equilibrium", "loads"),
     ],
 )
 def test_a_waypoint_without_a_pose_is_told_by_its_cause(fine, status, code, word):
@@ -149,7 +145,7 @@ def test_a_wheel_that_lifts_is_told_as_lifting_not_as_slipping(fine):
 
 
 def test_margins_are_the_worst_along_the_settled_part(fine):
-    changed = with_status(with_value(fine, "tip_over_ratio", 1, 0.7), 3, NOT_SETTLED)
+    changed = with_status(with_value(fine, "tip_over_ratio", 1, 0.7), 3, PoseStatus.NOT_SETTLED)
     changed = with_value(changed, "friction_utilisation", 2, 0.4, (3,))
     changed = with_value(changed, "torque_saturation", 2, 0.6, (1,))
     changed = with_value(changed, "belly_clearance", 0, 0.05)
@@ -199,7 +195,7 @@ def test_a_verdict_is_json_with_none_for_what_is_not_finite(fine):
     ],
 )
 def test_slopes_are_refused_for_the_physical_reason(slope, yaw, arguments, code):
-    prediction = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], **arguments)
+    prediction = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], SweepOptions(**arguments))
     assert judge(LSR1, prediction).code == code
 
 

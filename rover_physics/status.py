@@ -1,0 +1,55 @@
+"""What becomes of a pose, a contact or a bound: one code each, the same in kernels and results."""
+
+from enum import IntEnum
+
+
+class ContactStatus(IntEnum):
+    """What was found below a wheel; the numbers are those of `PoseStatus`."""
+
+    IN_CONTACT = 0
+    """All samples of the wheel are over known ground."""
+    OFF_MAP = 1
+    """A sample is beyond the edge of the map."""
+    UNKNOWN_GROUND = 2
+    """A sample is over ground of unknown height."""
+
+
+class PoseStatus(IntEnum):
+    """What became of a pose."""
+
+    SETTLED = 0
+    """All six wheels touch the ground, and the forces balance."""
+    OFF_MAP = 1
+    """A wheel would be beyond the edge of the map."""
+    UNKNOWN_GROUND = 2
+    """A wheel would be over ground of unknown height."""
+    NOT_SETTLED = 3
+    """No configuration was found in which all six wheels touch the ground."""
+    NO_EQUILIBRIUM = 4
+    """The equations of the balance are singular."""
+
+
+class BoundStatus(IntEnum):
+    """What became of the bounds of a pose on an uncertain map."""
+
+    BOUNDED = 0
+    """Bounds were found."""
+    OFF_MAP_NEAR = 1
+    """The edge of the map is within reach of a wheel."""
+    UNKNOWN_NEAR = 2
+    """Unknown ground is within reach of a wheel."""
+    NOT_SETTLED = 3
+    """The pose was not settled to begin with."""
+    SINGULAR = 4
+    """The forces are not determined."""
+    ON_EDGE = 5
+    """A wheel may climb an edge or fall off it."""
+
+
+class TorquePolicy(IntEnum):
+    """How the wheels share the traction."""
+
+    EQUAL = 0
+    """All wheels pull alike."""
+    OPTIMAL = 1
+    """The torques that need the least friction, as traction control can give them."""
