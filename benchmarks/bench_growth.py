@@ -5,7 +5,7 @@ import numpy as np
 
 from benchmarks.measure import Figure, median_time
 from rover_physics.prediction.evaluation import evaluate
-from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -56,8 +56,8 @@ def _maps(rover) -> list[Figure]:
         first = (whole.elevation.shape[0] - cells) // 2
         corner = whole.origin[0] + first * whole.resolution
         part = whole.elevation[first : first + cells, first : first + cells]
-        setup = set_up(rover, Terrain(part, whole.resolution, (corner, corner)))
-        times.append(median_time(lambda: evaluate(*setup, poses), 21))  # noqa: B023
+        model = pack_model(rover, Terrain(part, whole.resolution, (corner, corner)))
+        times.append(median_time(lambda: evaluate(model.records, poses), 21))  # noqa: B023
     return [
         Figure("growth", f"map of {cells} x {cells} cells", value / len(poses) * 1e6, "us/pose")
         for cells, value in zip(sizes, times, strict=True)
@@ -68,9 +68,9 @@ def _samples(rover) -> list[Figure]:
     """The same ground with finer cells: a wheel is sampled as finely as the map."""
     figures = []
     for resolution in (0.05, 0.02, 0.01):
-        setup = set_up(rover, make_mars_terrain(1, 10.0, resolution))
+        model = pack_model(rover, make_mars_terrain(1, 10.0, resolution))
         poses = straight(6.0)
-        taken = median_time(lambda: evaluate(*setup, poses), 11) / len(poses) * 1e6  # noqa: B023
-        count = int(setup.samples.rows * setup.samples.circles)
+        taken = median_time(lambda: evaluate(model.records, poses), 11) / len(poses) * 1e6  # noqa: B023
+        count = int(model.record.samples.rows * model.record.samples.circles)
         figures.append(Figure("growth", f"{count} samples a wheel", taken, "us/pose"))
     return figures

@@ -12,7 +12,7 @@ from benchmarks.grounds import random_poses, reference_ground
 from benchmarks.measure import Figure, median_time
 from benchmarks.mujoco_rover import DroppedRover, Settled
 from rover_physics.prediction.evaluation import evaluate
-from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 
@@ -45,7 +45,7 @@ def drop(ground, poses: np.ndarray) -> tuple[list[Settled], list[float]]:
 def compare(ground, settled: list[Settled]) -> float:
     """Return the median over poses of how far the worst wheel centre is from ours [mm]."""
     poses = np.array([rest.pose for rest in settled])
-    ours = evaluate(*set_up(rover(), ground), poses)
+    ours = evaluate(pack_model(rover(), ground).records, poses)
     off = [
         np.linalg.norm(one.wheel_centres - rest.wheel_centres, axis=1).max()
         for one, rest in zip(ours, settled, strict=True)
@@ -60,11 +60,11 @@ def measure() -> list[Figure]:
     figures = []
     for name in ("flat", "rocks", "fractal"):
         ground = reference_ground(name)
-        setup = set_up(rover(), ground)
+        model = pack_model(rover(), ground)
         settled, times = drop(ground, random_poses(ground, POSES))
         rests = np.array([rest.pose for rest in settled])
         poses = np.tile(rests, (MANY // len(rests), 1))
-        ours = median_time(lambda: run_settling(setup, poses)) / len(poses)  # noqa: B023
+        ours = median_time(lambda: run_settling(model, poses)) / len(poses)  # noqa: B023
         theirs, count = statistics.median(times), len(times)
         against = "the same pose by MuJoCo"
         figures += [

@@ -7,12 +7,12 @@ import numpy as np
 
 from benchmarks.grounds import all_grounds, random_poses
 from benchmarks.measure import Figure, median_times
-from rover_physics.contact.contact_record import AGAIN, COARSE, FULL, NEAR, QUICK
+from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.rim_scan import scan_rim
-from rover_physics.contact.settling import SLOPED, settle, write_gap_rates
+from rover_physics.contact.settling import GroundSlope, settle, write_gap_rates
 from rover_physics.contact.wheel import blend_contact, find_contact
-from rover_physics.prediction.evaluation import WORK, evaluate, new_work
-from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.evaluation import WORK, evaluate, new_work, set_pose
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.rover.linkage import place
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
@@ -23,68 +23,68 @@ compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 
 
 @compiled
-def do_nothing(ground, linkage, samples, work):
+def do_nothing(model, work):
     """Leave the rover placed."""
 
 
 @compiled
-def guess(ground, linkage, samples, work):
+def guess(model, work):
     """Make the first guess."""
     for wheel in range(6):
-        find_contact(ground, samples, work.placement, wheel, COARSE, work.contacts)
+        find_contact(model, work, wheel, SearchScope.COARSE)
 
 
 @compiled
-def sample(ground, linkage, samples, work):
+def sample(model, work):
     """Hold all samples of the rims against the ground."""
     for wheel in range(6):
-        scan_rim(ground, samples, work.placement, wheel, QUICK, work.contacts)
+        scan_rim(model, work, wheel, SearchScope.QUICK)
 
 
 @compiled
-def look(ground, linkage, samples, work):
+def look(model, work):
     """Hold all samples against the ground, and search around the nearest."""
     for wheel in range(6):
-        find_contact(ground, samples, work.placement, wheel, QUICK, work.contacts)
+        find_contact(model, work, wheel, SearchScope.QUICK)
 
 
 @compiled
-def look_and_step(ground, linkage, samples, work):
+def look_and_step(model, work):
     """Work out a step of Newton's method, too, but for its solution."""
-    look(ground, linkage, samples, work)
-    write_gap_rates(linkage, work.placement, work.contacts, SLOPED, work.J)
+    look(model, work)
+    write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.SLOPED, work.J)
 
 
 @compiled
-def look_near(ground, linkage, samples, work):
+def look_near(model, work):
     """Search around the nearest places once more, as after a step."""
-    look(ground, linkage, samples, work)
+    look(model, work)
     for wheel in range(6):
-        find_contact(ground, samples, work.placement, wheel, NEAR, work.contacts)
+        find_contact(model, work, wheel, SearchScope.NEAR)
 
 
 @compiled
-def verify(ground, linkage, samples, work):
+def verify(model, work):
     """Verify that no other place of the rims is nearer."""
-    look(ground, linkage, samples, work)
+    look(model, work)
     for wheel in range(6):
-        find_contact(ground, samples, work.placement, wheel, FULL, work.contacts)
+        find_contact(model, work, wheel, SearchScope.FULL)
 
 
 @compiled
-def verify_again(ground, linkage, samples, work):
+def verify_again(model, work):
     """Verify it once more at the circles that came near."""
-    verify(ground, linkage, samples, work)
+    verify(model, work)
     for wheel in range(6):
-        find_contact(ground, samples, work.placement, wheel, AGAIN, work.contacts)
+        find_contact(model, work, wheel, SearchScope.AGAIN)
 
 
 @compiled
-def share_load(ground, linkage, samples, work):
+def share_load(model, work):
     """Find the mean contacts."""
-    verify(ground, linkage, samples, work)
+    verify(model, work)
     for wheel in range(6):
-        blend_contact(samples, work.placement, wheel, work.contacts)
+        blend_contact(model.samples, work, wheel)
 
 
 PARTS = {
@@ -105,24 +105,21 @@ def loop_over_poses(part: Callable) -> Callable:
     """Return a kernel that places the rover at settled poses and does `part` there."""
 
     @compiled
-    def run(grounds, linkages, samplings, poses, q, works):
-        work = works[0]
+    def run(models, poses, q, works):
+        model, work = models[0], works[0]
         for i in range(len(poses)):
-            place(linkages[0], poses[i, 0], poses[i, 1], poses[i, 2], q[i], work.placement)
-            part(grounds[0], linkages[0], samplings[0], work)
+            place(model.linkage, poses[i], q[i], work.placement)
+            part(model, work)
 
     return run
 
 
 @compiled
-def settle_all(grounds, linkages, samplings, poses, q, works):
+def settle_all(models, poses, q, works):
     """Settle at all poses, for comparison."""
-    work = works[0]
     for i in range(len(poses)):
-        settle(
-            grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-            q[i], work.placement, work.contacts, work.J, work.step,
-        )  # fmt: skip
+        set_pose(poses, i, works[0])
+        settle(models[0], works[0])
 
 
 def measure() -> list[Figure]:
@@ -131,14 +128,13 @@ def measure() -> list[Figure]:
     loops = {part: loop_over_poses(part) for part, _ in PARTS.values()}
     figures = []
     for name, ground in all_grounds().items():
-        setup, poses = set_up(load_rover("lsr1"), ground), random_poses(ground, POSES)
-        results = evaluate(*setup, poses)
+        model, poses = pack_model(load_rover("lsr1"), ground), random_poses(ground, POSES)
+        results = evaluate(model.records, poses)
         settled = results["status"] == PoseStatus.SETTLED
         poses, q = poses[settled], results["q"][settled].copy()
-        records = (np.array([setup.linkage]), np.array([setup.samples]))
         works = np.full(1, new_work(), WORK)
         calls = [
-            lambda run=run: run(setup.ground.records, *records, poses, q, works)  # noqa: B023
+            lambda run=run: run(model.records, poses, q, works)  # noqa: B023
             for run in (*loops.values(), settle_all)
         ]
         times = median_times(calls, REPEATS)

@@ -6,8 +6,8 @@ import numpy as np
 from benchmarks.grounds import all_grounds, random_poses, reference_ground
 from benchmarks.measure import Figure, median_time, median_times
 from rover_physics.contact.settling import settle, settle_from
-from rover_physics.prediction.evaluation import WORK, evaluate, new_results, new_work
-from rover_physics.prediction.model_setup import Setup, set_up
+from rover_physics.prediction.evaluation import WORK, evaluate, new_results, new_work, set_pose
+from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import place
 from rover_physics.rover.rover_file import load_rover
@@ -27,33 +27,24 @@ OTHER_POSE = 1e-3
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
-def settle_all(grounds, linkages, samplings, poses, works, results):
+def settle_all(models, poses, works, results):
     """Settle the rover at poses (n, 3) and do nothing else."""
-    work = works[0]
     for i in range(len(poses)):
-        results[i].status = settle(
-            grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-            results[i].q, work.placement, work.contacts, work.J, work.step,
-        )  # fmt: skip
+        set_pose(poses, i, works[0])
+        results[i].status = settle(models[0], works[0])
+        results[i].q[:] = works[0].q
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
-def settle_along(grounds, linkages, samplings, poses, works, results):
+def settle_along(models, poses, works, results):
     """Settle the rover at poses (n, 3) of a path, each from the one before it."""
-    work = works[0]
     for i in range(len(poses)):
-        q = results[i].q
+        set_pose(poses, i, works[0])
         if i > 0 and results[i - 1].status == PoseStatus.SETTLED:
-            q[:] = results[i - 1].q
-            results[i].status = settle_from(
-                grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-                q, work.placement, work.contacts, work.J, work.step,
-            )  # fmt: skip
+            results[i].status = settle_from(models[0], works[0])
         else:
-            results[i].status = settle(
-                grounds[0], linkages[0], samplings[0], poses[i, 0], poses[i, 1], poses[i, 2],
-                q, work.placement, work.contacts, work.J, work.step,
-            )  # fmt: skip
+            results[i].status = settle(models[0], works[0])
+        results[i].q[:] = works[0].q
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
@@ -65,23 +56,22 @@ def look_up_all(grounds, cells):
     return highest
 
 
-def run_settling(setup: Setup, poses: np.ndarray, kernel=settle_all) -> np.ndarray:
+def run_settling(model: PackedModel, poses: np.ndarray, kernel=settle_all) -> np.ndarray:
     """Settle at all poses and return the results."""
-    records = [np.array([record]) for record in (setup.linkage, setup.samples)]
     works, results = np.full(1, new_work(), WORK), new_results(len(poses))
-    kernel(setup.ground.records, *records, poses, works, results)
+    kernel(model.records, poses, works, results)
     return results
 
 
-def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
+def cells_looked_up(model: PackedModel, poses: np.ndarray) -> tuple[np.ndarray, int]:
     """Return the cells (n, 2) at which heights must be known to tell that settled wheels touch.
 
     Of each wheel these are all samples of its rim but those that even the highest ground around
     it stays below: whatever finds the pose, it has to look there once. Also returns the number
     of settled poses.
     """
-    results = evaluate(*setup, poses)
-    ground, samples = setup.ground.records[0], setup.samples
+    results = evaluate(model.records, poses)
+    ground, samples = model.record.ground, model.record.samples
     corner = np.array([ground.x0, ground.y0])
     sines, cosines = samples.sines[: samples.rows], samples.cosines[: samples.rows]
     laterals, radius = samples.laterals[: samples.circles], samples.radius
@@ -90,7 +80,7 @@ def cells_looked_up(setup: Setup, poses: np.ndarray) -> tuple[np.ndarray, int]:
     settled = results[results["status"] == PoseStatus.SETTLED]
     work = new_work()
     for i in np.flatnonzero(results["status"] == PoseStatus.SETTLED):
-        place(setup.linkage, *poses[i], results[i].q, work.placement)
+        place(model.record.linkage, poses[i], results[i].q, work.placement)
         placed = work.placement
         axis = placed.R[:, 1]
         rim = radius * (sines[:, None] * placed.forward - cosines[:, None] * placed.up)
@@ -112,12 +102,12 @@ def measure() -> list[Figure]:
     for name, ground in all_grounds().items():
         poses = random_poses(ground, POSES)
         equal, optimal = (
-            set_up(rover, ground, SweepOptions(policy=p)) for p in ("equal", "optimal")
+            pack_model(rover, ground, SweepOptions(policy=p)) for p in ("equal", "optimal")
         )
         times = {
             "settling": median_time(lambda: run_settling(equal, poses)),  # noqa: B023
-            "equal": median_time(lambda: evaluate(*equal, poses)),  # noqa: B023
-            "optimal": median_time(lambda: evaluate(*optimal, poses)),  # noqa: B023
+            "equal": median_time(lambda: evaluate(equal.records, poses)),  # noqa: B023
+            "optimal": median_time(lambda: evaluate(optimal.records, poses)),  # noqa: B023
         }
         pose = {key: value / POSES * 1e6 for key, value in times.items()}
         figures += [
@@ -139,10 +129,10 @@ def measure_warm_start(rover) -> list[Figure]:
     figures = []
     for name in ("flat", "rocks", "fractal"):
         ground = reference_ground(name)
-        setup, lines = set_up(rover, ground), lines_of_poses(ground)
+        model, lines = pack_model(rover, ground), lines_of_poses(ground)
 
-        def settle_with(kernel, setup=setup, lines=lines) -> np.ndarray:
-            return np.concatenate([run_settling(setup, poses, kernel) for poses in lines])
+        def settle_with(kernel, model=model, lines=lines) -> np.ndarray:
+            return np.concatenate([run_settling(model, poses, kernel) for poses in lines])
 
         cold, warm = median_times(
             [lambda: settle_with(settle_all), lambda: settle_with(settle_along)]
@@ -171,11 +161,11 @@ def measure_floor(rover) -> list[Figure]:
     """Measure a full evaluation against the look-ups that it can't do without."""
     figures = []
     for name in ("flat", "rocks"):
-        setup = set_up(rover, reference_ground(name))
+        model = pack_model(rover, reference_ground(name))
         poses = random_poses(reference_ground(name), FLOOR_POSES)
-        cells, settled = cells_looked_up(setup, poses)
-        floor = median_time(lambda: look_up_all(setup.ground.records, cells), 21)  # noqa: B023
-        full = median_time(lambda: evaluate(*setup, poses), 21)  # noqa: B023
+        cells, settled = cells_looked_up(model, poses)
+        floor = median_time(lambda: look_up_all(model.ground.records, cells), 21)  # noqa: B023
+        full = median_time(lambda: evaluate(*model, poses), 21)  # noqa: B023
         figures += [
             Figure("floor", f"{name}: look-ups per pose", len(cells) / settled, ""),
             Figure("floor", f"{name}: time of the look-ups", floor / settled * 1e6, "us"),

@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.measure import Figure, median_time
 from rover_physics.prediction.evaluation import evaluate
-from rover_physics.prediction.model_setup import set_up
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
@@ -31,9 +31,9 @@ def measure() -> list[Figure]:
     figures = []
     for name in ("lsr1", "m2020"):
         for height in HEIGHTS:
-            setup = set_up(load_rover(name), wall(height, 0.02, 3.5))
-            taken = median_time(lambda: evaluate(*setup, poses)) / POSES  # noqa: B023
-            lost = (evaluate(*setup, poses)["status"] == PoseStatus.NOT_SETTLED).mean()
+            model = pack_model(load_rover(name), wall(height, 0.02, 3.5))
+            taken = median_time(lambda: evaluate(model.records, poses)) / POSES  # noqa: B023
+            lost = (evaluate(model.records, poses)["status"] == PoseStatus.NOT_SETTLED).mean()
             label = f"{name}, wall of {height:g} m"
             figures += [
                 Figure("wall", f"{label}: a pose within 1 m", 1e3 * taken, "ms"),

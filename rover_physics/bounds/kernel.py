@@ -17,7 +17,7 @@ from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.records import new_record, record_type, shared_array_of
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
-from rover_physics.prediction.model_setup import PackedModel
+from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.rover.linkage import place
 from rover_physics.status import BoundStatus, TorquePolicy
 from rover_physics.terrain.ground import GROUND, Ground, copy_soil

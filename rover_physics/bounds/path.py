@@ -13,7 +13,7 @@ import numpy as np
 from rover_physics.bounds.forces import MAX_SOILS
 from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
 from rover_physics.errors import ModelError
-from rover_physics.prediction.model_setup import pack_model
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import Floats, PathPrediction
 from rover_physics.prediction.sweep import sweep_lock

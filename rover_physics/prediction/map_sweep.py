@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.evaluation import effort, evaluate_pose, new_works, set_pose
-from rover_physics.prediction.model_setup import PackedModel, pack_model
+from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses, sweep_lock
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover

@@ -12,7 +12,7 @@ from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, find_crossings
 from rover_physics.prediction.drops import find_falls
 from rover_physics.prediction.evaluation import NONE_HELD, RESULT, effort, evaluate
-from rover_physics.prediction.model_setup import PackedModel, pack_model
+from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import add_up
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions

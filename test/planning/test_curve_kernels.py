@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from rover_planner.planning.curve_kernels import follow_curve, interpolate, turns_within
+from rover_planner.planning.curve_kernels import (
+    BumpedCurve,
+    follow_curve,
+    interpolate,
+    turns_within,
+)
 
 
 def test_the_spline_is_that_of_scipy():
@@ -21,7 +26,7 @@ def test_a_curve_is_the_cubic_through_its_ends_with_a_bump_beside_it():
     m0, m1 = np.array([3.0, 1.0]), np.array([5.0, -2.0])
     t = np.linspace(0.0, 1.0, 101)
     poses, slopes = np.empty((101, 3)), np.empty((2, 101))
-    follow_curve(t, start, chord, m0, m1, left, 0.3, poses, slopes)
+    follow_curve(t, BumpedCurve(start, chord, m0, m1, left, 0.3), poses, slopes)
     cubic = CubicHermiteSpline([0.0, 1.0], [start, start + chord], [m0, m1])
     bump = 0.15 * (1.0 - np.cos(2.0 * np.pi * t))
     assert poses[:, :2] == pytest.approx(cubic(t) + bump[:, None] * left, abs=1e-12)

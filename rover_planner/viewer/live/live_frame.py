@@ -75,7 +75,7 @@ class LiveFigure:
         roll, pitch, yaw = state.attitude
         x, y, z = state.position
         q = np.array([z, roll, pitch, 0.5 * (angles[0] - angles[1]), *angles[2:]])
-        place(self._linkage, x, y, yaw, q, self._placement)
+        place(self._linkage, np.array([x, y, yaw]), q, self._placement)
         centres = self._placement.centres.copy()
         radius = self._rover.wheel.radius
         s, c = np.sin(state.contact_angles)[:, None], np.cos(state.contact_angles)[:, None]

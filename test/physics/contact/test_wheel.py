@@ -6,20 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rover_physics.contact.contact_record import EXACT, FULL, QUICK, new_contacts
+from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.contact.wheel_samples import sample_wheel
-from rover_physics.numerics.records import new_record
-from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
+from rover_physics.prediction.evaluation import new_work
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.rover.linkage import place
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import ContactStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.terrain.ground import pack_ground
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky, smooth
 
 LSR1 = load_rover("lsr1")
 RADIUS, WIDTH = LSR1.wheel.radius, LSR1.wheel.width
-LINKAGE = pack_linkage(LSR1, 5.0, np.array([0.0, 0.0, 0.05]))
 few = settings(max_examples=30, deadline=None)
 
 
@@ -27,17 +26,15 @@ class WheelOn:
     """The first wheel of a rover, put with its centre somewhere over a ground."""
 
     def __init__(self, ground: Terrain, centre, scope, roll=0.0, pitch=0.0, yaw=0.0):
-        self.samples = sample_wheel(LSR1, ground.resolution)
-        self.placement, self.contacts = new_record(PLACEMENT), new_contacts()
+        self.model = pack_model(LSR1, ground)
+        self.work = new_work()
+        self.samples, self.contacts = self.model.record.samples, self.work.contacts
+        self.placement = self.work.placement
         q = np.array([0.0, roll, pitch, 0.0, 0.0, 0.0])
-        place(LINKAGE, 0.0, 0.0, yaw, q, self.placement)
+        place(self.model.record.linkage, np.array([0.0, 0.0, yaw]), q, self.placement)
         self.placement.centres[0] = centre
-        self.ground = pack_ground(ground)
-        record = self.ground.records[0]
-        for step in (QUICK, scope):
-            self.status = find_contact(
-                record, self.samples, self.placement, 0, step, self.contacts
-            )
+        for step in (SearchScope.QUICK, scope):
+            self.status = find_contact(self.model.record, self.work, 0, step)
 
     @property
     def gap(self) -> float:
@@ -49,7 +46,7 @@ class WheelOn:
 
     def share(self) -> "WheelOn":
         """Let the circles that are nearly as near share the load."""
-        blend_contact(self.samples, self.placement, 0, self.contacts)
+        blend_contact(self.samples, self.work, 0)
         return self
 
 
@@ -70,7 +67,7 @@ def dense_gap(ground, centre, roll, pitch, yaw, laterals) -> float:
     return (points[..., 2] - ground.elevation_at(points[..., 0], points[..., 1])).min()
 
 
-@pytest.mark.parametrize("scope", [FULL, EXACT])
+@pytest.mark.parametrize("scope", [SearchScope.FULL, SearchScope.EXACT])
 @pytest.mark.parametrize("height", [0.05, 0.10, 0.30])
 def test_over_level_ground_the_gap_is_the_height_less_the_radius(scope, height):
     wheel = WheelOn(plane(0.0, 0.0, height=0.4), [0.013, -0.007, 0.4 + height], scope)
@@ -80,7 +77,7 @@ def test_over_level_ground_the_gap_is_the_height_less_the_radius(scope, height):
 
 
 def test_on_level_ground_an_upright_wheel_touches_in_its_middle():
-    wheel = WheelOn(plane(0.0, 0.0), [0.013, -0.007, RADIUS], FULL, yaw=0.6).share()
+    wheel = WheelOn(plane(0.0, 0.0), [0.013, -0.007, RADIUS], SearchScope.FULL, yaw=0.6).share()
     assert wheel.contacts.point[0] == pytest.approx([0.013, -0.007, 0.0], abs=1e-9)
 
 
@@ -92,7 +89,9 @@ def test_on_a_plane_the_contact_angle_is_the_slope_along_the_heading(slope, yaw)
     attitude = Rotation.from_euler("ZYX", [yaw, -along, -cross])
     normal = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
     assert attitude.apply([0.0, 0.0, 1.0]) == pytest.approx(normal)
-    wheel = WheelOn(plane(slope, 0.0), normal * RADIUS, FULL, -cross, -along, yaw).share()
+    wheel = WheelOn(
+        plane(slope, 0.0), normal * RADIUS, SearchScope.FULL, -cross, -along, yaw
+    ).share()
     assert wheel.gap == pytest.approx(0.0, abs=1e-8)
     assert wheel.contacts.point[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     below = attitude.as_matrix()[:, 1]
@@ -102,13 +101,13 @@ def test_on_a_plane_the_contact_angle_is_the_slope_along_the_heading(slope, yaw)
 
 @pytest.mark.parametrize(("slope", "sign"), [(0.3, 1.0), (-0.3, -1.0)])
 def test_contact_angles_are_positive_uphill(slope, sign):
-    wheel = WheelOn(plane(slope, 0.0), [0.0, 0.0, 0.2], FULL)
+    wheel = WheelOn(plane(slope, 0.0), [0.0, 0.0, 0.2], SearchScope.FULL)
     assert wheel.angle == pytest.approx(sign * np.arctan(0.3), abs=1e-5)
 
 
 @pytest.mark.parametrize(("roll", "side"), [(0.2, -1.0), (-0.2, 1.0)])
 def test_a_leaning_wheel_stands_on_its_lower_edge(roll, side):
-    wheel = WheelOn(plane(0.0, 0.0), [0.0, 0.0, 0.2], FULL, roll=roll).share()
+    wheel = WheelOn(plane(0.0, 0.0), [0.0, 0.0, 0.2], SearchScope.FULL, roll=roll).share()
     lowest = RADIUS * np.cos(roll) + 0.5 * WIDTH * np.sin(abs(roll))
     assert wheel.gap == pytest.approx(0.2 - lowest, abs=1e-9)
     across = RADIUS * np.sin(roll) + side * 0.5 * WIDTH * np.cos(roll)
@@ -124,19 +123,19 @@ def block(height: float) -> Terrain:
 
 @pytest.mark.parametrize("distance", [0.02, 0.05, 0.08])
 def test_before_an_edge_the_wheel_rests_on_the_edge(distance):
-    wheel = WheelOn(block(0.06), [-distance, 0.0, 0.3], FULL)
+    wheel = WheelOn(block(0.06), [-distance, 0.0, 0.3], SearchScope.FULL)
     above = 0.06 + np.sqrt(RADIUS**2 - distance**2)
     assert wheel.gap == pytest.approx(0.3 - above, abs=2e-4)
     assert wheel.angle == pytest.approx(np.arcsin(distance / RADIUS), abs=5e-3)
 
 
 def test_behind_an_edge_the_contact_is_behind_the_axle():
-    wheel = WheelOn(block(0.06), [-0.05, 0.0, 0.3], FULL, yaw=np.pi)
+    wheel = WheelOn(block(0.06), [-0.05, 0.0, 0.3], SearchScope.FULL, yaw=np.pi)
     assert wheel.angle == pytest.approx(-np.arcsin(0.5), abs=5e-3)
 
 
 def test_out_of_reach_of_an_edge_the_wheel_stands_on_the_ground():
-    wheel = WheelOn(block(0.06), [-0.12, 0.0, RADIUS], FULL)
+    wheel = WheelOn(block(0.06), [-0.12, 0.0, RADIUS], SearchScope.FULL)
     assert wheel.gap == pytest.approx(0.0, abs=1e-12)
     assert wheel.angle == pytest.approx(0.0, abs=1e-6)
 
@@ -153,8 +152,8 @@ def test_the_exact_gap_is_the_smallest_on_the_circles_looked_at(make, seed, roll
     ground = make(seed)
     x, y = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
     centre = [x, y, float(ground.elevation_at(x, y)) + RADIUS]
-    exact = WheelOn(ground, centre, EXACT, roll, pitch, yaw)
-    full = WheelOn(ground, centre, FULL, roll, pitch, yaw)
+    exact = WheelOn(ground, centre, SearchScope.EXACT, roll, pitch, yaw)
+    full = WheelOn(ground, centre, SearchScope.FULL, roll, pitch, yaw)
     dense = dense_gap(ground, centre, roll, pitch, yaw, circles(exact.samples))
     assert exact.gap == pytest.approx(dense, abs=2e-4)
     assert exact.gap <= full.gap + 2e-6
@@ -167,7 +166,7 @@ def test_the_touching_point_is_on_the_rim_and_in_the_gap_to_a_tenth_of_a_millime
     seed, roll, yaw
 ):
     ground = fractal(seed)
-    wheel = WheelOn(ground, [0.1, 0.2, 0.5], FULL, roll, 0.0, yaw)
+    wheel = WheelOn(ground, [0.1, 0.2, 0.5], SearchScope.FULL, roll, 0.0, yaw)
     point, axis = wheel.contacts.point[0], wheel.placement.R[:, 1]
     arm = point - [0.1, 0.2, 0.5]
     assert np.linalg.norm(arm - (arm @ axis) * axis) == pytest.approx(RADIUS, abs=1e-12)
@@ -180,12 +179,12 @@ def test_the_touching_point_is_on_the_rim_and_in_the_gap_to_a_tenth_of_a_millime
 @given(st.integers(0, 30), st.floats(-1e-3, 1e-3))
 def test_the_normal_says_how_the_gap_changes_sideways(seed, step):
     ground = smooth(seed)
-    here = WheelOn(ground, [0.1, 0.2, 0.3], FULL)
-    there = WheelOn(ground, [0.1 + step, 0.2, 0.3], FULL)
+    here = WheelOn(ground, [0.1, 0.2, 0.3], SearchScope.FULL)
+    there = WheelOn(ground, [0.1 + step, 0.2, 0.3], SearchScope.FULL)
     assert there.gap - here.gap == pytest.approx(here.contacts.normal[0, 0] * step, abs=5e-6)
 
 
-@pytest.mark.parametrize("scope", [FULL, EXACT])
+@pytest.mark.parametrize("scope", [SearchScope.FULL, SearchScope.EXACT])
 def test_unknown_ground_and_the_map_edge_are_told_apart(scope):
     ground = plane(0.0, 0.0)
     heights = ground.elevation.copy()

@@ -252,7 +252,7 @@ def load_changes(rover: Rover, torques: list[float]) -> np.ndarray:
     body = rover.masses.body
     linkage = pack_linkage(rover, body.mass, np.array(body.com))
     work, q = new_work(), np.zeros(6)
-    place(linkage, 0.0, 0.0, 0.0, q, work.placement)
+    place(linkage, work.pose, q, work.placement)
     place_masses(linkage, q, work.placement)
     work.contacts.sine[:], work.contacts.cosine[:] = 0.0, 1.0
     work.contacts.point[:] = work.placement.centres - [0.0, 0.0, rover.wheel.radius]

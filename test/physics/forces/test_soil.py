@@ -16,6 +16,7 @@ from rover_physics.forces.soil import (
     MIN_FRICTION,
     SHEAR_MODULUS,
     TAN_PHI,
+    SoilWheel,
     contact_length,
     coulomb_slip,
     effective_friction,
@@ -32,7 +33,14 @@ from rover_physics.terrain.soil_file import load_soils
 
 MU = 0.8
 RIGID = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
-SLIP, SINKAGE, RESISTANCE, LARGEST, TORQUE, UTILISATION = range(6)
+
+
+def solve(soil, mu, radius, width, N, T, S):
+    return solve_wheel(soil, SoilWheel(radius, width, mu), N, T, S)
+
+
+def friction_of(soil, mu, radius, width, N):
+    return effective_friction(soil, SoilWheel(radius, width, mu), N)
 
 
 def packed(name):
@@ -74,14 +82,14 @@ HAND = [
 
 @pytest.mark.parametrize(("name", "r", "b", "N", "z0", "R", "pull", "torque", "largest"), HAND)
 def test_the_model_gives_the_values_worked_by_hand(name, r, b, N, z0, R, pull, torque, largest):
-    result = solve_wheel(packed(name), MU, r, b, N, pull, 0.0)
-    assert result[SLIP] == pytest.approx(0.2, abs=2e-6)
-    assert result[SINKAGE] == pytest.approx(z0, rel=1e-6)
-    assert result[RESISTANCE] == pytest.approx(R, rel=1e-6)
-    assert result[TORQUE] == pytest.approx(torque, rel=1e-5)
-    assert result[LARGEST] == pytest.approx(largest, rel=5e-6)
-    assert result[UTILISATION] == pytest.approx(pull / largest, rel=5e-6)
-    assert effective_friction(packed(name), MU, r, b, N) == pytest.approx(largest / N, rel=5e-6)
+    result = solve(packed(name), MU, r, b, N, pull, 0.0)
+    assert result.slip_ratio == pytest.approx(0.2, abs=2e-6)
+    assert result.sinkage == pytest.approx(z0, rel=1e-6)
+    assert result.resistance == pytest.approx(R, rel=1e-6)
+    assert result.torque == pytest.approx(torque, rel=1e-5)
+    assert result.drawbar_pull == pytest.approx(largest, rel=5e-6)
+    assert result.utilisation == pytest.approx(pull / largest, rel=5e-6)
+    assert friction_of(packed(name), MU, r, b, N) == pytest.approx(largest / N, rel=5e-6)
 
 
 @pytest.mark.parametrize(("name", "r", "b", "N"), [case[:4] for case in HAND])
@@ -118,56 +126,56 @@ wheels = st.tuples(st.floats(0.05, 0.6), st.floats(0.03, 0.5))
 @settings(deadline=None)
 def test_slip_to_pull_and_back_is_the_same_slip(name, wheel, N, slip):
     soil, (r, b) = packed(name), wheel
-    result = solve_wheel(soil, MU, r, b, N, 0.0, 0.0)
-    assume(result[SINKAGE] < r)
-    pull = thrust_at_slip(soil, r, b, N, slip) - result[RESISTANCE]
+    result = solve(soil, MU, r, b, N, 0.0, 0.0)
+    assume(result.sinkage < r)
+    pull = thrust_at_slip(soil, r, b, N, slip) - result.resistance
     # Full slip of a long contact is the flat end of an exponential: digits of pull become slip.
-    steepness = contact_length(r, result[SINKAGE]) / soil[SHEAR_MODULUS]
-    again = solve_wheel(soil, MU, r, b, N, pull, 0.0)
-    if result[LARGEST] > 0.0:
-        assert again[UTILISATION] <= 1.0
-    assert again[SLIP] == pytest.approx(slip, abs=1e-10 * (1.0 + steepness))
+    steepness = contact_length(r, result.sinkage) / soil[SHEAR_MODULUS]
+    again = solve(soil, MU, r, b, N, pull, 0.0)
+    if result.drawbar_pull > 0.0:
+        assert again.utilisation <= 1.0
+    assert again.slip_ratio == pytest.approx(slip, abs=1e-10 * (1.0 + steepness))
 
 
 @given(names, wheels, loads, st.floats(-0.9, 0.9), st.floats(1e-6, 0.1))
 @settings(deadline=None)
 def test_slip_rises_with_the_pull_needed(name, wheel, N, share, more):
     soil, (r, b) = packed(name), wheel
-    largest = solve_wheel(soil, MU, r, b, N, 0.0, 0.0)[LARGEST]
+    largest = solve(soil, MU, r, b, N, 0.0, 0.0).drawbar_pull
     assume(largest > 0.0)
     less, pull = share * largest, (share + more) * largest
-    low = solve_wheel(soil, MU, r, b, N, less, 0.0)
-    high = solve_wheel(soil, MU, r, b, N, pull, 0.0)
-    assert low[SLIP] < high[SLIP]
-    assert low[TORQUE] < high[TORQUE]
+    low = solve(soil, MU, r, b, N, less, 0.0)
+    high = solve(soil, MU, r, b, N, pull, 0.0)
+    assert low.slip_ratio < high.slip_ratio
+    assert low.torque < high.torque
 
 
 @given(names, wheels, loads, st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 @settings(deadline=None)
 def test_forces_within_the_effective_friction_are_within_the_strength(name, wheel, N, t, s):
     soil, (r, b) = packed(name), wheel
-    friction = effective_friction(soil, MU, r, b, N)
+    friction = friction_of(soil, MU, r, b, N)
     assume(friction > MIN_FRICTION)
     T, S = t * friction * N, s * friction * N
-    result = solve_wheel(soil, MU, r, b, N, T, S)
+    result = solve(soil, MU, r, b, N, T, S)
     circle = math.hypot(t, s)
-    assert result[UTILISATION] <= circle * (1.0 + 1e-9)
-    thrust = math.hypot(T + result[RESISTANCE], S)
-    strength = result[LARGEST] + result[RESISTANCE]
+    assert result.utilisation <= circle * (1.0 + 1e-9)
+    thrust = math.hypot(T + result.resistance, S)
+    strength = result.drawbar_pull + result.resistance
     if abs(thrust / strength - 1.0) > 1e-9:
-        assert (result[UTILISATION] > 1.0) == (thrust > strength)
-    assert -1.0 <= result[SLIP] <= 1.0
+        assert (result.utilisation > 1.0) == (thrust > strength)
+    assert -1.0 <= result.slip_ratio <= 1.0
 
 
 @given(names, wheels, loads, st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
 @settings(deadline=None)
 def test_utilisation_is_the_share_of_the_largest_forces_in_that_direction(name, wheel, N, t, s):
     soil, (r, b) = packed(name), wheel
-    largest = solve_wheel(soil, MU, r, b, N, 0.0, 0.0)[LARGEST]
+    largest = solve(soil, MU, r, b, N, 0.0, 0.0).drawbar_pull
     assume(largest > 1e-3 * N and math.hypot(t, s) > 1e-3)
-    used = solve_wheel(soil, MU, r, b, N, t * largest, s * largest)[UTILISATION]
+    used = solve(soil, MU, r, b, N, t * largest, s * largest).utilisation
     T, S = t * largest / used, s * largest / used
-    resistance = solve_wheel(soil, MU, r, b, N, T, S)[RESISTANCE]
+    resistance = solve(soil, MU, r, b, N, T, S).resistance
     assert math.hypot(T + resistance, S) == pytest.approx(largest + resistance, rel=1e-9)
 
 
@@ -202,35 +210,35 @@ def test_thrust_starts_with_half_the_strength_over_the_shear_modulus(name):
 @pytest.mark.parametrize("name", RIGID)
 def test_slip_is_one_at_the_largest_pull_and_beyond(name):
     soil, wheel = packed(name), (0.2, 0.15, 80.0)
-    largest = solve_wheel(soil, MU, *wheel, 0.0, 0.0)[LARGEST]
-    at = solve_wheel(soil, MU, *wheel, largest * (1.0 - 1e-12), 0.0)
-    beyond = solve_wheel(soil, MU, *wheel, largest * 1.5, 0.0)
-    assert at[SLIP] == pytest.approx(1.0, abs=1e-9)
-    assert (beyond[SLIP], beyond[UTILISATION]) == (1.0, pytest.approx(1.5))
-    assert beyond[TORQUE] == pytest.approx(0.2 * (1.5 * largest + beyond[RESISTANCE]))
-    assert thrust_at_slip(soil, *wheel, 1.0) == pytest.approx(largest + beyond[RESISTANCE])
+    largest = solve(soil, MU, *wheel, 0.0, 0.0).drawbar_pull
+    at = solve(soil, MU, *wheel, largest * (1.0 - 1e-12), 0.0)
+    beyond = solve(soil, MU, *wheel, largest * 1.5, 0.0)
+    assert at.slip_ratio == pytest.approx(1.0, abs=1e-9)
+    assert (beyond.slip_ratio, beyond.utilisation) == (1.0, pytest.approx(1.5))
+    assert beyond.torque == pytest.approx(0.2 * (1.5 * largest + beyond.resistance))
+    assert thrust_at_slip(soil, *wheel, 1.0) == pytest.approx(largest + beyond.resistance)
 
 
 @pytest.mark.parametrize("name", RIGID)
 def test_a_wheel_that_is_dragged_against_its_resistance_rolls_freely(name):
     soil, wheel = packed(name), (0.2, 0.15, 80.0)
-    resistance = solve_wheel(soil, MU, *wheel, 0.0, 0.0)[RESISTANCE]
-    free = solve_wheel(soil, MU, *wheel, -resistance, 0.0)
-    braked = solve_wheel(soil, MU, *wheel, -1.2 * resistance, 0.0)
-    locked = solve_wheel(soil, MU, *wheel, -10.0 * 80.0, 0.0)
-    assert free[SLIP] == 0.0 and free[TORQUE] == 0.0
-    assert -1.0 < braked[SLIP] < 0.0 and braked[TORQUE] < 0.0
-    assert locked[SLIP] == -1.0 and locked[UTILISATION] > 1.0
+    resistance = solve(soil, MU, *wheel, 0.0, 0.0).resistance
+    free = solve(soil, MU, *wheel, -resistance, 0.0)
+    braked = solve(soil, MU, *wheel, -1.2 * resistance, 0.0)
+    locked = solve(soil, MU, *wheel, -10.0 * 80.0, 0.0)
+    assert free.slip_ratio == 0.0 and free.torque == 0.0
+    assert -1.0 < braked.slip_ratio < 0.0 and braked.torque < 0.0
+    assert locked.slip_ratio == -1.0 and locked.utilisation > 1.0
 
 
 def test_a_lateral_force_needs_more_slip_but_makes_none_alone():
     soil, wheel = packed("dry_sand"), (0.2, 0.15, 80.0)
-    straight = solve_wheel(soil, MU, *wheel, 8.0, 0.0)
-    resistance = straight[RESISTANCE]
-    right, left = (solve_wheel(soil, MU, *wheel, 8.0, S) for S in (-9.0, 9.0))
+    straight = solve(soil, MU, *wheel, 8.0, 0.0)
+    resistance = straight.resistance
+    right, left = (solve(soil, MU, *wheel, 8.0, S) for S in (-9.0, 9.0))
     assert right == left
-    assert right[SLIP] > straight[SLIP] and right[UTILISATION] > straight[UTILISATION]
-    assert solve_wheel(soil, MU, *wheel, -resistance, 9.0)[SLIP] == 0.0
+    assert right.slip_ratio > straight.slip_ratio and right.utilisation > straight.utilisation
+    assert solve(soil, MU, *wheel, -resistance, 9.0).slip_ratio == 0.0
 
 
 @given(names, wheels, loads, st.floats(1.01, 5.0))
@@ -245,11 +253,11 @@ def test_a_heavier_wheel_sinks_deeper(name, wheel, N, factor):
 def test_the_largest_pull_rises_with_the_friction_angle_and_the_cohesion(name, wheel, N, factor):
     soil = packed(name)
     assume(find_sinkage(soil, *wheel, N) < wheel[0])
-    before = solve_wheel(soil, MU, *wheel, N, 0.0, 0.0)[LARGEST]
+    before = solve(soil, MU, *wheel, N, 0.0, 0.0).drawbar_pull
     for column in (TAN_PHI, COHESION):
         stronger = soil.copy()
         stronger[column] *= factor
-        assert solve_wheel(stronger, MU, *wheel, N, 0.0, 0.0)[LARGEST] > before
+        assert solve(stronger, MU, *wheel, N, 0.0, 0.0).drawbar_pull > before
 
 
 @given(names, wheels, loads, st.floats(1.01, 5.0))
@@ -258,10 +266,10 @@ def test_a_softer_soil_lets_a_wheel_sink_deeper_against_more_resistance(name, wh
     soil, softer = packed(name), packed(name)
     softer[K_C] /= factor
     softer[K_PHI] /= factor
-    firm = solve_wheel(soil, MU, *wheel, N, 0.0, 0.0)
-    soft = solve_wheel(softer, MU, *wheel, N, 0.0, 0.0)
-    assert soft[SINKAGE] > firm[SINKAGE]
-    assert soft[RESISTANCE] > firm[RESISTANCE]
+    firm = solve(soil, MU, *wheel, N, 0.0, 0.0)
+    soft = solve(softer, MU, *wheel, N, 0.0, 0.0)
+    assert soft.sinkage > firm.sinkage
+    assert soft.resistance > firm.resistance
 
 
 @pytest.mark.parametrize("name", RIGID)
@@ -272,11 +280,11 @@ def test_without_cohesion_a_softer_soil_pulls_less_once_the_contact_is_long(name
     long = math.sqrt(2.0 * soil[SHEAR_MODULUS] * 2.0 * radius)
     pulls = []
     for _ in range(300):
-        result = solve_wheel(soil, MU, radius, width, N, 0.0, 0.0)
-        if result[SINKAGE] > radius:
+        result = solve(soil, MU, radius, width, N, 0.0, 0.0)
+        if result.sinkage > radius:
             break
-        if contact_length(radius, result[SINKAGE]) > long:
-            pulls.append(result[LARGEST])
+        if contact_length(radius, result.sinkage) > long:
+            pulls.append(result.drawbar_pull)
         soil[K_C] *= 0.97
         soil[K_PHI] *= 0.97
     assert len(pulls) > 50
@@ -285,22 +293,22 @@ def test_without_cohesion_a_softer_soil_pulls_less_once_the_contact_is_long(name
 
 def test_a_wheel_sunk_to_its_axle_gives_no_pull():
     soil = packed("mars_simulant")
-    result = solve_wheel(soil, MU, 0.1, 0.08, 2000.0, 1.0, 0.0)
-    assert result[SINKAGE] > 0.1
-    assert not is_sinkage_moderate(result[SINKAGE], 0.1)
-    assert result[LARGEST] == -result[RESISTANCE] < 0.0
-    assert result[SLIP] == 1.0 and result[UTILISATION] == np.inf
-    assert effective_friction(soil, MU, 0.1, 0.08, 2000.0) == MIN_FRICTION
+    result = solve(soil, MU, 0.1, 0.08, 2000.0, 1.0, 0.0)
+    assert result.sinkage > 0.1
+    assert not is_sinkage_moderate(result.sinkage, 0.1)
+    assert result.drawbar_pull == -result.resistance < 0.0
+    assert result.slip_ratio == 1.0 and result.utilisation == np.inf
+    assert friction_of(soil, MU, 0.1, 0.08, 2000.0) == MIN_FRICTION
 
 
 def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged():
     soil = packed("mars_simulant")
     wheel = (0.1, 0.08, 90.0)
-    idle = solve_wheel(soil, MU, *wheel, 0.0, 0.0)
-    assert idle[SINKAGE] < 0.1 and idle[LARGEST] < 0.0
-    assert idle[UTILISATION] == np.inf and idle[SLIP] == 1.0
-    dragged = solve_wheel(soil, MU, *wheel, -idle[RESISTANCE], 0.0)
-    assert dragged[UTILISATION] == 0.0 and dragged[SLIP] == 0.0
+    idle = solve(soil, MU, *wheel, 0.0, 0.0)
+    assert idle.sinkage < 0.1 and idle.drawbar_pull < 0.0
+    assert idle.utilisation == np.inf and idle.slip_ratio == 1.0
+    dragged = solve(soil, MU, *wheel, -idle.resistance, 0.0)
+    assert dragged.utilisation == 0.0 and dragged.slip_ratio == 0.0
 
 
 def test_sinkage_is_moderate_up_to_a_sixth_of_the_diameter():
@@ -312,21 +320,21 @@ def test_sinkage_is_moderate_up_to_a_sixth_of_the_diameter():
 @pytest.mark.parametrize("N", [0.0, -5.0, math.nan])
 def test_a_lifted_wheel_has_no_grip(name, N):
     soil = pack_soils(default=name)[0]
-    slip, sinkage, resistance, largest, torque, utilisation = solve_wheel(
+    slip, sinkage, resistance, largest, torque, utilisation = solve(
         soil, MU, 0.1, 0.08, N, 2.0, 0.0
     )
     assert (slip, sinkage, resistance, largest) == (1.0, 0.0, 0.0, 0.0)
     assert (torque, utilisation) == (0.2, np.inf)
     if name is not None:
-        assert effective_friction(soil, MU, 0.1, 0.08, N) == MIN_FRICTION
+        assert friction_of(soil, MU, 0.1, 0.08, N) == MIN_FRICTION
 
 
 @pytest.mark.parametrize("name", RIGID)
 def test_the_smallest_load_keeps_its_digits(name):
     soil = packed(name)
-    result = solve_wheel(soil, MU, 0.1, 0.08, 1e-9, 1e-11, 0.0)
+    result = solve(soil, MU, 0.1, 0.08, 1e-9, 1e-11, 0.0)
     assert all(math.isfinite(value) for value in result)
-    assert 0.0 < result[SLIP] <= 1.0
+    assert 0.0 < result.slip_ratio <= 1.0
 
 
 # Coulomb ground.
@@ -335,20 +343,18 @@ def test_the_smallest_load_keeps_its_digits(name):
 @given(st.floats(0.1, 1000.0), st.floats(-1000.0, 1000.0), st.floats(-1000.0, 1000.0))
 def test_coulomb_ground_sticks_or_slips(N, T, S):
     soil = pack_soils()[0]
-    slip, sinkage, resistance, largest, torque, utilisation = solve_wheel(
-        soil, MU, 0.1, 0.08, N, T, S
-    )
+    slip, sinkage, resistance, largest, torque, utilisation = solve(soil, MU, 0.1, 0.08, N, T, S)
     assert (sinkage, resistance, largest) == (0.0, 0.0, MU * N)
     assert utilisation == pytest.approx(math.hypot(T, S) / (MU * N))
     assert torque == 0.1 * T
     assert slip == coulomb_slip(utilisation) == (0.0 if utilisation <= 1.0 else 1.0)
-    assert effective_friction(soil, MU, 0.1, 0.08, N) == MU
+    assert friction_of(soil, MU, 0.1, 0.08, N) == MU
 
 
 def test_a_coulomb_soil_with_friction_of_its_own_keeps_it():
     soil = packed("firm_ground")
     own = load_soils()["firm_ground"].friction
-    assert effective_friction(soil, 0.3, 0.1, 0.08, 10.0) == own
+    assert friction_of(soil, 0.3, 0.1, 0.08, 10.0) == own
 
 
 # Packing.

@@ -4,10 +4,17 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.evaluation import new_results
-from rover_physics.prediction.path_kernels import add_up, divide_stretches, find_jumps, sort_pieces
+from rover_physics.prediction.path_kernels import (
+    JumpLimits,
+    PathPoints,
+    add_up,
+    divide_stretches,
+    find_jumps,
+    sort_pieces,
+)
 from rover_physics.status import PoseStatus
 
-HEIGHT_JUMP, MIN_SPACING = 0.025, 1e-4
+LIMITS = JumpLimits(max_spacing=0.1, min_spacing=1e-4, height=0.025)
 
 
 def results_with(contact_angles, statuses=PoseStatus.SETTLED, heights=0.0):
@@ -31,16 +38,15 @@ def jumps_of(results, spacing=0.02, joined=None):
     ends = np.empty((n, 2), np.int64)
     joined = np.ones(n - 1, bool) if joined is None else np.array(joined)
     poses = along_x(spacing * np.arange(n))
-    count = find_jumps(results, poses, joined, 0.1, HEIGHT_JUMP, ends)
+    count = find_jumps(results, poses, joined, LIMITS, ends)
     return ends[:count].tolist()
 
 
 def sorted_pieces(results, xs, pieces=4):
     """Return open and closed pieces of one stretch: its ends, then the rows between them."""
     spare = np.empty((2, pieces, 2), np.int64)
-    n_open, n_closed = sort_pieces(
-        np.array([[0, 1]]), pieces, results, along_x(xs), HEIGHT_JUMP, MIN_SPACING, *spare
-    )
+    known = PathPoints(np.empty(0), np.empty(0, np.int64), along_x(xs), results)
+    n_open, n_closed = sort_pieces(np.array([[0, 1]]), pieces, known, LIMITS, spare)
     return spare[0, :n_open].tolist(), spare[1, :n_closed].tolist()
 
 
@@ -68,7 +74,8 @@ def test_stretches_are_divided_evenly_and_turned_the_shorter_way():
     ends, place = np.array([[0, 1]]), np.array([3.0, 4.0])
     poses = np.array([[0.0, 0.0, 3.0], [0.4, -0.8, -3.0]])
     new_place, new_waypoint, new_poses = np.empty(3), np.empty(3, np.int64), np.empty((3, 3))
-    divide_stretches(ends, 4, place, np.array([4, 4]), poses, new_place, new_waypoint, new_poses)
+    known = PathPoints(place, np.array([4, 4]), poses, new_results(2))
+    divide_stretches(ends, 4, known, (new_place, new_waypoint, new_poses))
     assert new_place.tolist() == [3.25, 3.5, 3.75] and new_waypoint.tolist() == [4, 4, 4]
     assert new_poses[:, :2] == pytest.approx(np.array([[0.1, -0.2], [0.2, -0.4], [0.3, -0.6]]))
     turn = 2.0 * np.pi - 6.0
