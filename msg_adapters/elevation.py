@@ -26,6 +26,7 @@ from msg_adapters.gridding import (
     rounding_error,
     typical_spacing,
 )
+from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 
 CELL_HEIGHTS = ("max", "mean")
@@ -124,7 +125,20 @@ def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
         std = raster.arrange(points["elevation_std"])
         std[unknown] = np.nan
     grid = raster.grid
-    return Terrain(elevation, grid.resolution, grid.origin, friction, elevation_std=std)
+    return _make_terrain(grid, elevation, friction, std)
+
+
+def _make_terrain(
+    grid: CellGrid,
+    elevation: NDArray[np.float64],
+    friction: NDArray[np.float64] | None,
+    std: NDArray[np.float64] | None,
+) -> Terrain:
+    """Return the terrain of layers that were made for it: sealed, so that none is copied."""
+    layers = [None if layer is None else seal_array(layer) for layer in (friction, std)]
+    return Terrain(
+        seal_array(elevation), grid.resolution, grid.origin, layers[0], elevation_std=layers[1]
+    )
 
 
 def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str) -> Terrain:
@@ -153,7 +167,7 @@ def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str
     std = None
     if points.elevation_std is not None:
         std = combine(cells, points.elevation_std[known], grid, "max")
-    return Terrain(elevation, grid.resolution, grid.origin, friction, elevation_std=std)
+    return _make_terrain(grid, elevation, friction, std)
 
 
 def terrain_to_point_cloud(

@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rover_physics.numerics.addresses import read_float
 from rover_physics.numerics.kernels import kernel
-from rover_physics.terrain.ground import BLOCK, elevation_of, look_up
+from rover_physics.terrain.ground import BLOCK, elevation_of, known_max_of_block, look_up
 
 HALF = 0.5 * (BLOCK - 1)
 """Distance of a block's outer rows and columns from its middle, in cells."""
@@ -54,7 +53,7 @@ def belly_clearance(ground, linkage, placement):
     nearest, nearest_i, nearest_j = np.inf, low_i, low_j
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
-            bound = _lowest_above(plane, bi, bj) - _known_max_of(ground, bi, bj)
+            bound = _lowest_above(plane, bi, bj) - known_max_of_block(ground, bi, bj)
             if bound < nearest and _is_below(plane, belly, bi, bj):
                 nearest, nearest_i, nearest_j = bound, bi, bj
     smallest = np.inf
@@ -62,17 +61,11 @@ def belly_clearance(ground, linkage, placement):
         smallest = _clear_block(ground, plane, belly, (nearest_i, nearest_j), np.inf)
     for bi in range(low_i, high_i + 1):
         for bj in range(low_j, high_j + 1):
-            if _lowest_above(plane, bi, bj) - _known_max_of(
+            if _lowest_above(plane, bi, bj) - known_max_of_block(
                 ground, bi, bj
             ) < smallest and _is_below(plane, belly, bi, bj):
                 smallest = _clear_block(ground, plane, belly, (bi, bj), smallest)
     return smallest if smallest < np.inf else _clear_points(ground, R, origin, belly)
-
-
-@kernel
-def _known_max_of(ground, bi, bj):
-    """Return the highest known ground [m] of a block, -inf where none is known."""
-    return read_float(ground.known_block_max, bi * ground.block_columns + bj)
 
 
 @kernel

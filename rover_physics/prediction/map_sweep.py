@@ -13,6 +13,7 @@ from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.evaluation import effort, evaluate_pose, new_works, set_pose
 from rover_physics.prediction.packed_model import PackedModel, pack_model
@@ -48,6 +49,9 @@ class PoseScores:
     """Angle between body z and the vertical [rad]."""
     belly_clearance: Floats
     """Smallest height of the underside above the ground [m]."""
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
 
     def within_limits(self, rover: Rover) -> NDArray[np.bool_]:
         """Tell where the rover keeps the limits of its file, but for sinkage and suspension."""

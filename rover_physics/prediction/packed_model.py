@@ -28,6 +28,12 @@ class PackedModel:
     ground: Ground
     """The terrain that the record points to; it lives as long as this."""
 
+    def __reduce__(self) -> str:
+        raise TypeError(
+            "a PackedModel holds addresses of this process and cannot be pickled; "
+            "pickle rover, terrain and options"
+        )
+
     @property
     def record(self) -> Any:
         """The MODEL itself."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.status import BoundStatus
 
 Floats = NDArray[np.float64]
@@ -15,6 +16,7 @@ class PathBounds:
     """Bounds along a path of n waypoints: smallest and largest value in the last axis.
 
     The values and their units are those of `PathPrediction`. NaN where a waypoint has no bounds.
+    All arrays are read-only.
     """
 
     sigmas: float
@@ -41,6 +43,9 @@ class PathBounds:
     """(n, 6, 2)."""
     sinkage: Floats
     """(n, 6, 2) [m]."""
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
 
     @property
     def bounded(self) -> NDArray[np.bool_]:

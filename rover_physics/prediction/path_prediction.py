@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.prediction.path_bounds import PathBounds
 
 Floats = NDArray[np.float64]
@@ -12,7 +13,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PathPrediction:
-    """The rover along a path of n waypoints; NaN where it did not settle; order as in `names`."""
+    """The rover along a path of n waypoints; NaN where it did not settle; order as in `names`.
+
+    All arrays are read-only.
+    """
 
     poses: Floats
     """(n, 3) x, y [m] and yaw [rad] of the body origin, map frame, as asked for."""
@@ -84,3 +88,6 @@ class PathPrediction:
     """Torque policy: "equal" or "optimal"."""
     bounds: PathBounds | None = None
     """Bounds on all this where the map is uncertain, added by `judge_path`."""
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)

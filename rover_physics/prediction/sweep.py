@@ -120,13 +120,13 @@ def _predict(
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:
-    """Return poses as float array (n, 3).
+    """Return a copy of poses as float array (n, 3).
 
     Raises:
         PoseError: Wrong shape or type, no pose, or values that are not finite.
     """
     try:
-        array = np.ascontiguousarray(poses, dtype=np.float64)
+        array = np.array(poses, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise PoseError(f"poses are not numbers: {error}") from error
     if array.ndim != 2 or array.shape[1] != 3 or not len(array):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.errors import TerrainError
+from rover_physics.numerics.read_only import freeze_array, seal_array
 from rover_physics.terrain.checks import (
     as_elevation,
     as_elevation_std,
@@ -28,7 +29,8 @@ class Terrain:
     """Ground heights on a regular grid in the map frame.
 
     Cell [j, i] is centred at x = origin[0] + i * resolution, y = origin[1] + j * resolution.
-    Arrays are taken as they are where type and layout fit, not copied: do not write into them.
+    Arrays are read-only: one that somebody else could write into is copied, so that what is
+    worked out of a terrain never goes stale.
 
     Raises:
         TerrainError: Wrong shape or type, resolution not above 0, infinite heights, no known cell,
@@ -71,7 +73,8 @@ class Terrain:
         if self.elevation_std is not None:
             checked["elevation_std"] = as_elevation_std(self.elevation_std, elevation)
         for name, value in checked.items():
-            object.__setattr__(self, name, value)
+            frozen = freeze_array(value) if isinstance(value, np.ndarray) else value
+            object.__setattr__(self, name, frozen)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -235,7 +238,7 @@ def _read_npz(path: Path) -> dict[str, Any]:
         with archive:
             entries = {}
             for name in (key for key in wanted if key in archive.files):
-                entries[name] = archive[name]
+                entries[name] = seal_array(archive[name])
             return entries
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         if isinstance(error, OSError) and error.strerror:
@@ -286,7 +289,7 @@ def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> N
         right_side[~inner] += elevation[rows + down, columns + along][~inner]
     filled = elevation.copy()
     filled[gaps] = linalg.spsolve(matrix.tocsc(), right_side)
-    return filled
+    return seal_array(filled)
 
 
 def _fill_with_largest(std: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:

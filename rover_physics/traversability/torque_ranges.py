@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
+from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_prediction import Floats
@@ -42,6 +43,9 @@ class TorqueRanges:
     """(n, 6) lowest torque of each wheel [N m], NaN where not feasible."""
     highest: Floats
     """(n, 6) highest torque of each wheel [N m], NaN where not feasible."""
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
 
 
 @dataclass(frozen=True, eq=False)

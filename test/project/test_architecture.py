@@ -1,0 +1,145 @@
+"""The house: imports run one way between rooms, no folder is crowded, kernels stay small."""
+
+import ast
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import pytest
+
+TOP = Path(__file__).resolve().parents[2]
+PACKAGES = ("rover_physics", "msg_adapters", "rover_planner")
+MAX_ENTRIES = 16
+"""Files and folders that a person finds in one folder."""
+MAX_LINES = 400
+MAX_KERNEL_ARGUMENTS = 5
+
+
+@lru_cache
+def modules() -> dict[str, Path]:
+    """Return all modules of the packages by their dotted names."""
+    found = {}
+    for package in PACKAGES:
+        for path in sorted((TOP / package).rglob("*.py")):
+            parts = path.relative_to(TOP).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imported_by(path: Path) -> Iterator[str]:
+    """Yield the modules of the packages that a file imports, wherever in the file it does."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        for name in names:
+            while name and name not in modules():
+                name = name.rpartition(".")[0]
+            if name:
+                yield name
+
+
+@lru_cache
+def imports() -> dict[str, frozenset[str]]:
+    """Return what each module imports; the façade of a package names what it holds as text."""
+    return {
+        name: frozenset(imported_by(path)) - {name}
+        for name, path in modules().items()
+        if path.name != "__init__.py"
+    }
+
+
+def room_of(module: str) -> str:
+    """Return the folder a module is in; a file at the top of a package is a room of its own."""
+    return module if module.count(".") < 2 else module.rpartition(".")[0]
+
+
+def find_circle(arrows: dict[str, set[str]]) -> list[str]:
+    """Return nodes that form a circle, nothing where there is none."""
+    done: set[str] = set()
+
+    def visit(node: str, way: list[str]) -> list[str]:
+        if node in way:
+            return [*way[way.index(node) :], node]
+        if node in done:
+            return []
+        for other in sorted(arrows.get(node, ())):
+            circle = visit(other, [*way, node])
+            if circle:
+                return circle
+        done.add(node)
+        return []
+
+    for node in sorted(arrows):
+        circle = visit(node, [])
+        if circle:
+            return circle
+    return []
+
+
+def test_no_circle_of_imports_between_modules():
+    circle = find_circle({name: set(others) for name, others in imports().items()})
+    assert not circle, " -> ".join(circle)
+
+
+def test_imports_run_one_way_between_rooms():
+    arrows: dict[str, set[str]] = {}
+    for name, others in imports().items():
+        beyond = {room_of(other) for other in others} - {room_of(name)}
+        arrows.setdefault(room_of(name), set()).update(beyond)
+    circle = find_circle(arrows)
+    assert not circle, " -> ".join(circle)
+
+
+def test_a_circle_would_be_found():
+    assert find_circle({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == ["a", "b", "c", "a"]
+    assert find_circle({"a": {"b", "c"}, "b": {"c"}}) == []
+
+
+def folders() -> list[Path]:
+    tops = [TOP / name for name in (*PACKAGES, "test", "support", "config", "docs")]
+    below = [path for top in tops for path in sorted(top.rglob("*")) if path.is_dir()]
+    return [path for path in [*tops, *below] if path.name != "__pycache__"]
+
+
+@pytest.mark.parametrize("folder", folders(), ids=lambda path: str(path.relative_to(TOP)))
+def test_no_folder_is_crowded(folder):
+    entries = [
+        path.name
+        for path in folder.iterdir()
+        if path.name not in ("__pycache__", "__init__.py", "__main__.py")
+        and path.suffix not in (".png", ".npz")
+    ]
+    assert len(entries) <= MAX_ENTRIES, sorted(entries)
+
+
+@pytest.mark.parametrize("name", sorted(modules()))
+def test_a_file_holds_one_concept(name):
+    assert len(modules()[name].read_text(encoding="utf-8").splitlines()) <= MAX_LINES
+
+
+def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:
+    for name, path in modules().items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                decorators = [getattr(item, "id", "") for item in node.decorator_list]
+                if any(decorator.endswith("kernel") for decorator in decorators):
+                    yield f"{name}.{node.name}", node
+
+
+def test_kernels_take_few_arguments():
+    counts = {name: len(node.args.args) for name, node in kernels()}
+    assert len(counts) > 150
+    assert {k: n for k, n in counts.items() if n > MAX_KERNEL_ARGUMENTS} == {}
+
+
+def test_public_kernels_say_what_they_do():
+    silent = [
+        name
+        for name, node in kernels()
+        if not node.name.startswith("_") and not ast.get_docstring(node)
+    ]
+    assert silent == []

@@ -1,0 +1,48 @@
+"""The API of rover_physics: its names work from the package, and cost nothing before their use."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import rover_physics
+
+
+def run(code: str) -> str:
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
+    ).stdout
+
+
+def test_a_path_is_judged_with_names_of_the_package_alone():
+    from rover_physics import SweepOptions, Terrain, judge_path, load_rover, score_poses
+
+    terrain = Terrain(np.zeros((120, 120)), 0.05, (-3.0, -3.0))
+    poses = [[0.02 * k, 0.0, 0.0] for k in range(4)]
+    prediction, verdict = judge_path(
+        load_rover("lsr1"), terrain, poses, SweepOptions(policy="optimal")
+    )
+    assert verdict.traversable and prediction.settled.all()
+    assert score_poses(load_rover("lsr1"), terrain, poses).tilt.shape == (4,)
+
+
+def test_every_name_of_the_api_is_there():
+    for name in rover_physics.__all__:
+        assert getattr(rover_physics, name) is not None, name
+    assert set(rover_physics.__all__) <= set(dir(rover_physics))
+
+
+def test_a_name_that_is_not_there_is_refused_by_name():
+    with pytest.raises(AttributeError, match="jugde_path"):
+        _ = rover_physics.jugde_path
+
+
+def test_nothing_is_imported_before_its_use():
+    loaded = run("import sys, rover_physics; print([m for m in sys.modules if 'numba' in m])")
+    assert loaded.strip() == "[]"
+    loaded = run(
+        "import sys; from rover_physics import load_rover; load_rover('lsr1');"
+        "print([m for m in sys.modules if m.startswith('numba')][:3])"
+    )
+    assert loaded.strip() == "[]"
