@@ -159,7 +159,7 @@ def test_what_is_no_complete_map_is_not_taken_for_one():
     uneven = rows + np.array([0.02, 0.0, 0.0]) * (np.arange(11) > 5)[:, None]
     for points in (shifted, unplaced, twice, gap, uneven):
         assert detect_raster(points[:, :, 0], points[:, :, 1]) is None
-    expected = rough_terrain().elevation
+    expected = rough_terrain().elevation.copy()
     expected[3, 4] = np.nan
     terrain = terrain_from_point_cloud(cloud_of(unplaced.reshape(-1, 3), height=7))
     np.testing.assert_array_equal(terrain.elevation, expected)
