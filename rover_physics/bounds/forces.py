@@ -28,15 +28,15 @@ from rover_physics.rover.linkage import place, place_masses
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import SOIL_NUMBERS, copy_soil, friction_at, soil_row_at
 
-HEIGHT, ANGLE, PLACE = 0, 6, 12
+HEIGHT_INPUTS, ANGLE_INPUTS, PLACE_INPUTS = 0, 6, 12
 """Where the heights of the wheels [m], the angles [rad] and the places of their contacts [m] begin
 among the inputs."""
-INPUTS = 18
-LOAD, PULL, SIDE, USE, TIP = 0, 6, 12, 18, 24
+INPUT_COUNT = 18
+LOAD_OUTPUTS, PULL_OUTPUTS, SIDE_OUTPUTS, USE_OUTPUTS, TIP_OUTPUTS = 0, 6, 12, 18, 24
 """Where loads, tractions, lateral forces (all in weights), utilisations and tip-over angles [rad]
 begin among the outputs."""
-OUTPUTS = 24 + CORNERS
-MIN_LOAD = 1e-6
+OUTPUT_COUNT = 24 + CORNERS
+MIN_LOAD_SHARE = 1e-6
 """Load, in weights, that counts where there is less, so that one may divide by it."""
 TOGETHER = 2.0
 """Sum of the squares of the contact angles' deviations, in their intervals: the errors under
@@ -46,24 +46,24 @@ MAX_SOILS = 32
 """Largest number of soils on a map, the default included."""
 
 BOX = record_type(
-    ("base", float, (INPUTS,)),  # the nominal inputs
-    ("low", float, (INPUTS,)),  # their smallest
-    ("high", float, (INPUTS,)),  # and largest values
-    ("at", float, (INPUTS,)),  # a point of the box
-    ("value", float, (OUTPUTS,)),  # the outputs there
-    ("base_value", float, (OUTPUTS,)),  # the nominal outputs
-    ("gain_low", float, (INPUTS, OUTPUTS)),  # change of the outputs with one input at its lowest
-    ("gain_high", float, (INPUTS, OUTPUTS)),  # the same with one at its highest
-    ("smallest", float, (OUTPUTS,)),  # smallest outputs
-    ("largest", float, (OUTPUTS,)),  # largest outputs
+    ("base", float, (INPUT_COUNT,)),  # the nominal inputs
+    ("low", float, (INPUT_COUNT,)),  # their smallest
+    ("high", float, (INPUT_COUNT,)),  # and largest values
+    ("at", float, (INPUT_COUNT,)),  # a point of the box
+    ("value", float, (OUTPUT_COUNT,)),  # the outputs there
+    ("base_value", float, (OUTPUT_COUNT,)),  # the nominal outputs
+    ("gain_low", float, (INPUT_COUNT, OUTPUT_COUNT)),  # change of outputs, one input at its lowest
+    ("gain_high", float, (INPUT_COUNT, OUTPUT_COUNT)),  # the same with one at its highest
+    ("smallest", float, (OUTPUT_COUNT,)),  # smallest outputs
+    ("largest", float, (OUTPUT_COUNT,)),  # largest outputs
     ("mu_low", float, (6,)),  # smallest friction coefficient that a wheel may touch
     ("mu_high", float, (6,)),  # largest one
     ("soils", np.int64, (6, MAX_SOILS)),  # rows of the soils that it may touch
     ("soil_count", np.int64, (6,)),  # number of these
     ("soil", float, (SOIL_NUMBERS,)),  # one of them
-    ("aim", float, (OUTPUTS,)),  # weights of the outputs in the sum that is taken to its extreme
-    ("gain", float, (INPUTS,)),  # change of that sum with one input at its better end
-    ("end", float, (INPUTS,)),  # that end
+    ("aim", float, (OUTPUT_COUNT,)),  # weights of the outputs in the sum that is made extreme
+    ("gain", float, (INPUT_COUNT,)),  # change of that sum with one input at its better end
+    ("end", float, (INPUT_COUNT,)),  # that end
     ("columns", np.int64),  # columns of the balance that the torque policy needs
 )
 """The box of inputs, and the outputs over it."""
@@ -86,34 +86,37 @@ def bound_forces(model, work):
     )
     if not _choose_torques(model, work):
         return False
-    for output in range(OUTPUTS):
+    for output in range(OUTPUT_COUNT):
         box.base_value[output] = box.smallest[output] = box.largest[output] = box.value[output]
     if not _find_gains(model, work):
         return False
     for wheel in range(6):
-        _bound_output(model, work, LOAD + wheel)
+        _bound_output(model, work, LOAD_OUTPUTS + wheel)
         if wheel == 0 or box.columns > 1:
-            _bound_output(model, work, PULL + wheel)
+            _bound_output(model, work, PULL_OUTPUTS + wheel)
         else:
-            box.smallest[PULL + wheel] = box.smallest[PULL]
-            box.largest[PULL + wheel] = box.largest[PULL]
+            box.smallest[PULL_OUTPUTS + wheel] = box.smallest[PULL_OUTPUTS]
+            box.largest[PULL_OUTPUTS + wheel] = box.largest[PULL_OUTPUTS]
         _bound_use(model, work, wheel)
     for edge in range(CORNERS):
-        _bound_output(model, work, TIP + edge)
+        _bound_output(model, work, TIP_OUTPUTS + edge)
     return True
 
 
 @kernel
 def _fill_box(spread, contact_bounds, box):
     for wheel in range(6):
-        box.base[HEIGHT + wheel] = 0.0
-        box.low[HEIGHT + wheel], box.high[HEIGHT + wheel] = spread.low[wheel], spread.high[wheel]
-        box.base[ANGLE + wheel] = contact_bounds.angle[wheel]
-        box.low[ANGLE + wheel] = contact_bounds.angle_low[wheel]
-        box.high[ANGLE + wheel] = contact_bounds.angle_high[wheel]
-        box.base[PLACE + wheel] = contact_bounds.lateral[wheel]
-        box.low[PLACE + wheel] = contact_bounds.lateral_low[wheel]
-        box.high[PLACE + wheel] = contact_bounds.lateral_high[wheel]
+        box.base[HEIGHT_INPUTS + wheel] = 0.0
+        box.low[HEIGHT_INPUTS + wheel], box.high[HEIGHT_INPUTS + wheel] = (
+            spread.low[wheel],
+            spread.high[wheel],
+        )
+        box.base[ANGLE_INPUTS + wheel] = contact_bounds.angle[wheel]
+        box.low[ANGLE_INPUTS + wheel] = contact_bounds.angle_low[wheel]
+        box.high[ANGLE_INPUTS + wheel] = contact_bounds.angle_high[wheel]
+        box.base[PLACE_INPUTS + wheel] = contact_bounds.lateral[wheel]
+        box.low[PLACE_INPUTS + wheel] = contact_bounds.lateral_low[wheel]
+        box.high[PLACE_INPUTS + wheel] = contact_bounds.lateral_high[wheel]
 
 
 @kernel
@@ -169,7 +172,7 @@ def _note_soil(row, wheel, box):
 def _choose_torques(model, work):
     """Balance the nominal rover and keep its torques for all others; False where singular."""
     rover, box, linkage = work.rover, work.box, model.linkage
-    for k in range(INPUTS):
+    for k in range(INPUT_COUNT):
         box.at[k] = box.base[k]
     rover.search.y[:] = 0.0
     rover.search.resistance[:] = 0.0
@@ -194,15 +197,15 @@ def _evaluate(model, work):
     for i in range(6):
         q[i] = spread.q[i]
         for wheel in range(6):
-            q[i] += spread.response[i, wheel] * box.at[HEIGHT + wheel]
+            q[i] += spread.response[i, wheel] * box.at[HEIGHT_INPUTS + wheel]
     place(linkage, rover.pose, q, placement)
     place_masses(linkage, q, placement)
     for wheel in range(6):
-        s, c = np.sin(box.at[ANGLE + wheel]), np.cos(box.at[ANGLE + wheel])
+        s, c = np.sin(box.at[ANGLE_INPUTS + wheel]), np.cos(box.at[ANGLE_INPUTS + wheel])
         contacts.sine[wheel], contacts.cosine[wheel] = s, c
         for i in range(3):
             radial = linkage.radius * (s * placement.forward[i] - c * placement.up[i])
-            aside = box.at[PLACE + wheel] * placement.R[i, 1]
+            aside = box.at[PLACE_INPUTS + wheel] * placement.R[i, 1]
             contacts.point[wheel, i] = placement.centres[wheel, i] + aside + radial
     if not balance_forces(linkage, placement, contacts, box.columns, rover.balance):
         return False
@@ -212,12 +215,16 @@ def _evaluate(model, work):
         apply_torques(rover.balance, FREE_FORCES, search)
     for wheel in range(6):
         N, T, S = search.wheel_loads[wheel], search.tangential[wheel], search.lateral[wheel]
-        box.value[LOAD + wheel], box.value[PULL + wheel], box.value[SIDE + wheel] = N, T, S
-        box.value[USE + wheel] = _worst_use(model, box, wheel, (N, T, S))
+        (
+            box.value[LOAD_OUTPUTS + wheel],
+            box.value[PULL_OUTPUTS + wheel],
+            box.value[SIDE_OUTPUTS + wheel],
+        ) = N, T, S
+        box.value[USE_OUTPUTS + wheel] = _worst_use(model, box, wheel, (N, T, S))
     find_tip_over(linkage, rover)
     for edge in range(CORNERS):
         angle, measure = measure_edge(rover.corners, edge, rover.centre, rover.force, rover.moment)
-        box.value[TIP + edge] = angle
+        box.value[TIP_OUTPUTS + edge] = angle
     return True
 
 
@@ -226,7 +233,7 @@ def _worst_use(model, box, wheel, forces):
     """Return the largest utilisation of a wheel on any of the grounds it may touch."""
     ground, linkage, settings = model.ground, model.linkage, model.settings
     N, T, S = forces
-    N = max(N, MIN_LOAD)
+    N = max(N, MIN_LOAD_SHARE)
     if not settings.on_soil:
         return np.sqrt(T * T + S * S) / (box.mu_low[wheel] * N)
     weight = linkage.mass * linkage.gravity
@@ -245,13 +252,13 @@ def _worst_use(model, box, wheel, forces):
 def _find_gains(model, work):
     """Write what each input alone changes at either end; False where the balance is singular."""
     box = work.box
-    for k in range(INPUTS):
+    for k in range(INPUT_COUNT):
         box.at[k] = box.base[k]
-    for k in range(INPUTS):
+    for k in range(INPUT_COUNT):
         for end in range(2):
             box.at[k] = box.low[k] if end == 0 else box.high[k]
             if box.at[k] == box.base[k]:
-                for output in range(OUTPUTS):
+                for output in range(OUTPUT_COUNT):
                     if end == 0:
                         box.gain_low[k, output] = 0.0
                     else:
@@ -260,7 +267,7 @@ def _find_gains(model, work):
             if not _evaluate(model, work):
                 return False
             _include_values(box)
-            for output in range(OUTPUTS):
+            for output in range(OUTPUT_COUNT):
                 gain = box.value[output] - box.base_value[output]
                 if end == 0:
                     box.gain_low[k, output] = gain
@@ -273,7 +280,7 @@ def _find_gains(model, work):
 @kernel
 def _include_values(box):
     """Widen the bounds to the outputs found last."""
-    for output in range(OUTPUTS):
+    for output in range(OUTPUT_COUNT):
         box.smallest[output] = min(box.smallest[output], box.value[output])
         box.largest[output] = max(box.largest[output], box.value[output])
 
@@ -298,12 +305,14 @@ def _bound_use(model, work, wheel):
     and at the level that were found.
     """
     box = work.box
-    pull = max(abs(box.smallest[PULL + wheel]), abs(box.largest[PULL + wheel]))
-    side = abs(box.base_value[SIDE + wheel])
+    pull = max(abs(box.smallest[PULL_OUTPUTS + wheel]), abs(box.largest[PULL_OUTPUTS + wheel]))
+    side = abs(box.base_value[SIDE_OUTPUTS + wheel])
     total = 0.0
-    for k in range(INPUTS):
-        gain = max(abs(box.gain_low[k, SIDE + wheel]), abs(box.gain_high[k, SIDE + wheel]))
-        if not ANGLE <= k < PLACE:
+    for k in range(INPUT_COUNT):
+        gain = max(
+            abs(box.gain_low[k, SIDE_OUTPUTS + wheel]), abs(box.gain_high[k, SIDE_OUTPUTS + wheel])
+        )
+        if not ANGLE_INPUTS <= k < PLACE_INPUTS:
             side += gain
         else:
             total += gain * gain
@@ -320,12 +329,12 @@ def _bound_use(model, work, wheel):
             pull, side = best_pull, best_side
             length = np.hypot(pull, side)
         box.aim[:] = 0.0
-        box.aim[PULL + wheel], box.aim[SIDE + wheel] = pull / length, side / length
-        box.aim[LOAD + wheel] = -box.largest[USE + wheel] * box.mu_low[wheel]
+        box.aim[PULL_OUTPUTS + wheel], box.aim[SIDE_OUTPUTS + wheel] = pull / length, side / length
+        box.aim[LOAD_OUTPUTS + wheel] = -box.largest[USE_OUTPUTS + wheel] * box.mu_low[wheel]
         _go_to_extreme(model, work)
-        if box.value[USE + wheel] > best:
-            best = box.value[USE + wheel]
-            best_pull, best_side = box.value[PULL + wheel], box.value[SIDE + wheel]
+        if box.value[USE_OUTPUTS + wheel] > best:
+            best = box.value[USE_OUTPUTS + wheel]
+            best_pull, best_side = box.value[PULL_OUTPUTS + wheel], box.value[SIDE_OUTPUTS + wheel]
 
 
 @kernel
@@ -333,9 +342,9 @@ def _go_to_extreme(model, work):
     """Go where the sum of outputs that `box.aim` weighs is largest, as the gains have it."""
     box = work.box
     total = 0.0
-    for k in range(INPUTS):
+    for k in range(INPUT_COUNT):
         low, high = 0.0, 0.0
-        for output in range(OUTPUTS):
+        for output in range(OUTPUT_COUNT):
             if box.aim[output] != 0.0:
                 low += box.aim[output] * box.gain_low[k, output]
                 high += box.aim[output] * box.gain_high[k, output]
@@ -344,7 +353,7 @@ def _go_to_extreme(model, work):
             gain, end = high, box.high[k]
         box.at[k] = box.base[k]
         box.gain[k], box.end[k] = max(gain, 0.0), end
-        if gain > 0.0 and not ANGLE <= k < PLACE:
+        if gain > 0.0 and not ANGLE_INPUTS <= k < PLACE_INPUTS:
             box.at[k] = end
         elif gain > 0.0:
             total += gain * gain
@@ -363,7 +372,7 @@ def _share_deviation(total, box):
     left = TOGETHER
     for _ in range(6):
         capped = False
-        for k in range(ANGLE, PLACE):
+        for k in range(ANGLE_INPUTS, PLACE_INPUTS):
             gain = box.gain[k]
             if gain > 0.0 and gain * gain * left >= total:
                 box.at[k] = box.end[k]
@@ -375,7 +384,7 @@ def _share_deviation(total, box):
                     return
         if not capped:
             break
-    for k in range(ANGLE, PLACE):
+    for k in range(ANGLE_INPUTS, PLACE_INPUTS):
         if box.gain[k] > 0.0:
             share = box.gain[k] * np.sqrt(left / max(total, 1e-30))
             box.at[k] = box.base[k] + min(share, 1.0) * (box.end[k] - box.base[k])

@@ -8,7 +8,14 @@ from numba import prange
 
 from rover_physics.bounds.belly import bound_clearance
 from rover_physics.bounds.contact import CONTACT_BOUNDS, bound_contacts
-from rover_physics.bounds.forces import BOX, LOAD, PULL, TIP, USE, bound_forces
+from rover_physics.bounds.forces import (
+    BOX,
+    LOAD_OUTPUTS,
+    PULL_OUTPUTS,
+    TIP_OUTPUTS,
+    USE_OUTPUTS,
+    bound_forces,
+)
 from rover_physics.bounds.pose import SPREAD, bound_configuration
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.forces.soil import SoilWheel, solve_wheel
@@ -167,8 +174,8 @@ def _write_configuration(spread, result):
 def _write_tip_over(settings, box, result):
     smallest, largest = np.inf, np.inf
     for edge in range(CORNERS):
-        smallest = min(smallest, box.smallest[TIP + edge])
-        largest = min(largest, box.largest[TIP + edge])
+        smallest = min(smallest, box.smallest[TIP_OUTPUTS + edge])
+        largest = min(largest, box.largest[TIP_OUTPUTS + edge])
     result.tip_over_ratio[0] = smallest / settings.flat_angle
     result.tip_over_ratio[1] = largest / settings.flat_angle
 
@@ -178,8 +185,14 @@ def _write_wheel(model, wheel, box, result):
     """Write the bounds on load, sinkage, torque saturation and utilisation of a wheel."""
     ground, linkage, settings = model.ground, model.linkage, model.settings
     weight = linkage.mass * linkage.gravity
-    lightest, heaviest = weight * box.smallest[LOAD + wheel], weight * box.largest[LOAD + wheel]
-    backward, forward = weight * box.smallest[PULL + wheel], weight * box.largest[PULL + wheel]
+    lightest, heaviest = (
+        weight * box.smallest[LOAD_OUTPUTS + wheel],
+        weight * box.largest[LOAD_OUTPUTS + wheel],
+    )
+    backward, forward = (
+        weight * box.smallest[PULL_OUTPUTS + wheel],
+        weight * box.largest[PULL_OUTPUTS + wheel],
+    )
     most = max(abs(backward), abs(forward))
     least = min(abs(backward), abs(forward)) if backward * forward > 0.0 else 0.0
     result.wheel_loads[wheel, 0], result.wheel_loads[wheel, 1] = lightest, heaviest
@@ -201,7 +214,9 @@ def _write_wheel(model, wheel, box, result):
     result.friction_utilisation[wheel, 0] = 0.0
     if heaviest > 0.0:
         result.friction_utilisation[wheel, 0] = least / (box.mu_high[wheel] * heaviest)
-    result.friction_utilisation[wheel, 1] = box.largest[USE + wheel] if lightest > 0.0 else np.inf
+    result.friction_utilisation[wheel, 1] = (
+        box.largest[USE_OUTPUTS + wheel] if lightest > 0.0 else np.inf
+    )
 
 
 @kernel

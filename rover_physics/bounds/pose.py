@@ -33,7 +33,7 @@ MAX_GAP_LEFT = 0.2
 JUMP = 0.3
 """Rise or fall, in wheel radii, beyond what the slope makes of it, within reach of a wheel from
 which on it counts as on an edge."""
-LEVELS = (0.8, 0.95, 1.1, 1.3)
+LEVEL_CHANGES = (0.8, 0.95, 1.1, 1.3)
 """Rises and falls, in wheel radii, at which a wheel is looked for another place to stand. Where a
 face is higher than the wheel can roll over, there are two: at its foot and on top."""
 MAX_TURN = 0.3
@@ -154,7 +154,7 @@ def _may_change_level(uncertain, work):
                 rise = sign * _rise_at(surface, rover, wheel, shift)
                 if rise - sign * slope * shift - margin > JUMP * linkage.radius:
                     return True
-                for level in LEVELS:
+                for level in LEVEL_CHANGES:
                     needed = level * linkage.radius
                     move = along * sign * needed + shift
                     if ahead * shift <= 0.0:

@@ -20,7 +20,7 @@ GAP_TOLERANCE = 3e-5
 """Largest gap left in a settled pose [m], found by a search of its own."""
 NEWTON_TOLERANCE = 5e-6
 """Largest gap at which Newton's method stops [m]."""
-NEWTON_STEPS = 20
+MAX_NEWTON_STEPS = 20
 QUICK_ATTEMPTS = 5
 NOTES_HOLD = 1e-2
 """Gaps, in wheel radii, below which a step is too small to bring other circles near."""
@@ -139,7 +139,7 @@ def _newton(model, work, scope):
     worst = 0.0
     for wheel in range(6):
         worst = max(worst, abs(work.contacts.gap[wheel]))
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE or np.isnan(worst):
             return worst
         if not _find_step(model.linkage, work, GroundSlope.SLOPED):

@@ -16,15 +16,17 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import SOIL_NUMBERS
 from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, load_soils, soil_named
 
-MODEL, FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(SOIL_NUMBERS)
+SOIL_MODEL, SOIL_FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(
+    SOIL_NUMBERS
+)
 """Columns of a packed soil."""
 COULOMB, BEKKER_WONG = 0.0, 1.0
-"""Values of the column MODEL."""
+"""Values of the column SOIL_MODEL."""
 MIN_FRICTION = 1e-3
 """Effective friction of a wheel that cannot even pull itself, so that one may divide by it."""
 MODERATE_SINKAGE = 1.0 / 6.0
 """Largest sinkage, in wheel diameters, at which Wong takes the sinkage formula to hold."""
-NEWTON_STEPS = 50
+MAX_NEWTON_STEPS = 50
 
 
 def pack_soils(
@@ -49,7 +51,7 @@ def pack_soils(
     """
     known = load_soils() if soils is None and (names or default is not None) else soils
     table = np.zeros((1 + len(names), SOIL_NUMBERS))
-    table[:, FRICTION] = np.nan
+    table[:, SOIL_FRICTION] = np.nan
     for row, name in enumerate((default, *names)):
         if name is not None:
             _write_soil(soil_named(name, known), table[row])
@@ -58,9 +60,9 @@ def pack_soils(
 
 def _write_soil(soil: Soil, row: NDArray[np.float64]) -> None:
     if soil.model == COULOMB_MODEL:
-        row[MODEL], row[FRICTION] = COULOMB, soil.friction
+        row[SOIL_MODEL], row[SOIL_FRICTION] = COULOMB, soil.friction
         return
-    row[MODEL] = BEKKER_WONG
+    row[SOIL_MODEL] = BEKKER_WONG
     row[COHESION], row[TAN_PHI] = soil.cohesion, np.tan(soil.friction_angle)
     row[K_C], row[K_PHI], row[EXPONENT] = soil.k_c, soil.k_phi, soil.n
     row[SHEAR_MODULUS] = soil.shear_modulus
@@ -122,7 +124,7 @@ def solve_wheel(soil, wheel, N, T, S):
     mu, radius, width = wheel.friction, wheel.radius, wheel.width
     if not N > 0.0:
         return WheelOnSoil(1.0, 0.0, 0.0, 0.0, radius * T, np.inf)
-    if soil[MODEL] == COULOMB:
+    if soil[SOIL_MODEL] == COULOMB:
         largest = _own_friction(soil, mu) * N
         utilisation = np.sqrt(T * T + S * S) / largest
         slip = coulomb_slip(utilisation)
@@ -150,7 +152,7 @@ def effective_friction(soil, wheel, N):
     For Bekker-Wong it depends on the load. `wheel` is a SoilWheel.
     """
     mu, radius, width = wheel.friction, wheel.radius, wheel.width
-    if soil[MODEL] == COULOMB:
+    if soil[SOIL_MODEL] == COULOMB:
         return _own_friction(soil, mu)
     if not N > 0.0:
         return MIN_FRICTION
@@ -170,7 +172,7 @@ def is_sinkage_moderate(sinkage, radius):
 @kernel
 def _own_friction(soil, mu):
     """Return the Coulomb coefficient of a soil, else `mu`."""
-    own = soil[FRICTION]
+    own = soil[SOIL_FRICTION]
     return own if own > 0.0 else mu
 
 
@@ -239,7 +241,7 @@ def find_mobilisation(share):
         return share * (2.0 + share * 4.0 / 3.0)
     rest = 1.0 - share
     x = min(1.0, 2.0 * share) / rest
-    for _ in range(NEWTON_STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         change = (x * rest + np.expm1(-x)) / (rest - np.exp(-x))
         x -= change
         if not change > 1e-14 * x:

@@ -20,15 +20,15 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
 
-LEVELS = 60
-NEWTON_STEPS = 12
+MAX_LEVELS = 60
+MAX_NEWTON_STEPS = 12
 STAY = 0.25
 """Share of the old level kept above what the centre needs, so that the centre stays inside."""
 LOAD_KEPT = 1e-4
 """Wheel load, in weights, that counts as on the ground."""
 CENTRED = 0.1
 """Newton decrement at which a centre is near enough."""
-PRECISION = 5e-5
+LEVEL_PRECISION = 5e-5
 """Relative precision of the smallest level."""
 
 
@@ -146,15 +146,15 @@ def _lower(balance, free, goal, enough, search):
     needed = _needed(search, goal)
     level = needed + 0.1 * abs(needed) + 1e-3
     stalled = 0
-    for _ in range(LEVELS):
+    for _ in range(MAX_LEVELS):
         if needed <= enough or stalled == 3:
             return
-        for _ in range(NEWTON_STEPS):
+        for _ in range(MAX_NEWTON_STEPS):
             _write_barrier(balance, free, goal, level, search)
             if not _take_newton_step(balance, free, search):
                 break
         now = _needed(search, goal)
-        stalled = stalled + 1 if level - now < PRECISION * max(abs(now), 1e-3) else 0
+        stalled = stalled + 1 if level - now < LEVEL_PRECISION * max(abs(now), 1e-3) else 0
         needed = now
         level = now + STAY * (level - now)
 

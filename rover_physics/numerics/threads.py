@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import numba
 
-ALONE = 2000
+MAX_SERIAL_POSES = 2000
 """Poses under equal torques, or what takes as long, up to which one thread works alone."""
 
 
@@ -13,7 +13,7 @@ ALONE = 2000
 def limit_threads(poses: int) -> Iterator[int]:
     """Let kernels use as many threads as they may, or one if there are few `poses`; yield it."""
     allowed = numba.get_num_threads()
-    used = allowed if poses > ALONE else 1
+    used = allowed if poses > MAX_SERIAL_POSES else 1
     if used == allowed:
         yield used
         return

@@ -1,7 +1,7 @@
 """Between waypoints: faces that wheels climb, edges they roll off, and how far they drop.
 
 Where the contact of a wheel jumps from one waypoint to the next, the poses in between decide
-whether the rover gets there. The path is halved around each jump until the jump is resolved or
+whether the rover gets there. The path is divided around each jump until the jump is resolved or
 shorter than MIN_SPACING. What is left is a jump in height at one place: upwards the wheel is
 evaluated while it climbs the face, held at heights from foot to edge with the face as its
 contact; downwards it drops.

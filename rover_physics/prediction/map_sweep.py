@@ -28,7 +28,7 @@ BATCH = 32_768
 NUMBERS = 6
 """Numbers that a score has beside the status."""
 
-Floats = NDArray[np.float32]
+SingleFloats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +37,17 @@ class PoseScores:
 
     status: NDArray[np.int8]
     """A PoseStatus each."""
-    friction_utilisation: Floats
+    friction_utilisation: SingleFloats
     """Largest of the six wheels; infinite where one lifts off."""
-    torque_saturation: Floats
+    torque_saturation: SingleFloats
     """Largest of the six wheels."""
-    least_load: Floats
+    least_load: SingleFloats
     """Smallest of the six wheel loads [N]."""
-    tip_over_ratio: Floats
+    tip_over_ratio: SingleFloats
     """Tip-over angle over that on flat ground."""
-    tilt: Floats
+    tilt: SingleFloats
     """Angle between body z and the vertical [rad]."""
-    belly_clearance: Floats
+    belly_clearance: SingleFloats
     """Smallest height of the underside above the ground [m]."""
 
     def __post_init__(self) -> None:

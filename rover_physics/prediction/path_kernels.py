@@ -9,7 +9,7 @@ from rover_physics.status import PoseStatus
 
 ANGLE_JUMP = np.radians(12.0)
 """Change of a contact angle that is looked into, where one of the two is steep."""
-STEEP = np.radians(25.0)
+STEEP_CONTACT = np.radians(25.0)
 
 
 class JumpLimits(NamedTuple):
@@ -132,7 +132,7 @@ def _jumps(here, there, height_jump):
         return False
     for wheel in range(6):
         angle, other = here.contact_angle[wheel], there.contact_angle[wheel]
-        if max(abs(angle), abs(other)) > STEEP and abs(other - angle) > ANGLE_JUMP:
+        if max(abs(angle), abs(other)) > STEEP_CONTACT and abs(other - angle) > ANGLE_JUMP:
             return True
         if abs(there.wheel_centres[wheel, 2] - here.wheel_centres[wheel, 2]) > height_jump:
             return True

@@ -35,7 +35,7 @@ DROP = 0.1
 """Drop, in wheel radii, from which on the way back is asked for."""
 RUN_UP = 1.0
 """Wheelbases before the first place that needs asking to which the way back has to lead."""
-UNKNOWN = ("off_map", "unknown_ground")
+UNKNOWN_CODES = ("off_map", "unknown_ground")
 """Codes that close a way on only within LOOK_AHEAD wheelbases; what lies further is not known."""
 
 
@@ -144,7 +144,7 @@ def _find_way_on(
             if verdict.traversable:
                 return ""
             far = verdict.first_failure * spacing > LOOK_AHEAD * wheelbase
-            if verdict.code in UNKNOWN and far:
+            if verdict.code in UNKNOWN_CODES and far:
                 return ""
             closed = closed or verdict.reason
     return closed
