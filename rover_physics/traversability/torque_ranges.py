@@ -1,10 +1,11 @@
-"""A query per waypoint: the torques of each wheel with which all constraints can be kept.
+"""The range of torques of each wheel, at each waypoint, with which all constraints can be kept.
 
-The forces that balance the rover and keep the paper's three constraints are a convex set. How low
-and how high the torque of a wheel is in it is found by following the central path of the set's
-self-concordant barrier from its analytic centre.
+The forces that balance the rover and keep the paper's three constraints are a convex set. The
+lowest and the highest torque of a wheel in it are second-order cone programs; Clarabel solves
+them.
 
-Source: Boyd and Vandenberghe, Convex Optimization, Cambridge 2004, section 11.3.
+Source: Goulart and Chen, Clarabel: An interior-point solver for conic programs with quadratic
+objectives, arXiv:2405.12762, 2024.
 """
 
 from dataclasses import dataclass, replace
@@ -24,11 +25,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
-PRECISION = 1e-5
-"""Precision of the ranges, in largest torques."""
-BARRIERS = 24.0
-"""Parameter of the barrier: two for each of six cones and twelve limits."""
-NEWTON_STEPS = 100
 EQUAL_SHARES = 1e-9
 """Lateral forces, in weights, by which shares still count as equal."""
 
@@ -40,9 +36,9 @@ class TorqueRanges:
     feasible: np.ndarray
     """(n,) True where some torques keep all constraints."""
     lowest: Floats
-    """(n, 6) lowest torque of each wheel [N m], NaN where not feasible."""
+    """(n, 6) lowest torque of each wheel [N m], NaN where not feasible or not found."""
     highest: Floats
-    """(n, 6) highest torque of each wheel [N m], NaN where not feasible."""
+    """(n, 6) highest torque of each wheel [N m], NaN where not feasible or not found."""
 
     def __post_init__(self) -> None:
         freeze_fields(self)
@@ -50,18 +46,16 @@ class TorqueRanges:
 
 @dataclass(frozen=True, eq=False)
 class _FeasibleSet:
-    """Forces linear in x within cones and limits: a row per wheel, a constant and its slopes."""
+    """The forces that keep the constraints, in units of the weight, linear in x (k,).
 
-    load: np.ndarray
-    """(6, 1 + k) utmost shear: u nu N."""
-    along: np.ndarray
-    """(6, 1 + k) shear along the wheel: T + u R."""
-    across: np.ndarray
-    """(6, 1 + k) shear across the wheel: S."""
+    A row is a constant and its k slopes: row @ [1, *x].
+    """
+
+    rows: np.ndarray
+    """(30, 1 + k) for each wheel utmost shear u nu N, shear along T + u R and across S, which
+    form a second-order cone; then room below the torque limit (6) and above its negative (6)."""
     thrust: np.ndarray
     """(6, 1 + k) torque over the wheel radius: T + R."""
-    most: float
-    """Largest torque over the wheel radius."""
 
 
 def find_torque_ranges(
@@ -99,10 +93,13 @@ def find_torque_ranges(
         if results[i].status != PoseStatus.SETTLED or not _is_within(rover, model, results[i]):
             continue
         feasible[i] = True
-        forces, start = _describe_set(rover, model, work.balance, results[i])
-        lowest[i], highest[i] = _find_extremes(forces, start)
+        lowest[i], highest[i] = _find_extremes(
+            _describe_set(rover, model, work.balance, results[i])
+        )
     scale = model.record.linkage.radius * model.record.linkage.mass * model.record.linkage.gravity
-    return TorqueRanges(feasible, scale * lowest, scale * highest)
+    most = model.settings.allowed_torque  # the solver keeps its constraints to 1e-8
+    lowest, highest = (np.clip(scale * ends, -most, most) for ends in (lowest, highest))
+    return TorqueRanges(feasible, lowest, highest)
 
 
 def _is_within(rover: Rover, model: PackedModel, result: Any) -> bool:
@@ -111,78 +108,46 @@ def _is_within(rover: Rover, model: PackedModel, result: Any) -> bool:
     return bool(friction and torque and result.wheel_loads.min() > 0.0)
 
 
-def _describe_set(
-    rover: Rover, model: PackedModel, balance: Any, result: Any
-) -> tuple[_FeasibleSet, np.ndarray]:
-    """Return the feasible set of a waypoint in units of the weight, and a point x (k,) in it."""
+def _describe_set(rover: Rover, model: PackedModel, balance: Any, result: Any) -> _FeasibleSet:
     weight = model.record.linkage.mass * model.record.linkage.gravity
     known = np.concatenate([result.tangential, result.lateral]) / weight
     slopes = np.vstack([balance.tangential, balance.lateral])
-    start = np.linalg.lstsq(slopes[:, 1:], known - slopes[:, 0], rcond=None)[0]
-    shared = np.abs(start[FREE_TORQUES:]).max() <= EQUAL_SHARES
+    used = np.linalg.lstsq(slopes[:, 1:], known - slopes[:, 0], rcond=None)[0]
+    shared = np.abs(used[FREE_TORQUES:]).max() <= EQUAL_SHARES
     free = FREE_TORQUES if shared else FREE_FORCES
     normal, tangential, lateral = (
         rows[:, : 1 + free] for rows in (balance.normal, balance.tangential, balance.lateral)
     )
-    used = rover.limits.friction_utilisation
+    most_used = rover.limits.friction_utilisation
     resistance = (result.motion_resistance / result.wheel_loads)[:, None] * normal
-    strength = result.friction[:, None] * normal + resistance
+    strength = most_used * (result.friction[:, None] * normal + resistance)
     resistance = model.settings.direction * resistance
-    forces = _FeasibleSet(
-        load=used * strength,
-        along=tangential + used * resistance,
-        across=lateral.copy(),
-        thrust=tangential + resistance,
-        most=model.settings.allowed_torque / (model.record.linkage.radius * weight),
-    )
-    return forces, start[:free]
+    cones = np.stack([strength, tangential + most_used * resistance, lateral], axis=1)
+    thrust = tangential + resistance
+    limits = np.vstack([-thrust, thrust])
+    limits[:, 0] += model.settings.allowed_torque / (model.record.linkage.radius * weight)
+    return _FeasibleSet(np.vstack([*cones, limits]), thrust)
 
 
-def _find_extremes(forces: _FeasibleSet, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    centre = _go_to_centre(forces, start, np.zeros(len(start)))
-    ends = np.empty((2, 6))
+def _find_extremes(forces: _FeasibleSet) -> tuple[Floats, Floats]:
+    """Return the lowest and highest thrust (6,) of each wheel; NaN where the solver gives up."""
+    import clarabel  # takes a quarter of a second, with scipy.sparse
+    from scipy.sparse import csc_matrix
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.equilibrate_enable = False  # in units of the weight all numbers are about one
+    cones = [clarabel.SecondOrderConeT(3)] * 6 + [clarabel.NonnegativeConeT(12)]
+    k = forces.thrust.shape[1] - 1
+    solver = clarabel.DefaultSolver(
+        csc_matrix((k, k)), np.zeros(k), csc_matrix(-forces.rows[:, 1:]), forces.rows[:, 0],
+        cones, settings,
+    )  # fmt: skip
+    ends = np.full((2, 6), np.nan)
     for row, sign in enumerate((1.0, -1.0)):
-        for wheel in range(6):
-            x = _minimise(forces, centre, sign * forces.thrust[wheel, 1:])
-            ends[row, wheel] = forces.thrust[wheel, 0] + forces.thrust[wheel, 1:] @ x
+        for wheel, (constant, *slopes) in enumerate(forces.thrust):
+            solver.update(q=sign * np.array(slopes))
+            answer = solver.solve()
+            if answer.status == clarabel.SolverStatus.Solved:
+                ends[row, wheel] = constant + sign * answer.obj_val
     return ends[0], ends[1]
-
-
-def _minimise(forces: _FeasibleSet, x: np.ndarray, cost: np.ndarray) -> np.ndarray:
-    """Return the x of the set at which cost @ x is least, to PRECISION."""
-    sharpness = BARRIERS / forces.most
-    while BARRIERS / sharpness > PRECISION * forces.most:
-        sharpness *= 6.0
-        x = _go_to_centre(forces, x, sharpness * cost)
-    return x
-
-
-def _go_to_centre(forces: _FeasibleSet, x: np.ndarray, cost: np.ndarray) -> np.ndarray:
-    """Return the x that minimises cost @ x plus the barrier, by damped Newton steps."""
-    for _ in range(NEWTON_STEPS):
-        gradient, hessian = _differentiate_barrier(forces, x)
-        gradient = gradient + cost
-        step = np.linalg.lstsq(hessian, gradient, rcond=1e-14)[0]
-        decrement = np.sqrt(max(gradient @ step, 0.0))
-        if not decrement > 1e-4:
-            break
-        x = x - step / (1.0 + decrement if decrement > 0.25 else 1.0)
-    return x
-
-
-def _differentiate_barrier(forces: _FeasibleSet, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return gradient (k,) and Hessian (k, k) of the barrier at x."""
-    rows = forces.load, forces.along, forces.across
-    L, P, S = (row[:, 0] + row[:, 1:] @ x for row in rows)
-    dL, dP, dS = (row[:, 1:] for row in rows)
-    room = (L * L - P * P - S * S)[:, None]
-    slope = 2.0 * (L[:, None] * dL - P[:, None] * dP - S[:, None] * dS) / room
-    gradient = -slope.sum(axis=0)
-    hessian = slope.T @ slope
-    hessian -= 2.0 * ((dL / room).T @ dL - (dP / room).T @ dP - (dS / room).T @ dS)
-    thrust = forces.thrust[:, 0] + forces.thrust[:, 1:] @ x
-    turn = forces.thrust[:, 1:]
-    above, below = 1.0 / (forces.most - thrust), 1.0 / (forces.most + thrust)
-    gradient += turn.T @ (above - below)
-    hessian += (turn.T * (above**2 + below**2)) @ turn
-    return gradient, hessian
