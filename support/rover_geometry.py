@@ -151,21 +151,32 @@ def balance_matrix(
 
     A @ (N, T, s0, s1) = b is its balance, all forces in units of the weight, S = s0 + s1 along.
     """
-    placed, frames = place_rover(rover, prediction, i), contact_frames(prediction, i)
+    A, b = free_balance_matrix(rover, prediction, i)
+    placed = place_rover(rover, prediction, i)
     along = (placed.wheels - placed.origin) @ placed.attitude[:, 0]
+    shares = np.column_stack([np.ones(6), along])
+    return np.hstack([A[:, :12], A[:, 12:] @ shares]), b, along
+
+
+def free_balance_matrix(
+    rover: Rover, prediction: PathPrediction, i: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return A (9, 18) and b (9,) of waypoint i: A @ (N, T, S) = b is its balance.
+
+    All forces are in units of the weight; each wheel has a lateral force S of its own.
+    """
+    placed, frames = place_rover(rover, prediction, i), contact_frames(prediction, i)
     columns = []
-    for kind in range(2):
+    for kind in range(3):
         for wheel in range(6):
             forces = np.zeros((6, 3))
             forces[wheel] = rover.weight * frames[wheel, kind]
             columns.append(forces)
-    columns.append(rover.weight * frames[:, 2])
-    columns.append(rover.weight * along[:, None] * frames[:, 2])
     sums = [
         balance_sums(rover, placed, _on_wheels(prediction, i, placed, forces))
         for forces in columns
     ]
-    return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed)), along
+    return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
 
 
 def wheel_gaps(

@@ -1,6 +1,7 @@
 """Torque ranges: as wide as linear programs of their own find them, and consistent."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,33 +15,39 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import judge
 from support.reference_cases import reference_ground
-from support.rough_grounds import mirrored, plane, random_poses, rocky, smooth
-from support.rover_geometry import balance_matrix
+from support.rough_grounds import fractal, mirrored, plane, random_poses, rocky, smooth
+from support.rover_geometry import balance_matrix, free_balance_matrix
 
 LSR1 = load_rover("lsr1")
 SIDES = 96
 few = settings(max_examples=15, deadline=None)
 
 
-def range_by_programme(prediction, i, wheel, max_torque, inside: bool) -> np.ndarray:
-    """Return the range [N m] of a wheel's torque by linear programs in N, T, s0, s1.
+def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: bool):
+    """Return the range [N m] of a wheel's torque by linear programs in N, T and lateral forces.
 
-    The friction cones are replaced by pyramids around them or inside them.
+    The friction cones are replaced by pyramids around them or inside them. Lateral forces are
+    s0 + s1 along where shared, else each wheel has its own.
     """
-    A, b, along = balance_matrix(LSR1, prediction, i)
+    A, b = free_balance_matrix(LSR1, prediction, i)
+    sideways = np.eye(6)
+    if shared:
+        A, b, along = balance_matrix(LSR1, prediction, i)
+        sideways = np.column_stack([np.ones(6), along])
     turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
     shrink = np.cos(np.pi / SIDES) if inside else 1.0
-    rows = np.zeros((6 * SIDES, 14))
+    rows = np.zeros((6 * SIDES, A.shape[1]))
     for w in range(6):
         own = slice(w * SIDES, (w + 1) * SIDES)
         rows[own, w] = -shrink * prediction.friction[i, w]
         rows[own, 6 + w] = np.cos(turns)
-        rows[own, 12], rows[own, 13] = np.sin(turns), np.sin(turns) * along[w]
+        rows[own, 12:] = np.outer(np.sin(turns), sideways[w])
     pull = max_torque / (LSR1.wheel.radius * LSR1.weight)
-    bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + [(None, None)] * 2
+    lateral = [(None, None)] * sideways.shape[1]
+    bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + lateral
     ends = []
     for sign in (1.0, -1.0):
-        cost = np.zeros(14)
+        cost = np.zeros(A.shape[1])
         cost[6 + wheel] = sign
         answer = linprog(cost, rows, np.zeros(len(rows)), A, b, bounds, method="highs")
         assert answer.status == 0, answer.message
@@ -49,23 +56,26 @@ def range_by_programme(prediction, i, wheel, max_torque, inside: bool) -> np.nda
 
 
 @pytest.mark.parametrize(
-    ("ground", "max_torque"), [(smooth(3), 2.0), (rocky(5), 0.8), (plane(0.4, 0.1), 2.0)]
+    ("ground", "poses", "friction", "max_torque", "shared"),
+    [
+        (smooth(3), random_poses(2, 3, 0.5), 0.8, 2.0, True),
+        (rocky(5), random_poses(2, 3, 0.5), 0.8, 0.8, True),
+        (plane(0.4, 0.1), random_poses(2, 3, 0.5), 0.8, 2.0, True),
+        (fractal(13, roughness=0.12), random_poses(13, 12, 1.8), 0.4, 2.0, False),
+    ],
 )
-def test_ranges_lie_between_those_of_linear_programmes(ground, max_torque):
-    poses = random_poses(2, 3, 0.5)
-    ranges = find_torque_ranges(LSR1, ground, poses, SweepOptions(max_torque=max_torque))
-    optimal = sweep_path(
-        LSR1, ground, poses, SweepOptions(policy="optimal", max_torque=max_torque)
-    )
-    compared = 0
+def test_ranges_lie_between_those_of_linear_programs(ground, poses, friction, max_torque, shared):
+    options = SweepOptions(friction=friction, max_torque=max_torque)
+    ranges = find_torque_ranges(LSR1, ground, poses, options)
+    optimal = sweep_path(LSR1, ground, poses, replace(options, policy="optimal"))
+    compared, slack = 0, 1e-5 * max_torque
     for i in np.flatnonzero(ranges.feasible):
-        if not has_equal_shares(optimal, i):
+        if has_equal_shares(optimal, i) != shared:
             continue
         for wheel in range(6):
             compared += 1
-            widest = range_by_programme(optimal, i, wheel, max_torque, inside=False)
-            within = range_by_programme(optimal, i, wheel, max_torque, inside=True)
-            slack = 1e-4 * max_torque
+            program = partial(range_by_program, optimal, i, wheel, max_torque, shared=shared)
+            widest, within = program(inside=False), program(inside=True)
             assert widest[0] - slack <= ranges.lowest[i, wheel] <= within[0] + slack
             assert within[1] - slack <= ranges.highest[i, wheel] <= widest[1] + slack
     assert compared >= 6
