@@ -6,22 +6,40 @@ from typing import Any
 import yaml
 
 from rover_physics.errors import RoverFileError
+from rover_physics.files.validation import errors_of, show_key
+
+MAX_REASON = 200
+"""Most characters of PyYAML's reason that an error shows."""
+BAD_SCALAR = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+"""What PyYAML raises, besides its own errors, where a value does not fit its tag."""
 
 
 class _StrictLoader(yaml.SafeLoader):
     """A safe loader that refuses a key which stands twice in one mapping."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+    def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[Any, Any]:
         seen: dict[str, int] = {}
-        for key_node, _ in node.value:
-            key = str(key_node.value)
+        for key_node, _ in node.value if isinstance(node, yaml.MappingNode) else ():
             line = key_node.start_mark.line + 1
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise RoverFileError(f"not valid YAML: a key that is not a text in line {line}")
+            key = key_node.value
             if key in seen and key_node.tag != "tag:yaml.org,2002:merge":
                 raise RoverFileError(
-                    f"duplicate key {key} in lines {seen[key]} and {line}; keep one of them"
+                    f"duplicate key {show_key((key,))} in lines {seen[key]} and {line}; "
+                    "keep one of them"
                 )
             seen[key] = line
         return super().construct_mapping(node, deep=deep)
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Merge other mappings into one; of equal keys only the last stays, which counts."""
+        super().flatten_mapping(node)
+        pairs: dict[object, object] = {}
+        for pair in node.value:
+            key = pair[0]
+            pairs[(key.tag, key.value) if isinstance(key, yaml.ScalarNode) else id(key)] = pair
+        node.value = list(pairs.values())
 
 
 def read_yaml(path: Path) -> object:
@@ -36,21 +54,27 @@ def read_yaml(path: Path) -> object:
     Raises:
         RoverFileError: Unreadable file, broken YAML, or a key that stands twice.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise RoverFileError(f"{path}: not a text file in UTF-8 ({error.reason})") from error
-    except OSError as error:
-        reason = error.strerror or error
-        raise RoverFileError(f"{path}: cannot be read: {reason}") from error
+    with errors_of(path):
+        return parse_yaml(_read_text(path))
+
+
+def parse_yaml(text: str) -> object:
+    """Return what a YAML text holds, made of dicts, lists and scalars; None for an empty text.
+
+    Raises:
+        RoverFileError: Broken YAML, or a key that stands twice.
+    """
     try:
         return yaml.load(text, Loader=_StrictLoader)
-    except RoverFileError as error:
-        raise RoverFileError(f"{path}: {error}") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise RoverFileError(f"{path}: not valid YAML: {_one_line(error)}") from error
+    except (yaml.YAMLError, RecursionError, *BAD_SCALAR) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise RoverFileError(f"not valid YAML: {reason[:MAX_REASON]}") from error
 
 
-def _one_line(error: Exception) -> str:
-    """Put the text of an error into one line."""
-    return " ".join(str(error).split()) or type(error).__name__
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise RoverFileError(f"not a text file in UTF-8 ({error.reason})") from error
+    except OSError as error:
+        raise RoverFileError(f"cannot be read: {error.strerror or error}") from error

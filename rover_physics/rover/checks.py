@@ -2,38 +2,29 @@
 
 import math
 
-from rover_physics.errors import RoverFileError
+from rover_physics.files.validation import refuse
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEEL_POSITIONS
 from rover_physics.rover.model import Rover, Suspension
 
 _LEVEL_TOLERANCE = 1e-3  # m, wheels count as level when their heights differ by less
 
 
-def check_rover(rover: Rover, source: str) -> None:
+def check_rover(rover: Rover) -> None:
     """Check what holds between several keys of a rover file.
 
     Args:
         rover: The rover as read; each number is already in its own range.
-        source: File name or other origin, opens every error text.
 
     Raises:
         RoverFileError: Two or more keys contradict each other; names the one to mend.
     """
-    try:
-        _check_wheels(rover)
-        _check_pivots(rover.suspension)
-        _check_joint_limits(rover.suspension)
-        _check_belly(rover)
-        _check_speed(rover)
-        _check_balance(rover)
-        _check_manipulator(rover)
-    except RoverFileError as error:
-        raise RoverFileError(f"{source}: {error}") from None
-
-
-def _refuse(key: str, value: object, must: str) -> RoverFileError:
-    shown = list(value) if isinstance(value, tuple) else value
-    return RoverFileError(f"{key} is {shown}; it must be {must}")
+    _check_wheels(rover)
+    _check_pivots(rover.suspension)
+    _check_joint_limits(rover.suspension)
+    _check_belly(rover)
+    _check_speed(rover)
+    _check_balance(rover)
+    _check_manipulator(rover)
 
 
 def _check_wheels(rover: Rover) -> None:
@@ -44,21 +35,21 @@ def _check_wheels(rover: Rover) -> None:
         wheel = wheels[position]
         key = f"suspension.wheels.{position}"
         if wheel[1] < width / 2.0:
-            raise _refuse(
+            raise refuse(
                 key, wheel, f"on the left side, y at least half the wheel width, {width / 2.0:g} m"
             )
         if abs(wheel[2] - wheels["rear"][2]) > _LEVEL_TOLERANCE:
             level = wheels["rear"][2]
-            raise _refuse(key, wheel, f"as high as the rear wheel, z = {level:g}, on flat ground")
+            raise refuse(key, wheel, f"as high as the rear wheel, z = {level:g}, on flat ground")
     for behind, ahead in (("rear", "middle"), ("middle", "front")):
         spacing = wheels[ahead][0] - wheels[behind][0]
         key = f"suspension.wheels.{ahead}"
         if spacing <= 0.0:
             at = wheels[behind][0]
-            raise _refuse(key, wheels[ahead], f"ahead of the {behind} wheel, x above {at:g}")
+            raise refuse(key, wheels[ahead], f"ahead of the {behind} wheel, x above {at:g}")
         beside = abs(wheels[ahead][1] - wheels[behind][1]) >= width
         if spacing < diameter and not beside:
-            raise _refuse(
+            raise refuse(
                 key,
                 wheels[ahead],
                 f"a wheel diameter, {diameter:g} m, ahead of the {behind} wheel",
@@ -69,26 +60,26 @@ def _check_pivots(suspension: Suspension) -> None:
     """The rocker pivot is in the body's y axis; each pivot is between what hangs on it."""
     pivot, bogie, wheels = suspension.rocker_pivot, suspension.bogie_pivot, suspension.wheels
     if abs(pivot[0]) > 1e-9 or abs(pivot[2]) > 1e-9:
-        raise _refuse(
+        raise refuse(
             "suspension.rocker_pivot",
             pivot,
             f"[0, {pivot[1]:g}, 0]: the origin of the body frame is midway between the pivots",
         )
     if pivot[1] <= 0.0:
-        raise _refuse("suspension.rocker_pivot", pivot, "on the left side, y above 0")
+        raise refuse("suspension.rocker_pivot", pivot, "on the left side, y above 0")
     if bogie[1] <= 0.0:
-        raise _refuse("suspension.bogie_pivot", bogie, "on the left side, y above 0")
+        raise refuse("suspension.bogie_pivot", bogie, "on the left side, y above 0")
     behind, ahead = suspension.bogie_wheels
     low, high = wheels[behind][0], wheels[ahead][0]
     if not low < bogie[0] < high:
-        raise _refuse(
+        raise refuse(
             "suspension.bogie_pivot",
             bogie,
             f"between its two wheels, {behind} and {ahead}, x from {low:g} to {high:g}",
         )
     ends = sorted((wheels[suspension.rocker_wheel][0], bogie[0]))
     if not ends[0] < pivot[0] < ends[1]:
-        raise _refuse(
+        raise refuse(
             "suspension.rocker_pivot",
             pivot,
             f"between the {suspension.rocker_wheel} wheel and the bogie pivot, "
@@ -101,7 +92,7 @@ def _check_joint_limits(suspension: Suspension) -> None:
     for name in ("rocker_limits", "bogie_limits"):
         low, high = getattr(suspension, name)
         if not -math.pi < low <= 0.0 <= high < math.pi:
-            raise _refuse(
+            raise refuse(
                 f"suspension.{name}",
                 (low, high),
                 "within -3.14 to 3.14 rad and contain 0, the angle on flat ground",
@@ -112,14 +103,14 @@ def _check_belly(rover: Rover) -> None:
     """The belly is above the ground that the wheels stand on."""
     ground = rover.suspension.wheels["rear"][2] - rover.wheel.radius
     if rover.belly.z <= ground:
-        raise _refuse("belly.z", rover.belly.z, f"above the ground under the wheels, {ground:g} m")
+        raise refuse("belly.z", rover.belly.z, f"above the ground under the wheels, {ground:g} m")
 
 
 def _check_speed(rover: Rover) -> None:
     """The wheels can turn as fast as the nominal speed asks."""
     fastest = rover.wheel.max_speed * rover.wheel.radius
     if rover.nominal_speed > fastest:
-        raise _refuse(
+        raise refuse(
             "nominal_speed",
             rover.nominal_speed,
             f"at most wheel.max_speed x wheel.radius = {fastest:g} m/s",
@@ -129,6 +120,8 @@ def _check_speed(rover: Rover) -> None:
 def _check_balance(rover: Rover) -> None:
     """The rover stands on flat ground: its centre of mass is over the wheels."""
     wheels, masses = rover.suspension.wheels, rover.masses
+    if masses.body.mass <= 0.0:
+        raise refuse("masses.body.mass", masses.body.mass, "a number above 0 in kg")
     moment = masses.body.mass * masses.body.com[0]
     for part in (masses.rocker, masses.bogie):
         moment += 2.0 * part.mass * part.com[0]
@@ -137,7 +130,7 @@ def _check_balance(rover: Rover) -> None:
     y = masses.body.mass * masses.body.com[1] / rover.total_mass
     half_track = min(wheel[1] for wheel in wheels.values())
     if not wheels["rear"][0] < x < wheels["front"][0] or abs(y) >= half_track:
-        raise _refuse(
+        raise refuse(
             "masses.body.com",
             masses.body.com,
             f"such that the rover's centre of mass, now x = {x:.3g}, y = {y:.3g} m, "
@@ -151,7 +144,7 @@ def _check_manipulator(rover: Rover) -> None:
     if arm is None:
         return
     if sum(arm.link_masses) >= rover.masses.body.mass:
-        raise _refuse(
+        raise refuse(
             "manipulator.link_masses",
             arm.link_masses,
             f"together below masses.body.mass, {rover.masses.body.mass:g} kg, which includes them",
@@ -160,14 +153,14 @@ def _check_manipulator(rover: Rover) -> None:
         arm.joints, arm.stowed, arm.joint_limits or (), strict=arm.joint_limits is not None
     ):
         if not low <= angle <= high:
-            raise _refuse(
+            raise refuse(
                 "manipulator.stowed",
                 arm.stowed,
                 f"within manipulator.joint_limits, for {name} from {low:g} to {high:g} rad",
             )
     taken = set(arm.joints) & {*SUSPENSION_JOINTS, *WHEEL_JOINTS}
     if taken:
-        raise _refuse(
+        raise refuse(
             "manipulator.joints",
             arm.joints,
             f"names of the arm's own: {', '.join(sorted(taken))} belongs to the suspension",

@@ -1,24 +1,50 @@
-"""The rover: geometry, masses, actuators and safety limits."""
+"""The rover: geometry, masses, actuators and safety limits; the keys of a rover file."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-Point = tuple[float, float, float]
-Interval = tuple[float, float]
+from rover_physics.files.rules import (
+    Keys,
+    Metres,
+    Point,
+    Radians,
+    Rule,
+    Text,
+    choice,
+    interval,
+    number,
+)
+from rover_physics.names import WHEEL_POSITIONS
+
+Angles = Annotated[tuple[Radians, Radians], interval("rad")]
+Edges = Annotated[tuple[Metres, Metres], interval("m")]
+Mass = Annotated[float, number("kg", least=0.0)]
+Share = Annotated[float, number("", above=0.0, most=1.0)]
+
+
+def _is_arm(lengths: tuple[float, float, float]) -> bool:
+    """Tell whether three lengths are those of column, upper arm and forearm."""
+    return min(lengths) >= 0.0 and lengths[1] + lengths[2] > 0.0
+
+
+def _are_names(texts: tuple[str, ...]) -> bool:
+    """Tell whether texts are different and none of them empty."""
+    return all(text.strip() for text in texts) and len(set(texts)) == len(texts)
 
 
 @dataclass(frozen=True)
 class Wheel:
     """One wheel with its drive; all six are alike."""
 
-    radius: float
+    radius: Annotated[float, number("m", above=0.0)]
     """Radius in [m]."""
-    width: float
+    width: Annotated[float, number("m", above=0.0)]
     """Width of the tread in [m]."""
-    mass: float
+    mass: Mass
     """Mass with drive in [kg]."""
-    max_torque: float
+    max_torque: Annotated[float, number("N m", above=0.0)]
     """Largest torque of the drive in [N m]."""
-    max_speed: float
+    max_speed: Annotated[float, number("rad/s", above=0.0)]
     """Largest speed of the drive in [rad/s]."""
 
 
@@ -30,13 +56,13 @@ class Suspension:
     """Where the rocker is hinged to the body; the origin is midway between the two pivots."""
     bogie_pivot: Point
     """Where the bogie is hinged to the rocker."""
-    rocker_wheel: str
+    rocker_wheel: Annotated[str, choice("rear", "front")]
     """The wheel on the rocker itself, ``"rear"`` or ``"front"``; the others are on the bogie."""
-    wheels: dict[str, Point]
+    wheels: Annotated[dict[str, Point], Keys(dict.fromkeys(WHEEL_POSITIONS, Point))]
     """Wheel centres, keys ``"rear"``, ``"middle"``, ``"front"``."""
-    rocker_limits: Interval
+    rocker_limits: Angles
     """Lowest and highest rocker angle in [rad]."""
-    bogie_limits: Interval
+    bogie_limits: Angles
     """Lowest and highest bogie angle in [rad]."""
 
     @property
@@ -49,7 +75,7 @@ class Suspension:
 class Part:
     """A rigid part."""
 
-    mass: float
+    mass: Mass
     """Mass in [kg]."""
     com: Point
     """Centre of mass in [m], body frame, left side, flat ground."""
@@ -71,11 +97,11 @@ class Masses:
 class Belly:
     """The underside of the body: a rectangle in the body frame."""
 
-    z: float
+    z: Metres
     """Height in [m]."""
-    x: Interval
+    x: Edges
     """Rear and front edge in [m]."""
-    y: Interval
+    y: Edges
     """Right and left edge in [m]."""
 
 
@@ -83,17 +109,17 @@ class Belly:
 class Limits:
     """Safety limits that a path is judged by."""
 
-    tilt: float
+    tilt: Annotated[float, number("rad", above=0.0, most=1.57)]
     """Largest angle between body z and the vertical in [rad]."""
-    tip_over_ratio: float
+    tip_over_ratio: Annotated[float, number("", least=0.0, most=1.0)]
     """Smallest tip-over angle relative to the one on flat ground."""
-    friction_utilisation: float
+    friction_utilisation: Share
     """Largest share of the friction that a wheel may use."""
-    torque_saturation: float
+    torque_saturation: Share
     """Largest share of the drive torque that a wheel may use."""
-    belly_clearance: float
+    belly_clearance: Annotated[float, number("m", least=0.0)]
     """Smallest height of the belly over the ground in [m]."""
-    wheel_drop: float
+    wheel_drop: Annotated[float, number("m", least=0.0)]
     """Largest height that a wheel may drop when it rolls off an edge in [m]."""
 
 
@@ -107,17 +133,28 @@ class Manipulator:
 
     base: Point
     """Foot of the column in [m], body frame."""
-    joints: tuple[str, str, str]
+    joints: Annotated[tuple[str, str, str], Rule("a list of 3 different names", holds=_are_names)]
     """Names of base yaw, shoulder and elbow in ``joint_states``."""
-    link_lengths: tuple[float, float, float]
+    link_lengths: Annotated[
+        tuple[Metres, Metres, Metres],
+        Rule("a list of 3 numbers in m, none of them negative, the arm not 0", holds=_is_arm),
+    ]
     """Column, upper arm and forearm in [m]."""
-    link_masses: tuple[float, float, float]
+    link_masses: Annotated[
+        tuple[Mass, Mass, Mass], Rule("a list of 3 numbers in kg, none of them negative")
+    ]
     """Masses of the same in [kg], each at the middle of its link."""
-    stowed: tuple[float, float, float]
+    stowed: Annotated[tuple[Radians, Radians, Radians], Rule("a list of 3 numbers in rad")]
     """Joint angles of the stowed pose in [rad], the one that the body's mass centre is for."""
-    payload: float = 0.0
+    payload: Mass = 0.0
     """Mass at the tip in [kg]."""
-    joint_limits: tuple[Interval, ...] | None = None
+    joint_limits: (
+        Annotated[
+            tuple[Angles, Angles, Angles],
+            Rule("a list of 3 intervals [lowest, highest] in rad, each first below its second"),
+        ]
+        | None
+    ) = None
     """Lowest and highest angle of each joint in [rad]; None: the joints turn without end."""
 
 
@@ -125,9 +162,9 @@ class Manipulator:
 class Rover:
     """A rocker-bogie rover with six wheels and a differential."""
 
-    name: str
+    name: Text
     """What the rover is called."""
-    gravity: float
+    gravity: Annotated[float, number("m/s^2", above=0.0)]
     """Acceleration of gravity in [m/s^2]."""
     wheel: Wheel
     """The wheel, six times."""
@@ -137,9 +174,9 @@ class Rover:
     """Body, rockers and bogies."""
     belly: Belly
     """Underside of the body, for its clearance."""
-    friction: float
+    friction: Annotated[float, number("", above=0.0)]
     """Coulomb friction coefficient where the terrain says nothing of it."""
-    nominal_speed: float
+    nominal_speed: Annotated[float, number("m/s", above=0.0)]
     """Driving speed in [m/s]."""
     limits: Limits
     """Safety limits."""

@@ -1,14 +1,16 @@
 """Soils: their parameters, the presets, and how they are read from a file."""
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Annotated, Any, get_type_hints
 
 from rover_physics.errors import RoverFileError, SoilError
 from rover_physics.files.config_files import find_config
-from rover_physics.files.config_section import ConfigSection, describe
+from rover_physics.files.rules import Keys, Text, choice, number
+from rover_physics.files.validation import describe, errors_of, read_as, refuse, suggest
 from rover_physics.files.yaml_file import read_yaml
 
 COULOMB_MODEL, BEKKER_WONG_MODEL = "coulomb", "bekker_wong"
@@ -16,32 +18,30 @@ MODELS = (COULOMB_MODEL, BEKKER_WONG_MODEL)
 MAX_EXPONENT = 2.0
 """Sinkage exponents are published from 0.1 to 1.6; the wheel formula breaks down at 3."""
 
-_BEKKER_WONG_KEYS = ("cohesion", "friction_angle", "k_c", "k_phi", "n", "shear_modulus")
-
 
 @dataclass(frozen=True)
 class Soil:
-    """What a wheel-soil model needs to know of a soil; NaN where its model has no use for it."""
+    """The parameters of a soil; NaN where its model does not use them."""
 
     name: str
-    """What the soil is called."""
-    model: str
+    """What the soil is called; in a file the key of the soil."""
+    model: Annotated[str, choice(*MODELS)]
     """``"coulomb"`` or ``"bekker_wong"``."""
-    source: str
+    source: Text
     """Where the values come from."""
-    friction: float = math.nan
+    friction: Annotated[float, number("", above=0.0)] = math.nan
     """Coulomb coefficient; NaN where the terrain's or the rover's own holds."""
-    cohesion: float = math.nan
+    cohesion: Annotated[float, number("Pa", least=0.0)] = math.nan
     """Cohesion c in [Pa]."""
-    friction_angle: float = math.nan
+    friction_angle: Annotated[float, number("rad", least=0.0, most=1.2)] = math.nan
     """Angle of internal shearing resistance phi in [rad]."""
-    k_c: float = math.nan
+    k_c: Annotated[float, number("N/m^(n+1)", least=0.0)] = math.nan
     """Cohesive modulus of sinkage in [N/m^(n+1)]."""
-    k_phi: float = math.nan
+    k_phi: Annotated[float, number("N/m^(n+2)", above=0.0)] = math.nan
     """Frictional modulus of sinkage in [N/m^(n+2)]."""
-    n: float = math.nan
+    n: Annotated[float, number("", above=0.0, most=MAX_EXPONENT)] = math.nan
     """Exponent of sinkage."""
-    shear_modulus: float = math.nan
+    shear_modulus: Annotated[float, number("m", above=0.0)] = math.nan
     """Shear displacement modulus K in [m]."""
 
 
@@ -74,17 +74,10 @@ def soils_from_dict(data: object, source: str) -> dict[str, Soil]:
     Raises:
         SoilError: Not such a mapping, or a missing, unknown or impossible key; names soil and key.
     """
-    if not isinstance(data, Mapping) or not data:
-        raise SoilError(f"{source}: is {describe(data)}; it must be a mapping of names to soils")
-    soils = {}
-    for name, entry in data.items():
-        if not isinstance(name, str) or not name.strip():
-            raise SoilError(f"{source}: soil name is {describe(name)}; it must be a text")
-        try:
-            soils[name] = _read_soil(name, entry, source)
-        except RoverFileError as error:
-            raise SoilError(str(error)) from None
-    return soils
+    with errors_of(source, SoilError):
+        if not isinstance(data, dict) or not data:
+            raise RoverFileError(f"is {describe(data)}; it must be a mapping of names to soils")
+        return {name: _read_soil(name, entry) for name, entry in data.items()}
 
 
 def soil_named(name: str, soils: Mapping[str, Soil] | None = None) -> Soil:
@@ -100,33 +93,28 @@ def soil_named(name: str, soils: Mapping[str, Soil] | None = None) -> Soil:
     known = load_soils() if soils is None else soils
     if name in known:
         return known[name]
-    close = difflib.get_close_matches(str(name), known, n=1)
-    hint = f"did you mean {close[0]}? " if close else ""
-    raise SoilError(f"no soil {name!r}; {hint}soils are {', '.join(known)}")
+    hint = suggest(str(name), tuple(known))
+    raise SoilError(f"no soil {describe(name)}; {hint}soils are {', '.join(known)}")
 
 
-def _read_soil(name: str, entry: object, source: str) -> Soil:
-    common = ("model", "source")
-    every = ConfigSection(entry, source, name, common, ("friction", *_BEKKER_WONG_KEYS))
-    text = every.text("source")
-    if every.choice("model", MODELS) == COULOMB_MODEL:
-        soil = ConfigSection(entry, source, name, common, ("friction",))
-        has_own = soil.has("friction")
-        friction = soil.number("friction", "", above=0.0) if has_own else math.nan
-        return Soil(name, COULOMB_MODEL, text, friction)
-    soil = ConfigSection(entry, source, name, (*common, *_BEKKER_WONG_KEYS))
-    cohesion = soil.number("cohesion", "Pa", least=0.0)
-    friction_angle = soil.number("friction_angle", "rad", least=0.0, most=1.2)
-    if cohesion == 0.0 and friction_angle == 0.0:
-        raise soil.error("cohesion", "above 0 where friction_angle is 0: a soil has some strength")
-    return Soil(
-        name,
-        BEKKER_WONG_MODEL,
-        text,
-        cohesion=cohesion,
-        friction_angle=friction_angle,
-        k_c=soil.number("k_c", "N/m^(n+1)", least=0.0),
-        k_phi=soil.number("k_phi", "N/m^(n+2)", above=0.0),
-        n=soil.number("n", "", above=0.0, most=MAX_EXPONENT),
-        shear_modulus=soil.number("shear_modulus", "m", above=0.0),
-    )
+def _read_soil(name: object, entry: object) -> Soil:
+    if not isinstance(name, str) or not name.strip():
+        raise RoverFileError(f"soil name is {describe(name)}; it must be a text")
+    model = entry.get("model") if isinstance(entry, dict) else None
+    kind = _keys_of(model if isinstance(model, str) else "")
+    soil = Soil(name, **read_as(kind, entry, "a soil", (name,)))
+    if soil.cohesion == 0.0 and soil.friction_angle == 0.0:
+        must = "above 0 where friction_angle is 0: a soil has some strength"
+        raise refuse(f"{name}.cohesion", soil.cohesion, must)
+    return soil
+
+
+@cache
+def _keys_of(model: str) -> Any:
+    """Return the type of a soil's entry in a file; of any soil's where there is no such model."""
+    kinds = get_type_hints(Soil, include_extras=True)
+    common = {key: kinds.pop(key) for key in ("name", "model", "source")}
+    del common["name"]
+    coulomb = {"friction": kinds.pop("friction")}
+    keys = {COULOMB_MODEL: Keys(common, coulomb), BEKKER_WONG_MODEL: Keys(common | kinds)}
+    return Annotated[dict, keys.get(model, Keys(common, coulomb | kinds))]

@@ -99,15 +99,15 @@ def _lift_limit(study: Study, rover: Rover) -> Rover:
 
 
 def _ground(rover: Rover, drive: StudyDrive) -> Terrain:
-    if drive.kind == "file":
+    if drive.file is not None:
         return _load_once(drive.file)
     reach = drive.length + 2.0 * _length(rover) + abs(drive.start[0]) + abs(drive.start[1])
     cell = 0.2 * rover.wheel.radius
     axis = cell * np.arange(-int(reach / cell), int(reach / cell) + 1)
     x = np.broadcast_to(axis, (len(axis), len(axis)))
-    if drive.kind == "slope":
-        return Terrain(np.tan(drive.size) * x, cell, (axis[0], axis[0]))
-    return step_ground(rover, drive.size)
+    if drive.slope is not None:
+        return Terrain(np.tan(drive.slope) * x, cell, (axis[0], axis[0]))
+    return step_ground(rover, drive.step or 0.0)
 
 
 @lru_cache(maxsize=16)

@@ -5,28 +5,20 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rover_physics.errors import RoverFileError
+from rover_physics.files.validation import Key, describe, find_unit
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_from_dict
 from rover_planner.studies.rover_values import rover_to_dict
 
-Key = tuple[str | int, ...]
 AXES = ("x", "y", "z")
-UNITS = {
-    "mass": "kg", "max_torque": "N m", "max_speed": "rad/s", "gravity": "m/s^2", "friction": "",
-    "nominal_speed": "m/s", "payload": "kg", "link_masses": "kg", "stowed": "rad", "tilt": "rad",
-    "joint_limits": "rad", "rocker_limits": "rad", "bogie_limits": "rad", "tip_over_ratio": "",
-    "friction_utilisation": "", "torque_saturation": "",
-}  # fmt: skip
-"""Units of what is no length, by the last name of a key."""
 
 
-def find_key(contents: Mapping[str, Any], name: str, source: str) -> tuple[Key, str]:
+def find_key(contents: Mapping[str, Any], name: str) -> tuple[Key, str]:
     """Return where a number of a rover file is, and its unit.
 
     Args:
         contents: Contents of the rover file.
         name: Dotted name; the numbers of a point are x, y, z, others count from 0.
-        source: Opens the error text.
 
     Raises:
         RoverFileError: There is no such number; names the nearest.
@@ -35,11 +27,9 @@ def find_key(contents: Mapping[str, Any], name: str, source: str) -> tuple[Key, 
     if name not in known:
         near = difflib.get_close_matches(name, known, 3) or sorted(known)[:3]
         raise RoverFileError(
-            f"{source}: the rover has no number {name!r}; it has {', '.join(near)}, ..."
+            f"the rover has no number {describe(name)}; it has {', '.join(near)}, ..."
         )
-    key = known[name]
-    words = [str(part) for part in key if isinstance(part, str)]
-    return key, UNITS.get(words[-1], "m")
+    return known[name], find_unit(Rover, known[name])
 
 
 def _list_keys(contents: Any, name: str = "", key: Key = ()) -> Iterator[tuple[str, Key]]:

@@ -121,7 +121,7 @@ def _try(study: Study, values: tuple[float, ...]) -> Trial:
     numbers = {
         key: value
         for parameter, value in zip(study.parameters, values, strict=True)
-        for key in (parameter.key, *parameter.also)
+        for key in parameter.keys
     }
     try:
         rover = vary(study.rover, numbers)

@@ -1,16 +1,30 @@
-"""What a study file says: a rover, its numbers that vary, what is driven, and what is best."""
+"""A study: a rover, its numbers that vary, the drives and the objective; and its file."""
 
-from dataclasses import dataclass
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from rover_physics.errors import RoverFileError
-from rover_physics.files.config_section import ConfigSection
+from rover_physics.files.rules import (
+    ListOfMappings,
+    Metres,
+    Radians,
+    Rule,
+    Text,
+    choice,
+    number,
+)
+from rover_physics.files.validation import Key, errors_of, read_as, refuse
 from rover_physics.files.yaml_file import read_yaml
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.soil_file import soil_named
-from rover_planner.studies.rover_keys import Key, find_key
+from rover_planner.studies.rover_keys import find_key
 from rover_planner.studies.rover_values import get_value, rover_to_dict
 
 OBJECTIVES = {
@@ -23,75 +37,113 @@ OBJECTIVES = {
 """Objectives by name: what is best, what it is, its unit."""
 ABOUT_DRIVES = ("worst_utilisation", "tip_over_margin", "drive_energy")
 """Objectives that need drives."""
-METHODS = ("sweep", "optimise")
-POLICIES = ("equal", "optimal")
 
 
-@dataclass(frozen=True)
-class StudyParameter:
+def _whole(least: int, most: int) -> Rule:
+    return Rule(
+        f"a whole number from {least} to {most}", holds=range(least, most + 1).__contains__
+    )
+
+
+def _are_names(texts: Sequence[str]) -> bool:
+    return len(texts) > 0 and len(set(texts)) == len(texts)
+
+
+_NUMBER = Rule("a number in the unit of that number of the rover", holds=math.isfinite)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterEntry:
+    """A number of the rover that varies, as a study file has it."""
+
+    name: Text
+    """Dotted name, such as suspension.bogie_pivot.z."""
+    low: Annotated[float, Field(alias="from"), _NUMBER]
+    """Smallest value."""
+    high: Annotated[float, Field(alias="to"), _NUMBER]
+    """Largest value."""
+    count: Annotated[int, _whole(2, 1000)] = 11
+    """Values of a sweep, the ends included."""
+    also: Annotated[
+        tuple[Text, ...], Rule("a list of one name or more, all different", holds=_are_names)
+    ] = ()
+    """Names of further numbers that always have the same value."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyParameter(ParameterEntry):
     """A number of the rover that varies."""
 
-    name: str
-    """As it is written, such as suspension.bogie_pivot.z."""
-    key: Key
-    """Where it is in the rover file."""
+    keys: tuple[Key, ...]
+    """Where it is in the rover file; then where the further numbers are."""
     unit: str
     """Its unit."""
-    low: float
-    """Smallest value."""
-    high: float
-    """Largest value."""
-    count: int
-    """Values of a sweep, the ends included."""
-    also: tuple[Key, ...] = ()
-    """Further numbers that always have the same value."""
-    now: float = float("nan")
-    """What the rover file has."""
+    now: float
+    """Its value in the rover file."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StudyDrive:
-    """What is driven over, straight along a line."""
+    """A straight drive over a slope, a step or the terrain of a file; one of the three is set."""
 
-    kind: str
-    """slope, step or file."""
-    size: float
-    """Angle of the slope [rad] or height of the step [m]."""
-    file: str
-    """Terrain file, empty for the others."""
-    start: tuple[float, float, float]
+    slope: Annotated[float, number("rad")] | None = None
+    """Angle of the slope [rad]."""
+    step: Metres | None = None
+    """Height of the step across x = 0 [m]."""
+    file: Text | None = None
+    """Terrain file."""
+    start: Annotated[tuple[Metres, Metres, Radians], Rule("a list of 3 numbers in m, m, rad")] = (
+        0.0,
+        0.0,
+        0.0,
+    )
     """x, y [m] and yaw [rad]."""
-    length: float
+    length: Annotated[float, number("m", above=0.0)] = 2.0
     """[m]"""
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, kw_only=True)
+class StudyOptions:
+    """The question of a study, and how it is answered."""
+
+    objective: Annotated[str, choice(*OBJECTIVES)]
+    """One of OBJECTIVES."""
+    method: Annotated[str, choice("sweep", "optimise")] = "sweep"
+    """A sweep tries all combinations of the parameters, an optimisation searches."""
+    policy: Annotated[str, choice("equal", "optimal")] = "equal"
+    """How the wheels share the traction."""
+    friction: Annotated[float, number("", above=0.0)] | None = None
+    """Instead of the rover's own."""
+    soil: Text | None = None
+    """Preset soil of the ground; None: firm ground."""
+    evaluations: Annotated[int, _whole(3, 100_000)] = 60
+    """Most evaluations of an optimisation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(StudyOptions):
     """One study."""
 
     rover: Rover
     """The rover whose numbers vary."""
-    objective: str
-    """One of OBJECTIVES."""
-    method: str
-    """One of METHODS."""
-    policy: str
-    """How the wheels share the traction."""
-    friction: float | None
-    """Instead of the rover's own."""
-    soil: str | None
-    """Preset soil of the ground; None: firm ground."""
-    evaluations: int
-    """Most evaluations of an optimisation."""
     parameters: tuple[StudyParameter, ...]
-    """What varies; of a sweep all combinations are tried."""
+    """The numbers that vary."""
     drives: tuple[StudyDrive, ...]
-    """What is driven, for objectives that need it."""
+    """The drives, for objectives that need them."""
 
     @property
     def wants_largest(self) -> bool:
         """Whether more of the objective is better."""
         return OBJECTIVES[self.objective][0] == "largest"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _StudyFile(StudyOptions):
+    """The keys of a study file."""
+
+    rover: Text
+    parameters: Annotated[tuple[ParameterEntry, ...], ListOfMappings()]
+    drives: Annotated[tuple[StudyDrive, ...], ListOfMappings()] | None = None
 
 
 def load_study(path: Path) -> Study:
@@ -117,91 +169,70 @@ def study_from_dict(data: object, source: str, folder: Path = Path()) -> Study:
         RoverFileError: A key is missing, unknown or impossible; names it.
         SoilError: A soil that is not among the presets.
     """
-    optional = ("method", "policy", "friction", "soil", "evaluations", "drives")
-    required = ("rover", "objective", "parameters")
-    top = ConfigSection(data, source, "", required, optional, kind="a study file")
-    rover = load_rover(_beside(top.text("rover"), folder))
-    objective = top.choice("objective", tuple(OBJECTIVES))
-    drives = tuple(_read_drives(top, folder)) if top.has("drives") else ()
-    if objective in ABOUT_DRIVES and not drives:
+    with errors_of(source):
+        file: _StudyFile = read_as(_StudyFile, data, "a study file")
+        _check_use(file)
+        rover = load_rover(_beside(file.rover, folder))
+        found = {
+            "rover": rover,
+            "parameters": _find_parameters(file.parameters, rover),
+            "drives": tuple(_find_file(drive, folder) for drive in file.drives or ()),
+        }
+        return Study(**{**vars(file), **found})
+
+
+def _check_use(file: _StudyFile) -> None:
+    """Check that drives and soil are there for objectives that use them, and for no others."""
+    if file.soil is not None:
+        soil_named(file.soil)
+    if file.objective in ABOUT_DRIVES and not file.drives:
         raise RoverFileError(
-            f"{source}: drives is missing; the objective {objective} is about what is driven"
+            f"drives is missing; the objective {file.objective} is about what is driven"
         )
     for key in ("drives", "soil"):
-        if objective not in ABOUT_DRIVES and top.has(key):
-            raise top.error(key, f"left out: the objective {objective} does not use it")
-    return Study(
-        rover=rover,
-        objective=objective,
-        method=top.choice("method", METHODS) if top.has("method") else "sweep",
-        policy=top.choice("policy", POLICIES) if top.has("policy") else "equal",
-        friction=top.number("friction", "", above=0.0) if top.has("friction") else None,
-        soil=soil_named(top.text("soil")).name if top.has("soil") else None,
-        evaluations=_whole(top, "evaluations", 3, 100_000, 60),
-        parameters=tuple(_read_parameters(top, rover, source)),
-        drives=drives,
-    )
+        value = getattr(file, key)
+        if file.objective not in ABOUT_DRIVES and value is not None:
+            shown = value if key == "soil" else f"a list of {len(value)}"
+            raise refuse(key, shown, f"left out: the objective {file.objective} does not use it")
+    for k, drive in enumerate(file.drives or ()):
+        kinds = [kind for kind in ("slope", "step", "file") if getattr(drive, kind) is not None]
+        if len(kinds) != 1:
+            raise RoverFileError(
+                f"drives[{k}]: a drive has one of slope (rad), step (m) and file; this one has "
+                f"{', '.join(kinds) or 'none'}"
+            )
 
 
-def _whole(section: ConfigSection, name: str, least: int, most: int, default: int) -> int:
-    """Return a whole number, the default where the key is not there."""
-    if not section.has(name):
-        return default
-    value = section.number(name, "", least=least, most=most)
-    if not value.is_integer():
-        raise section.error(name, f"a whole number from {least} to {most}")
-    return int(value)
+def _find_parameters(
+    entries: Sequence[ParameterEntry], rover: Rover
+) -> tuple[StudyParameter, ...]:
+    """Return the parameters with their places in the rover file; none is varied twice."""
+    contents, found, taken = rover_to_dict(rover), [], set[Key]()
+    for k, entry in enumerate(entries):
+        parameter = _find_parameter(entry, contents, f"parameters[{k}]")
+        if taken & {*parameter.keys}:
+            must = "a number that no other parameter varies"
+            raise refuse(f"parameters[{k}].name", entry.name, must)
+        taken |= {*parameter.keys}
+        found.append(parameter)
+    return tuple(found)
 
 
-def _read_parameters(top: ConfigSection, rover: Rover, source: str):
-    contents = rover_to_dict(rover)
-    taken: set[Key] = set()
-    for section in top.sections("parameters", ("name", "from", "to"), ("count", "also")):
-        name = section.text("name")
-        key, unit = find_key(contents, name, source)
-        low, high = section.number("from", unit), section.number("to", unit)
-        if not low < high:
-            raise section.error("to", f"above from, {low:g}")
-        count = _whole(section, "count", 2, 1000, 11)
-        also = tuple(_read_also(section, contents, source, unit))
-        if taken & {key, *also}:
-            raise section.error("name", "a number that no other parameter varies")
-        taken |= {key, *also}
-        now = get_value(contents, key)
-        yield StudyParameter(name, key, unit, low, high, count, also, now)
+def _find_parameter(entry: ParameterEntry, contents: Mapping[str, Any], at: str) -> StudyParameter:
+    if not entry.low < entry.high:
+        raise refuse(f"{at}.to", entry.high, f"above from, {entry.low:g}")
+    key, unit = find_key(contents, entry.name)
+    others = [find_key(contents, name) for name in entry.also]
+    if any(own_unit != unit for _, own_unit in others):
+        raise refuse(f"{at}.also", entry.also, f"names of numbers in {unit or 'no unit'}")
+    keys = (key, *(other for other, _ in others))
+    return StudyParameter(**vars(entry), keys=keys, unit=unit, now=get_value(contents, key))
 
 
-def _read_also(section: ConfigSection, contents: dict[str, Any], source: str, unit: str):
-    """Yield the keys of numbers that go along with a parameter."""
-    for name in section.names("also") if section.has("also") else ():
-        key, own_unit = find_key(contents, name, source)
-        if own_unit != unit:
-            raise section.error("also", f"names of numbers in {unit or 'no unit'}")
-        yield key
+def _find_file(drive: StudyDrive, folder: Path) -> StudyDrive:
+    return drive if drive.file is None else replace(drive, file=_beside(drive.file, folder))
 
 
 def _beside(name: str, folder: Path) -> str:
     """Return the file of that name in a folder, or the name where there is none."""
-    return str(folder / name) if (folder / name).is_file() else name
-
-
-def _read_drives(top: ConfigSection, folder: Path):
-    optional = ("slope", "step", "file", "start", "length")
-    for section in top.sections("drives", (), optional):
-        kinds = [kind for kind in ("slope", "step", "file") if section.has(kind)]
-        if len(kinds) != 1:
-            raise RoverFileError(
-                f"{section.key('drives')}: a drive has one of slope (rad), step (m) and file; "
-                f"this one has {', '.join(kinds) or 'none'}"
-            )
-        kind = kinds[0]
-        start = section.numbers("start", 3, "m, m, rad") if section.has("start") else (0.0,) * 3
-        yield StudyDrive(
-            kind=kind,
-            size=section.number(kind, "rad" if kind == "slope" else "m")
-            if kind != "file"
-            else 0.0,
-            file=_beside(section.text("file"), folder) if kind == "file" else "",
-            start=(start[0], start[1], start[2]),
-            length=section.number("length", "m", above=0.0) if section.has("length") else 2.0,
-        )
+    return str(folder / name) if os.path.isfile(folder / name) else name

@@ -167,7 +167,7 @@ def test_every_number_of_a_rover_has_a_name_and_a_unit():
         ("manipulator.stowed.1", "rad", -0.2),
         ("friction", "", 0.8),
     ):
-        key, found = find_key(contents, name, "study")
+        key, found = find_key(contents, name)
         assert found == unit
         inner = contents
         for part in key:

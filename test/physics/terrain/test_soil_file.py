@@ -83,7 +83,7 @@ def test_an_unknown_soil_lists_the_soils_there_are():
         ({"source": None}, "missing key dune.source"),
         ({"cohesion": -1.0}, "dune.cohesion is -1.0; it must be a number at least 0 in Pa"),
         ({"cohesion": math.nan}, "dune.cohesion is nan"),
-        ({"cohesion": "1e3"}, "dune.cohesion is '1e3'.*YAML reads '1e3' as text"),
+        ({"cohesion": "1e3"}, "dune.cohesion is '1e3'.*YAML reads it as text"),
         ({"friction_angle": 28.0}, "dune.friction_angle is 28.0; .* at most 1.2 in rad"),
         ({"friction_angle": -0.1}, "dune.friction_angle is -0.1"),
         ({"friction_angle": 0.0, "cohesion": 0.0}, "dune.cohesion is 0.0; .*some strength"),

@@ -1,0 +1,124 @@
+"""Rules that values of a configuration file keep, written in the annotations of their types.
+
+A field such as ``radius: Annotated[float, number("m", above=0.0)]`` says all there is to say about
+a key: pydantic checks it, and errors quote the rule. pydantic is imported by what reads a file.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a value must be, besides having the type that is annotated."""
+
+    must: str
+    """The rule as an error quotes it, after "it must be"."""
+    unit: str = ""
+    """Unit of the number, empty where it has none."""
+    holds: Callable[[Any], object] = lambda value: True
+    """Tells whether a value of the right type keeps the rule."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Refuse any value that has another type or does not hold in the words of the rule."""
+        from pydantic_core import core_schema
+
+        schema: Any = {**handler(source), "strict": True}
+        if schema["type"] == "tuple":
+            schema = core_schema.no_info_before_validator_function(_list_to_tuple, schema)
+        schema = core_schema.no_info_after_validator_function(self._check, schema)
+        return core_schema.custom_error_schema(schema, "rule", custom_error_message=self.must)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        """Add the unit to the description of the type."""
+        return {**handler(schema), "unit": self.unit}
+
+    def _check(self, value: Any) -> Any:
+        if not self.holds(value):
+            raise ValueError(self.must)
+        return value
+
+
+@dataclass(frozen=True)
+class ListOfMappings:
+    """A list of one mapping or more; each mapping has errors of its own."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Refuse what is not a list, or empty, before the mappings are looked at."""
+        from pydantic_core import PydanticCustomError, core_schema
+
+        def check(value: Any) -> Any:
+            if not isinstance(value, list) or not value:
+                raise PydanticCustomError("rule", "a list of one mapping or more")
+            return value
+
+        return core_schema.no_info_before_validator_function(check, handler(source))
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """The keys of a dict: for each the type of its value."""
+
+    required: Mapping[str, Any]
+    """Keys that must be there."""
+    optional: Mapping[str, Any] = field(default_factory=dict)
+    """Keys that may be there."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Accept a dict with these keys."""
+        from pydantic_core import core_schema
+
+        return core_schema.typed_dict_schema(
+            {
+                key: core_schema.typed_dict_field(
+                    handler.generate_schema(kind), required=key in self.required
+                )
+                for key, kind in {**self.required, **self.optional}.items()
+            }
+        )
+
+
+def number(
+    unit: str,
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+    most: float = math.inf,
+) -> Rule:
+    """Return the rule of a finite number within bounds; `above` itself is outside."""
+    named = (("above", above), ("at least", least), ("at most", most))
+    bounds = " and ".join(f"{name} {bound:g}" for name, bound in named if math.isfinite(bound))
+    words = "a number", bounds, f"in {unit}" if unit else ""
+    return Rule(
+        " ".join(filter(None, words)),
+        unit,
+        lambda value: math.isfinite(value) and above < value and least <= value <= most,
+    )
+
+
+def interval(unit: str) -> Rule:
+    """Return the rule of two numbers in ascending order."""
+    must = f"[lowest, highest] in {unit}, the first below the second"
+    return Rule(must, unit, lambda ends: ends[0] < ends[1])
+
+
+def choice(*names: str) -> Rule:
+    """Return the rule of a text that is one of the names."""
+    return Rule(" or ".join(names), holds=names.__contains__)
+
+
+Text = Annotated[str, Rule("a text that is not empty", holds=str.strip)]
+Metres = Annotated[float, number("m")]
+Radians = Annotated[float, number("rad")]
+Point = Annotated[
+    tuple[Metres, Metres, Metres], Rule("a list of 3 numbers in m, [x, y, z] in the body frame")
+]
+"""A position in [m]."""
+
+
+def _list_to_tuple(value: Any) -> Any:
+    """Return lists, numpy arrays among them, as tuples, and anything else as it is."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return tuple(value) if isinstance(value, list) else value

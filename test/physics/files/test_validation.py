@@ -1,0 +1,170 @@
+"""Contents of a file become a type, or an error that names key, value and rule."""
+
+import subprocess
+import sys
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+
+from rover_physics.errors import RoverError, RoverFileError
+from rover_physics.files.rules import (
+    Keys,
+    ListOfMappings,
+    Metres,
+    Point,
+    Rule,
+    Text,
+    choice,
+    interval,
+    number,
+)
+from rover_physics.files.validation import describe, errors_of, find_unit, read_as, show_key
+from rover_physics.rover.model import Rover
+
+
+@dataclass(frozen=True)
+class Leg:
+    length: Annotated[float, number("m", above=0.0, most=2.0)]
+    swing: Annotated[tuple[float, float], interval("rad")] = (-1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Walker:
+    name: Text
+    hip: Point
+    gait: Annotated[str, choice("walk", "trot")]
+    legs: Annotated[tuple[Leg, ...], ListOfMappings()]
+    feet: Annotated[dict[str, float], Keys({"left": Metres}, {"right": Metres})]
+    tail: Leg | None = None
+
+
+def walker(**changes: Any) -> dict[str, Any]:
+    data = {
+        "name": "w", "hip": [0, 0.5, 1.0], "gait": "walk", "legs": [{"length": 1}],
+        "feet": {"left": 0.1},
+    }  # fmt: skip
+    return data | changes
+
+
+def refusal(**changes: Any) -> str:
+    with pytest.raises(RoverFileError) as raised:
+        read_as(Walker, walker(**changes), "a walker file")
+    return str(raised.value)
+
+
+def test_contents_become_the_type_with_lists_as_tuples_and_integers_as_floats():
+    read = read_as(Walker, walker(tail={"length": 2, "swing": [0, 1]}), "a walker file")
+    assert read == Walker(
+        "w", (0.0, 0.5, 1.0), "walk", (Leg(1.0),), {"left": 0.1}, Leg(2.0, (0.0, 1.0))
+    )
+    assert type(read.legs[0].length) is float
+
+
+def test_numpy_arrays_and_scalars_are_lists_and_numbers():
+    data = walker(hip=np.array([0.0, 0.5, 1.0]), feet={"left": np.float32(0.5)})
+    read = read_as(Walker, data, "a walker file")
+    assert read.hip == (0.0, 0.5, 1.0) and read.feet == {"left": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"legs": [{"length": 3}]}, "legs[0].length is 3; it must be a number above 0 and at "
+         "most 2 in m"),
+        ({"legs": [{"length": 1}, {"lenght": 1}]}, "unknown key legs[1].lenght; did you mean "
+         "length? legs[1] has length, swing"),
+        ({"legs": [{}]}, "missing key legs[0].length; legs[0] needs length"),
+        ({"legs": [7]}, "legs[0] is 7; it must be a mapping with length"),
+        ({"legs": []}, "legs is []; it must be a list of one mapping or more"),
+        ({"legs": {}}, "legs is {}; it must be a list of one mapping or more"),
+        ({"tail": {"length": 1, "swing": (1, 0)}}, "tail.swing is [1, 0]; it must be [lowest, "
+         "highest] in rad, the first below the second"),
+        ({"gait": "run"}, "gait is 'run'; it must be walk or trot"),
+        ({"gait": None}, "gait is empty; it must be walk or trot"),
+        ({"name": " "}, "name is ' '; it must be a text that is not empty"),
+        ({"hip": {1, 2, 3}}, "hip is {1, 2, 3}; it must be a list of 3 numbers in m, [x, y, z] "
+         "in the body frame"),
+        ({"feet": {}}, "missing key feet.left; feet needs left"),
+        ({"feet": {"left": 1, 7: 2}}, "unknown key feet.7; feet has left, right"),
+        ({"feet": []}, "feet is []; it must be a mapping with left"),
+        ({"colour": "red"}, "unknown key colour; a walker file has name, hip, gait, legs, feet, "
+         "tail"),
+    ],
+)  # fmt: skip
+def test_an_error_names_key_value_and_rule(changes, text):
+    assert refusal(**changes) == text
+
+
+def test_an_unknown_key_is_named_before_the_missing_one_that_it_was_meant_for():
+    data = walker(hips=[0, 0, 0])
+    del data["hip"]
+    with pytest.raises(RoverFileError, match="unknown key hips; did you mean hip[?]"):
+        read_as(Walker, data, "a walker file")
+
+
+def test_numbers_in_quotes_get_a_hint_in_lists_too():
+    assert "YAML reads it as text" in refusal(hip=[0.0, "1e3", 0.0])
+    assert "YAML" not in refusal(hip=[0.0, "up", 0.0])
+    assert "YAML" not in refusal(gait="1e3")
+
+
+def test_the_part_of_a_file_is_named_from_the_top():
+    with pytest.raises(RoverFileError, match=r"^dune\.legs\[0\]\.length is 0; "):
+        read_as(Walker, walker(legs=[{"length": 0}]), "a walker file", ("dune",))
+    with pytest.raises(RoverFileError, match="^dune is 3; it must be a mapping with name, hip"):
+        read_as(Walker, 3, "a walker file", ("dune",))
+
+
+@pytest.mark.parametrize(
+    ("key", "unit"),
+    [
+        (("wheel", "radius"), "m"),
+        (("suspension", "wheels", "front", 2), "m"),
+        (("suspension", "rocker_limits", 1), "rad"),
+        (("masses", "body", "com", 0), "m"),
+        (("manipulator", "link_masses", 0), "kg"),
+        (("manipulator", "joint_limits", 2, 1), "rad"),
+        (("limits", "tip_over_ratio"), ""),
+    ],
+)
+def test_the_unit_of_each_number_is_in_its_type(key, unit):
+    assert find_unit(Rover, key) == unit
+
+
+def test_a_rule_checks_only_values_of_the_right_type():
+    seen = []
+    kind = Annotated[float, Rule("a number", holds=lambda value: seen.append(value) or True)]
+    for value in (True, "1", None, [1.0]):
+        with pytest.raises(RoverFileError):
+            read_as(kind, value, "a number")
+    assert read_as(kind, 2, "a number") == 2.0
+    assert seen == [2.0]
+
+
+@pytest.mark.parametrize("value", ["x" * 100, list(range(100)), {k: k for k in range(100)}])
+def test_a_long_value_is_described_briefly(value):
+    assert len(describe(value)) <= 60
+    assert "..." in describe(value)
+
+
+def test_keys_are_shown_as_they_are_written():
+    assert show_key(("drives", 0, "length")) == "drives[0].length"
+    assert show_key(("my soil", "n")) == "my soil.n"
+    assert len(show_key(("x" * 1000,))) <= 60
+
+
+def test_errors_of_a_file_open_with_its_name():
+    with pytest.raises(RoverError, match="^mine: no key"), errors_of("mine"):
+        raise RoverFileError("no key")
+
+
+def test_pydantic_is_loaded_when_a_file_is_read_and_not_before():
+    code = (
+        "import sys, rover_planner.cli, rover_physics.rover.rover_file as files\n"
+        "assert 'pydantic' not in sys.modules\n"
+        "files.load_rover('lsr1')\n"
+        "assert 'pydantic' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,104 @@
+"""YAML is read strictly, and whatever a file holds, its error is one short line."""
+
+import time
+
+import pytest
+
+from rover_physics.errors import RoverError, RoverFileError
+from rover_physics.files.config_files import find_config
+from rover_physics.files.yaml_file import parse_yaml
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.soil_file import load_soils
+
+PRESET = find_config("rovers/lsr1.yaml").read_text(encoding="utf-8")
+HOSTILE = [
+    "!!map foo",
+    "!!bool foo",
+    "!!bool {a: b}",
+    "!!timestamp foo",
+    "!!timestamp 2001-99-99",
+    "!!int ''",
+    "!!float x",
+    "!!binary é",
+    "!!python/name:os.system",
+    "!!set {a}",
+    "!!pairs [a: 1]",
+    "&self [*self]",
+    "1" * 4000,
+    "1" * 6000,
+    "0x" + "f" * 6000,
+    "-1e" + "9" * 4000,
+    "'" + "x" * 9000 + "'",
+    "'" + "1" * 4000 + "'",
+    '"\\e[31m\\n\\0"',
+    "[" * 600,
+    "{? [1]: 2}",
+    "{? {a: 1}: 2}",
+    "{7: 1, null: 2, 1.5: 3}",
+]
+
+
+def error_of(folder, text, load=load_rover) -> str:
+    """Return the error of a file with this text, without the file's name."""
+    path = folder / "file.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RoverError) as raised:
+        load(path)
+    return str(raised.value).removeprefix(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        PRESET.replace("radius: 0.10 ", "radius: {} "),
+        PRESET.replace("bogie_pivot: [0.20,", "bogie_pivot: [{},"),
+        PRESET.replace("rocker_wheel: rear", "rocker_wheel: {}"),
+        PRESET.replace("rear: [-0.40, 0.31, -0.20]", "rear: {}"),
+        PRESET.replace("belly: {z: -0.06,", "belly: {{z: -0.06, ? {} : 1,", 1),
+        "{}",
+    ],
+    ids=["number", "item", "choice", "point", "key", "file"],
+)
+@pytest.mark.parametrize("value", HOSTILE, ids=lambda value: value[:20])
+def test_a_hostile_value_ends_in_one_short_line(tmp_path, place, value):
+    before, marker, after = place.partition("{}")
+    assert marker
+    text = error_of(tmp_path, (before + value + after).replace("{{", "{"))
+    assert len(text) <= 300
+    assert text.isprintable()
+
+
+@pytest.mark.parametrize("value", HOSTILE, ids=lambda value: value[:20])
+def test_a_hostile_soil_ends_in_one_short_line(tmp_path, value):
+    for form in ("dune: {model: coulomb, friction: %s, source: s}", "? %s\n: 3", "dune: %s"):
+        text = error_of(tmp_path, form % value, load_soils)
+        assert len(text) <= 300
+        assert text.isprintable()
+
+
+def levels(form: str) -> str:
+    """Return 30 levels of YAML, each of nine references to the one above."""
+    lines = [f"a0: &a0 {form % ('x: 1', '')}"]
+    for level in range(1, 30):
+        above = ",".join([f"*a{level - 1}"] * 9)
+        lines.append(f"a{level}: &a{level} " + form % (f"x{level}: 1", above))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("form", ["[{%s}, %s]", "{%s, <<: [%s]}"], ids=["aliases", "merges"])
+def test_a_bomb_of_references_is_refused_at_once(tmp_path, form):
+    start = time.perf_counter()
+    for tail in (PRESET.replace("radius: 0.10 ", "radius: *a29 "), "? *a29\n: 1\n"):
+        assert len(error_of(tmp_path, levels(form) + tail)) <= 300
+    assert time.perf_counter() - start < 5.0
+
+
+def test_of_merged_keys_the_nearest_counts():
+    text = "a: &a {x: 1, y: 1}\nb: &b {y: 2}\nc: {<<: [*b, *a], z: 3}\nd: {<<: *a, x: 4}\n"
+    assert parse_yaml(text)["c"] == {"x": 1, "y": 2, "z": 3}
+    assert parse_yaml(text)["d"] == {"x": 4, "y": 1}
+
+
+def test_a_key_that_stands_twice_is_refused_below_a_merge_too():
+    with pytest.raises(RoverFileError, match="duplicate key x in lines 2 and 2"):
+        parse_yaml("a: &a {x: 1}\nb: {<<: *a, x: 2, x: 3}")
