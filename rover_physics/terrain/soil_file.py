@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_type_hints
 from rover_physics.errors import RoverFileError, SoilError
 from rover_physics.files.config_files import find_config
 from rover_physics.files.rules import Keys, Text, choice, number
-from rover_physics.files.validation import describe, errors_of, read_as, refuse, suggest
+from rover_physics.files.validation import describe, errors_of, read_as, refuse, show_key, suggest
 from rover_physics.files.yaml_file import read_yaml
 
 COULOMB_MODEL, BEKKER_WONG_MODEL = "coulomb", "bekker_wong"
@@ -101,11 +101,11 @@ def _read_soil(name: object, entry: object) -> Soil:
     if not isinstance(name, str) or not name.strip():
         raise RoverFileError(f"soil name is {describe(name)}; it must be a text")
     model = entry.get("model") if isinstance(entry, dict) else None
-    kind = _keys_of(model if isinstance(model, str) else "")
+    kind = _keys_of(model if model in MODELS else "")
     soil = Soil(name, **read_as(kind, entry, "a soil", (name,)))
     if soil.cohesion == 0.0 and soil.friction_angle == 0.0:
         must = "above 0 where friction_angle is 0: a soil has some strength"
-        raise refuse(f"{name}.cohesion", soil.cohesion, must)
+        raise refuse(show_key((name, "cohesion")), soil.cohesion, must)
     return soil
 
 
@@ -113,8 +113,8 @@ def _read_soil(name: object, entry: object) -> Soil:
 def _keys_of(model: str) -> Any:
     """Return the type of a soil's entry in a file; of any soil's where there is no such model."""
     kinds = get_type_hints(Soil, include_extras=True)
-    common = {key: kinds.pop(key) for key in ("name", "model", "source")}
-    del common["name"]
+    del kinds["name"]
+    common = {key: kinds.pop(key) for key in ("model", "source")}
     coulomb = {"friction": kinds.pop("friction")}
     keys = {COULOMB_MODEL: Keys(common, coulomb), BEKKER_WONG_MODEL: Keys(common | kinds)}
     return Annotated[dict, keys.get(model, Keys(common, coulomb | kinds))]

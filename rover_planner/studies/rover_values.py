@@ -8,11 +8,10 @@ from typing import Any
 
 import yaml
 
+from rover_physics.files.validation import Key, errors_of
+from rover_physics.files.yaml_file import parse_yaml
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_from_dict
-from rover_planner.errors import PlanningError
-
-Key = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
@@ -141,11 +140,8 @@ def read_rover(text: str, source: str) -> Rover:
     """Read a rover from the text of a rover file.
 
     Raises:
-        PlanningError: The text is no YAML.
-        RoverFileError: The rover is impossible; names the key.
+        RoverFileError: The text is no YAML, or the rover is impossible; names the key.
     """
-    try:
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise PlanningError(f"{source} is no YAML: {' '.join(str(error).split())}") from None
+    with errors_of(source):
+        data = parse_yaml(text)
     return rover_from_dict(data, source)

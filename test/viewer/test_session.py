@@ -57,11 +57,10 @@ def test_the_height_of_the_wheels_moves_all_six():
     assert {wheel[2] for wheel in rover.suspension.wheels.values()} == {-0.25}
 
 
-def test_text_that_is_no_rover_file_is_refused_with_its_name():
-    with pytest.raises(PlanningError, match="mine.yaml"):
-        read_rover("{", "mine.yaml")
-    with pytest.raises(RoverFileError, match="mine.yaml"):
-        read_rover("name: x", "mine.yaml")
+@pytest.mark.parametrize("text", ["{", "name: x", "!!bool foo", "name: x\nname: y\n"])
+def test_text_that_is_no_rover_file_is_refused_with_its_name(text):
+    with pytest.raises(RoverFileError, match="^mine.yaml: "):
+        read_rover(text, "mine.yaml")
 
 
 # The session.
