@@ -9,13 +9,16 @@ NAME = "rover_planner"
 IMPORT_PACKAGES = ("rover_physics", "msg_adapters", "rover_planner")
 HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link to this file
 
-# Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba and osqp are not in it.
+# Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba, osqp and clarabel are not in
+# it, and its pydantic is version 1.
 # Upper bounds: the next version that may break. constraints.txt holds the versions tested.
 REQUIRES = [
     "numpy>=1.26,<3",
     "scipy>=1.11,<2",
     "numba>=0.60,<1",
     "osqp>=1.0,<2",
+    "clarabel>=0.10,<1",
+    "pydantic>=2.12,<3",
     "PyYAML>=6.0,<7",
     "typer>=0.9,<1",
     "rich>=13.7,<16",

@@ -20,6 +20,9 @@ ROS_FREE = {
     "scipy",
     "numba",
     "osqp",
+    "clarabel",
+    "pydantic",
+    "pydantic_core",
     "yaml",
     "rover_physics",
 }
