@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import RoverError
+from rover_physics.files.validation import Key
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
@@ -23,7 +24,7 @@ from rover_planner.planning.path_query import (
     check_path,
     choose,
 )
-from rover_planner.studies.rover_values import Key, with_value
+from rover_planner.studies.rover_values import with_value
 from rover_planner.viewer.state.journey import Journey
 
 REFUSALS = (RoverError, PlanningError)
