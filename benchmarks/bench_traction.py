@@ -1,8 +1,8 @@
 """Updates of the traction controller: alone, and at 100 Hz for a minute beside a busy server.
 
-Alone, the node publishes what it makes of a drive over rocks, in CPU time. Then simulator,
-controller and server run in processes of their own; the controller's own diagnostics say how long
-its updates took (estimate, build, solve, publish), by the clock, and how many cycles it missed.
+Alone, the node gets the measurements of a drive over rocks, and CPU time is measured. Then
+simulator, controller and server run in processes of their own; the controller's diagnostics hold
+the time of its updates (estimate, build, solve, publish), by the clock, and the cycles it missed.
 """
 
 import threading
@@ -27,35 +27,40 @@ from support.rough_grounds import rocky
 from support.traction_states import drive_states
 
 RATE = 100.0
-DURATION = 60.0
-ALONE = 20.0
-"""How long updates are measured alone [s]."""
+"""Rate of the controller [Hz]."""
+SPEED = 0.03
+"""Wanted speed [m/s]."""
+TOGETHER_TIME = 60.0
+"""Time for which everything runs together [s]."""
+ALONE_TIME = 20.0
+"""Time for which updates are measured alone [s]."""
 PRIORITY = 50
-"""Of the controller (SCHED_FIFO), as ros2_control has it; where it is not granted, none."""
+"""Priority of the controller (SCHED_FIFO), as in ros2_control; none where it is not granted."""
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
+"""Poses of the question that the server answers: x, y [m], yaw [rad]."""
 
 
 class DiagnosticsReader:
-    """Keeps the latest words of the controller's diagnostics."""
+    """Keeps the values of the controller's last diagnostics."""
 
     def __init__(self, node: Node):
-        self.words: dict[str, str] = {}
+        self.values: dict[str, str] = {}
         node.create_subscription(DiagnosticArray, "/diagnostics", self._take, topic_qos())
 
     def _take(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name.startswith("traction_controller"):
-                self.words = {value.key: value.value for value in status.values}
+                self.values = {item.key: item.value for item in status.values}
 
     def wait_for_updates(self, count: int, timeout: float = 120.0) -> dict[str, float]:
-        """Return the numbers among the words once so many updates were made."""
+        """Return the numbers among the values once so many updates were made."""
         end = time.monotonic() + timeout
-        while float(self.words.get("updates", 0)) < count:
+        while float(self.values.get("updates", 0)) < count:
             if time.monotonic() > end:
-                raise TimeoutError(f"the controller made {self.words.get('updates', 0)} updates")
+                raise TimeoutError(f"the controller made {self.values.get('updates', 0)} updates")
             time.sleep(0.1)
         numbers = {}
-        for key, value in self.words.items():
+        for key, value in self.values.items():
             try:
                 numbers[key] = float(value)
             except ValueError:
@@ -69,14 +74,14 @@ def measure() -> list[Figure]:
 
 
 def measure_alone() -> list[Figure]:
-    """Let a node update and publish at its rate on measurements of a drive over rocks."""
+    """Measure a node that updates and publishes at its rate, on a drive over rocks."""
     prediction, motions, duration = drive_states(load_rover("lsr1"), rocky(1))
-    assert prediction.settled.all(), "the ground of the drive is to be passable"
+    assert prediction.settled.all(), "the rover must settle everywhere on the way"
     context = Context()
     rclpy.init(context=context, domain_id=DOMAIN)
     node, times = TractionController(context=context), []
     began = time.monotonic()
-    for k in range(int(RATE * ALONE)):
+    for k in range(int(RATE * ALONE_TIME)):
         time.sleep(max(began + k / RATE - time.monotonic(), 0.0))
         place, share = divmod(k / RATE / duration, 1.0)
         _take(node, _blend(motions[int(place)], motions[int(place) + 1], share))
@@ -95,24 +100,24 @@ def measure_alone() -> list[Figure]:
 
 
 def _blend(before: Motion, after: Motion, share: float) -> Motion:
-    """Return what is measured between two moments."""
+    """Return the measurement between two moments."""
     pairs = ((getattr(before, f.name), getattr(after, f.name)) for f in fields(Motion))
     return Motion(*((1.0 - share) * first + share * second for first, second in pairs))
 
 
 def _take(node: TractionController, motion: Motion) -> None:
-    """Hand a node what a rover measures."""
+    """Give a node the measurements of a rover."""
     now, rocker = time.monotonic(), (motion.rocker_angle, -motion.rocker_angle)
     positions = dict(zip(SUSPENSION_JOINTS, (*rocker, *motion.bogie_angles), strict=True))
     rates = (motion.rocker_rate, -motion.rocker_rate, *motion.bogie_rates, *motion.wheel_rates)
     velocities = dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), rates, strict=True))
     node.service.take_joints(positions, velocities, now)
     node.service.take_attitude(motion.roll, motion.pitch, motion.body_rates, now)
-    node.service.take_command(0.03, 0.0, now)
+    node.service.take_command(SPEED, 0.0, now)
 
 
 def measure_together() -> list[Figure]:
-    """Let everything run together for a minute."""
+    """Measure the node while a simulator and a busy server run beside it."""
     ground = make_mars_terrain(1, 24.0, 0.05)
     with planner_and_processes() as (planner, processes):
         reader = DiagnosticsReader(planner.node)
@@ -123,10 +128,10 @@ def measure_together() -> list[Figure]:
         stop = threading.Event()
         asked = threading.Thread(target=_ask_on, args=(planner, stop))
         asked.start()
-        time.sleep(DURATION)
+        time.sleep(TOGETHER_TIME)
         stop.set()
         asked.join()
-        after = reader.wait_for_updates(int(before["updates"] + 0.9 * RATE * DURATION))
+        after = reader.wait_for_updates(int(before["updates"] + 0.9 * RATE * TOGETHER_TIME))
     missed = after["missed_cycles"] - before["missed_cycles"]
     updates = int(after["updates"] - before["updates"])
     return [

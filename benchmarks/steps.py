@@ -7,7 +7,7 @@ import sys
 
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
-from rover_planner.simulator.mujoco_engine import MujocoPlant
+from rover_planner.simulator.mujoco_plant import MujocoPlant
 from rover_planner.studies.objectives import step_ground, tallest_step
 from rover_planner.studies.rover_keys import vary
 

@@ -1,7 +1,7 @@
-"""Wheel torques in closed loop: speed servos, equal torques and the program, in MuJoCo.
+"""Wheel torques in closed loop in MuJoCo: speed servos, equal torques, the quadratic program.
 
 Run from the repository: python -m benchmarks.traction [--quick] [--out FOLDER]
-It needs the extra `bench`. docs/traction.md has what it says.
+It needs the extra `bench`. Its results are in docs/traction.md.
 """
 
 import argparse
@@ -21,25 +21,34 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.simulator.mujoco_rover import RoverPlant
+from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.traction.traction_service import TractionService, settings_from_parameters
 from support.reference_drives import drive_ground
 from support.rough_grounds import bouldered, fractal
 
 PERIOD = 0.02
+"""Period of the controllers [s]."""
 SPEED = 0.06
-"""Of the drives [m/s]: twice the rover's own, half as long to wait for."""
+"""Speed of the drives [m/s]: twice the rover's own, so that they take half the time."""
 START, END = -1.2, 1.2
-PATIENCE = 2.0
-"""Times the way's duration after which a rover is stuck."""
-TIPPED = 1.2
-SERVO, EQUAL, MOTION, MAP = "servo", "equal", "optimal", "optimal, map"
-CONTROLLERS = (SERVO, EQUAL, MOTION, MAP)
+"""x of the body's origin at the start and at the end of a drive [m]."""
+MAX_DURATION_RATIO = 2.0
+"""Time after which a rover counts as stuck, over the duration of a drive at SPEED."""
+MAX_TILT = 1.2
+"""Tilt from which a rover counts as tipped over [rad]."""
+MAX_OFFSET = 1.0
+"""Distance from the x axis from which a rover counts as lost [m]."""
+MIN_LOAD = 0.02
+"""Load from which the utilisation of a wheel counts, in sixths of the weight."""
+SERVO_CONTROLLER, EQUAL_CONTROLLER = "servo", "equal"
+MOTION_CONTROLLER, MAP_CONTROLLER = "optimal", "optimal, map"
+CONTROLLERS = (SERVO_CONTROLLER, EQUAL_CONTROLLER, MOTION_CONTROLLER, MAP_CONTROLLER)
+"""Speed servos, equal torques, the program with contact angles from motion, and from the map."""
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """One ground to drive over along +x."""
+    """A ground to drive over along +x."""
 
     kind: str
     """step, bump_one_side, ditch, slope, rocks or relief."""
@@ -56,43 +65,46 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Drive:
-    """How a drive went; means are over time and wheels, from start to end or to where it stuck."""
+    """Result of a drive; means are over time and wheels, to the end or to where it stuck."""
 
     passed: bool
-    """Whether the rover came to the end."""
+    """Whether the rover reached the end."""
     end: float
     """x of the body's origin at the end [m]."""
     duration: float
-    """[s]"""
+    """Duration [s]."""
     mean_utilisation: float
-    """Mean of the largest of the wheels' utilisations."""
+    """Mean over time of the largest utilisation of all wheels."""
     peak_utilisation: float
-    """The same, 95th percentile."""
+    """95th percentile of the same."""
     slip: float
-    """Way that a tread slid over the ground [m], mean of the wheels."""
+    """Distance that a tread slid over the ground [m], mean of the wheels."""
     torque: float
     """Mean size of a wheel's torque [N m]."""
     torque_squared: float
     """Mean square of a wheel's torque [(N m)^2]."""
     energy: float
-    """Mechanical work of the motors, without what they take back [J]."""
+    """Mechanical work of the motors, without what they recover [J]."""
 
 
-Controller = Callable[[RoverPlant], np.ndarray]
+Controller = Callable[[MujocoRover], np.ndarray]
 
 
 def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain) -> Controller:
-    """Return a function that moves the plant on by a period and returns its torques."""
-    if name == SERVO:
+    """Return a function that advances the plant by a period and returns its torques."""
+    if name == SERVO_CONTROLLER:
         rates = np.full(6, SPEED / rover.wheel.radius)
         return lambda plant: plant.servo(rates, PERIOD)
     values = {spec.name: spec.default for spec in TRACTION_CONTROLLER}
-    values |= {"policy": "equal" if name == EQUAL else "optimal", "friction": obstacle.friction}
+    values |= {
+        "policy": "equal" if name == EQUAL_CONTROLLER else "optimal",
+        "friction": obstacle.friction,
+    }
     service = TractionService(settings_from_parameters(values))
-    if name == MAP:
+    if name == MAP_CONTROLLER:
         service.take_terrain(ground)
 
-    def control(plant: RoverPlant) -> np.ndarray:
+    def control(plant: MujocoRover) -> np.ndarray:
         now = plant.time
         service.take_joints(plant.joint_positions, plant.joint_velocities, now)
         service.take_attitude(*plant.attitude, plant.body_rates, now)
@@ -106,21 +118,25 @@ def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain
 
 
 def drive(obstacle: Obstacle, name: str, trace: list | None = None) -> Drive:
-    """Drive the rover lsr1 over an obstacle under a controller; `trace` takes what it did."""
+    """Drive the rover lsr1 over an obstacle with a controller.
+
+    A row for each period is appended to `trace`: time [s], x [m], loads (6) [N], torques (6)
+    [N m], peak utilisation.
+    """
     rover, ground = load_rover("lsr1"), make_ground(obstacle)
-    plant = RoverPlant(rover, ground, (START, 0.0, 0.0), obstacle.friction)
+    plant = MujocoRover(rover, ground, (START, 0.0, 0.0), obstacle.friction)
     control = make_controller(name, rover, obstacle, ground)
     sums, peaks = np.zeros(4), []
-    while plant.time < PATIENCE * (END - START) / SPEED and plant.pose[0] < END:
+    while plant.time < MAX_DURATION_RATIO * (END - START) / SPEED and plant.pose[0] < END:
         torques = control(plant)
-        if plant.tilt > TIPPED or abs(plant.pose[1]) > 1.0:
+        if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET:
             break
         contacts = plant.measure_contacts()
         sums[0] += contacts.slip_speeds.mean() * PERIOD
         sums[1] += np.abs(torques).mean() * PERIOD
         sums[2] += (torques**2).mean() * PERIOD
         sums[3] += np.clip(torques * plant.wheel_rates, 0.0, None).sum() * PERIOD
-        held = contacts.loads > 0.02 * rover.weight / 6.0
+        held = contacts.loads > MIN_LOAD * rover.weight / 6.0
         used = contacts.shears[held] / (obstacle.friction * contacts.loads[held])
         peaks.append(float(used.max(initial=0.0)))
         if trace is not None:
@@ -158,14 +174,15 @@ OBSTACLES = (
     *(Obstacle("rocks", seed, mu) for seed, mu in ((1, 0.4), (2, 0.6), (3, 0.8), (4, 1.0))),
     *(Obstacle("relief", seed, mu) for seed, mu in ((1, 0.4), (2, 0.6), (3, 0.8))),
 )  # fmt: skip
-"""What is driven over: frictions from 0.4 to 1.0."""
+"""Obstacles of the benchmark: frictions from 0.4 to 1.0."""
 ROUGH = ("rocks", "relief")
-QUICK = 5
-"""Every so many obstacles with --quick."""
+"""Kinds of rough ground."""
+QUICK_STEP = 5
+"""--quick drives over one of so many obstacles."""
 
 
 def drive_all(obstacles: Sequence[Obstacle]) -> dict[tuple[Obstacle, str], Drive]:
-    """Drive over all obstacles under all controllers, a process per core."""
+    """Drive over all obstacles with all controllers, a process per core."""
     jobs = [(obstacle, name) for obstacle in obstacles for name in CONTROLLERS]
     context = multiprocessing.get_context("spawn")
     with (
@@ -180,14 +197,20 @@ def drive_all(obstacles: Sequence[Obstacle]) -> dict[tuple[Obstacle, str], Drive
 
 
 def compare(drives: dict[tuple[Obstacle, str], Drive], kinds: Sequence[str]) -> dict[str, dict]:
-    """Return for each controller sums over the obstacles that all of them got over."""
-    obstacles = [obstacle for obstacle, name in drives if name == SERVO and obstacle.kind in kinds]
+    """Return for each controller sums over the obstacles that all controllers passed."""
+    obstacles = [
+        obstacle
+        for obstacle, name in drives
+        if name == SERVO_CONTROLLER and obstacle.kind in kinds
+    ]
     common = [o for o in obstacles if all(drives[o, name].passed for name in CONTROLLERS)]
     sums = {}
     for name in CONTROLLERS:
         rows = [drives[obstacle, name] for obstacle in common]
         lost = [
-            o.label for o in obstacles if drives[o, SERVO].passed and not drives[o, name].passed
+            o.label
+            for o in obstacles
+            if drives[o, SERVO_CONTROLLER].passed and not drives[o, name].passed
         ]
         sums[name] = {
             "passed": sum(drives[obstacle, name].passed for obstacle in obstacles),
@@ -210,7 +233,7 @@ def show_drives(drives: dict[tuple[Obstacle, str], Drive]) -> Table:
         table.add_column(heading, justify="left" if heading in headings[:2] else "right")
     for (obstacle, name), row in drives.items():
         table.add_row(
-            obstacle.label if name == SERVO else "", name,
+            obstacle.label if name == SERVO_CONTROLLER else "", name,
             "passed" if row.passed else f"{row.end:.2f}", f"{row.mean_utilisation:.2f}",
             f"{row.peak_utilisation:.2f}", f"{row.slip:.3f}", f"{row.torque:.3f}",
             f"{row.energy:.1f}",
@@ -219,13 +242,13 @@ def show_drives(drives: dict[tuple[Obstacle, str], Drive]) -> Table:
 
 
 def show_sums(sums: dict[str, dict], title: str) -> Table:
-    """Return a row for each controller, with what it saves against the servos."""
+    """Return a row for each controller, with its differences from the servos."""
     table = Table(title=title)
     headings = ("controller", "passed", "lost", "slip [m]", "torque [N m]", "energy [J]",
                 "utilisation")  # fmt: skip
     for heading in headings:
         table.add_column(heading, justify="left" if heading in ("controller", "lost") else "right")
-    base = sums[SERVO]
+    base = sums[SERVO_CONTROLLER]
 
     def against(row: dict, key: str, digits: int) -> str:
         change = 100.0 * (row[key] / base[key] - 1.0) if base[key] else 0.0
@@ -241,7 +264,7 @@ def show_sums(sums: dict[str, dict], title: str) -> Table:
 
 
 def draw_sums(sums: dict[str, dict], picture: Path) -> None:
-    """Draw slip, torque, energy and utilisation of the controllers, in shares of the servos'."""
+    """Draw slip, torque, energy and utilisation of the controllers over those of the servos."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -252,7 +275,7 @@ def draw_sums(sums: dict[str, dict], picture: Path) -> None:
     width = 0.8 / len(CONTROLLERS)
     colours = ("#999999", "#e69f00", "#56b4e9", "#0072b2")
     for k, (name, colour) in enumerate(zip(CONTROLLERS, colours, strict=True)):
-        shares = [sums[name][key] / sums[SERVO][key] for key in keys]
+        shares = [sums[name][key] / sums[SERVO_CONTROLLER][key] for key in keys]
         axes.bar(np.arange(len(keys)) + k * width, shares, width, label=name, color=colour)
     axes.set_xticks(np.arange(len(keys)) + 1.5 * width)
     axes.set_xticklabels(("slip distance", "torque effort", "energy", "utilisation"))
@@ -264,16 +287,16 @@ def draw_sums(sums: dict[str, dict], picture: Path) -> None:
 def main() -> None:
     """Drive, print tables, and write JSON and a picture."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--quick", action="store_true", help=f"every {QUICK}th obstacle only")
+    parser.add_argument("--quick", action="store_true", help=f"only every {QUICK_STEP}th obstacle")
     parser.add_argument("--out", type=Path, default=Path("bench_output"))
     arguments = parser.parse_args()
-    drives = drive_all(OBSTACLES[::QUICK] if arguments.quick else OBSTACLES)
+    drives = drive_all(OBSTACLES[::QUICK_STEP] if arguments.quick else OBSTACLES)
     kinds = tuple(dict.fromkeys(obstacle.kind for obstacle, _ in drives))
     everything, rough = compare(drives, kinds), compare(drives, ROUGH)
     console = Console()
     console.print(show_drives(drives))
-    console.print(show_sums(everything, "All obstacles that all controllers got over"))
-    console.print(show_sums(rough, "Rocks and relief that all controllers got over"))
+    console.print(show_sums(everything, "All obstacles that all controllers passed"))
+    console.print(show_sums(rough, "Rocks and relief that all controllers passed"))
     arguments.out.mkdir(parents=True, exist_ok=True)
     rows = [asdict(o) | {"controller": name} | asdict(row) for (o, name), row in drives.items()]
     result = {"drives": rows, "all": everything, "rough": rough}

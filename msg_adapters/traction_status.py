@@ -9,32 +9,32 @@ STATUS_NAME = "traction_controller: wheel torques"
 
 
 def traction_diagnostics(
-    words: Mapping[str, Any], fault: str, hardware_id: str, stamp
+    values: Mapping[str, Any], fault: str, hardware_id: str, stamp
 ) -> DiagnosticArray:
-    """Write what there is to say of a traction controller as one status.
+    """Write the state of a traction controller as one status.
 
     Args:
-        words: What becomes keys and values; `warning`, `fallback` and `contact_source` decide the
-            level too.
-        fault: Why there is no torque, empty where there is.
+        values: What becomes keys and values of the status; `warning`, `fallback` and
+            `contact_source` decide its level too.
+        fault: Why there is no torque, empty where there is torque.
         hardware_id: Name of the rover.
         stamp: builtin_interfaces/Time.
 
     Returns:
-        An array with one status: ERROR where a fault holds the wheels, WARN where the rover
-        drives on less than it should have, else OK.
+        An array with one status: ERROR where a fault sets the torques to zero, WARN where the
+        rover drives with equal torques or without an input that it should have, else OK.
     """
     status = DiagnosticStatus(name=STATUS_NAME, hardware_id=hardware_id)
     if fault:
         status.level, status.message = DiagnosticStatus.ERROR, f"zero torque: {fault}"
-    elif words.get("fallback"):
+    elif values.get("fallback"):
         status.level, status.message = DiagnosticStatus.WARN, "equal torques: not solved"
-    elif words.get("warning"):
-        status.level, status.message = DiagnosticStatus.WARN, str(words["warning"])
+    elif values.get("warning"):
+        status.level, status.message = DiagnosticStatus.WARN, str(values["warning"])
     else:
-        source = words.get("contact_source", "nothing")
+        source = values.get("contact_source", "nothing")
         status.level, status.message = DiagnosticStatus.OK, f"contact angles from {source}"
-    status.values = [KeyValue(key=key, value=str(value)) for key, value in words.items()]
+    status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     message = DiagnosticArray(status=[status])
     message.header.stamp = stamp
     return message

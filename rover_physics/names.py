@@ -10,6 +10,9 @@ WHEELS = (
 )
 """Wheel order of every per-wheel array, as in the paper: the right side first, rear to front."""
 
+WHEEL_COUNT = len(WHEELS)
+"""Number of wheels."""
+
 SIDES = ("right", "left")
 """Side order of every per-side array."""
 

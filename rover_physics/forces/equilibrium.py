@@ -47,8 +47,13 @@ def balance_forces(linkage, placement, contacts, columns, balance):
 
     `columns` is 1 for the common pull alone, 6 with the changes by torques, 10 with all.
     """
-    _write_frames(placement, contacts, balance.frames)
-    _write_equations(linkage, placement, contacts, columns, balance)
+    write_equations(linkage, placement, contacts, columns, balance)
+    return solve_equations(linkage, placement, columns, balance)
+
+
+@kernel
+def solve_equations(linkage, placement, columns, balance):
+    """Solve the equations of `write_equations` into `balance`; False where they are singular."""
     B = balance.B
     if not solve_in_place(balance.A, B, UNKNOWNS, columns):
         return False
@@ -86,9 +91,14 @@ def _write_frames(placement, contacts, frames):
 
 
 @kernel
-def _write_equations(linkage, placement, contacts, columns, balance):
-    """Write the nine equations: forces, moments about the origin, bogies, differential."""
+def write_equations(linkage, placement, contacts, columns, balance):
+    """Write the nine equations: forces, moments about the origin, bogies, differential.
+
+    Rows of balance.A and balance.B: forces along map x, y, z in weights; moments about map x, y, z
+    in weights times the reference length; right and left bogie; differential.
+    """
     A, B, frames = balance.A, balance.B, balance.frames
+    _write_frames(placement, contacts, frames)
     A[:, :] = 0.0
     B[:, :] = 0.0
     origin, length = placement.origin, linkage.length

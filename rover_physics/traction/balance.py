@@ -1,9 +1,9 @@
 """The balance of a rover whose attitude, suspension and contact angles are measured, as rows.
 
 The nine equations of `equilibrium` are kept in the form in which they are solved for what they
-determine: six loads, two lateral terms and the pull of the last wheel as linear functions of how
-much more each other wheel pulls than the last does. The wanted net traction enters as a force on
-the centre of mass against the way the rover is to be pushed (d'Alembert), so that the tractions
+determine: six loads, two lateral terms and the traction of the last wheel as linear functions of
+how much more each other wheel pulls than the last does. The wanted push is d'Alembert's force: the
+rover accelerates forward as if a force on its centre of mass held it back, so that the tractions
 together hold gravity and push by as much.
 """
 
@@ -14,16 +14,36 @@ import numpy as np
 
 from rover_physics.contact.contact_record import CONTACTS
 from rover_physics.errors import ModelError
-from rover_physics.forces.equilibrium import BALANCE, FREE_TORQUES, balance_forces
+from rover_physics.forces.equilibrium import (
+    BALANCE,
+    FREE_TORQUES,
+    solve_equations,
+    write_equations,
+)
+from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
+from rover_physics.traction.layout import (
+    EQUATIONS,
+    FORCES,
+    LAST_WHEEL,
+    LATERAL_SHARE,
+    LATERAL_SHARE_EQUATION,
+    LATERAL_SLOPE,
+    LATERAL_SLOPE_EQUATION,
+    LOAD,
+    TRACTION,
+    TRACTION_EQUATION,
+    TRACTIONS,
+)
 
-WHEEL_COUNT = 6
-FORCES = 2 * WHEEL_COUNT + 2
-"""Tractions, loads and two lateral terms."""
+FORCE_ROW, MOMENT_ROW = 0, 3
+"""First rows of the forces and of the moments in the equations of `equilibrium`."""
+REAR, FRONT = WHEELS.index("rear_right"), WHEELS.index("front_right")
+"""Wheels whose lateral forces give those of all wheels, which are linear along the body."""
 
 
 @dataclass(frozen=True)
@@ -44,32 +64,61 @@ class MeasuredState:
     """(6,) where each wheel touches along its axis, from its middle [m]."""
 
 
+MEASURED_BALANCE = record_type(
+    ("A", float, (EQUATIONS, FORCES)),  # coefficients, of order one
+    ("b", float, (EQUATIONS,)),  # right-hand sides
+    ("along", float, (WHEEL_COUNT,)),  # places of the wheels along the body, in rover lengths
+    ("force_unit", float),  # a sixth of the weight [N]
+)
+"""The numbers of `BalanceRows` as the kernels read them."""
+
+
 @dataclass(frozen=True, eq=False)
 class BalanceRows:
-    """Nine equations A x = b in x = tractions (6), loads (6), s0, s1, all in `force_unit`."""
+    """Nine equations A x = b in x = tractions (6), loads (6), s0, s1, all in `force_unit`.
 
-    A: np.ndarray
-    """(9, 14) coefficients, of order one."""
-    b: np.ndarray
-    """(9,) right-hand sides."""
-    along: np.ndarray
-    """(6,) places of the wheels along the body, in lengths of the rover: S_i = s0 + s1 along_i."""
-    force_unit: float
-    """A sixth of the weight in [N]."""
+    `layout` has the names of the variables and of the equations.
+    """
+
+    packed: np.ndarray
+    """Array (1,) of MEASURED_BALANCE."""
+
+    @property
+    def A(self) -> np.ndarray:  # noqa: N802
+        """Coefficients (9, 14), of order one."""
+        return self.packed["A"][0]
+
+    @property
+    def b(self) -> np.ndarray:
+        """Right-hand sides (9,)."""
+        return self.packed["b"][0]
+
+    @property
+    def along(self) -> np.ndarray:
+        """Places (6,) of the wheels along the body in lengths of the rover: S_i = s0 + s1 along_i.
+
+        The length is from rear to front axle.
+        """
+        return self.packed["along"][0]
+
+    @property
+    def force_unit(self) -> float:
+        """A sixth of the weight in [N]."""
+        return float(self.packed["force_unit"][0])
 
     @property
     def wheel_speeds(self) -> np.ndarray:
         """Speeds (6,) of the wheels' centres while the rover drives, relative to their mean.
 
-        The last equation is that of virtual work: the tractions, each over the way that its wheel
-        moves, lift and push the rover.
+        The traction equation is that of virtual work: the tractions, each over the way that its
+        wheel moves, lift and push the rover.
         """
-        return WHEEL_COUNT * self.A[8, :WHEEL_COUNT]
+        return WHEEL_COUNT * self.A[TRACTION_EQUATION, TRACTIONS]
 
     @property
     def equal_pull(self) -> float:
         """The traction of each wheel where all pull alike, in force units."""
-        return float(self.b[8])
+        return float(self.b[TRACTION_EQUATION])
 
     def complete(self, tractions: np.ndarray) -> np.ndarray:
         """Return x (14,) that keeps all nine equations, with the differences between tractions.
@@ -78,23 +127,35 @@ class BalanceRows:
             tractions: (6,) in force units; what all have in common follows from the balance.
         """
         x = np.empty(FORCES)
-        _complete(self.A, self.b, tractions, x)
+        _complete(self.packed, tractions, x)
         return x
 
+    def pull_equally(self) -> np.ndarray:
+        """Return x (14,) that keeps all nine equations, with the same traction at all wheels."""
+        return self.complete(np.zeros(WHEEL_COUNT))
 
-ROWS_WORK = record_type(
+
+MEASUREMENT = record_type(
+    ("pose", float, (3,)),  # x, y [m] and yaw [rad], for `place`
+    (
+        "q",
+        float,
+        (6,),
+    ),  # z [m], roll, pitch, right rocker, right and left bogie [rad], for `place`
+    ("contact_angles", float, (WHEEL_COUNT,)),  # [rad]
+    ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
+    ("push", float),  # wanted push along body +x [N]
+)
+"""A `MeasuredState` and the wanted push as the kernels read them; x, y, z and yaw are 0."""
+
+BALANCE_WORK = record_type(
+    ("measured", MEASUREMENT),
+    ("com", float, (3,)),  # centre of mass of the whole rover on flat ground [m], body frame
     ("placement", PLACEMENT),
     ("contacts", CONTACTS),
     ("balance", BALANCE),
-    ("pose", float, (3,)),
-    ("q", float, (6,)),
-    ("angles", float, (6,)),
-    ("offsets", float, (6,)),
-    ("push", float),
 )
-"""Work space of `BalanceWriter`."""
-GIVEN = 6
-"""Numbers of a state that are handed over together: attitude, suspension, push."""
+"""Input and work space of `BalanceWriter`."""
 
 
 class BalanceWriter:
@@ -111,12 +172,15 @@ class BalanceWriter:
             ModelError: A payload below zero, or for a rover without an arm.
         """
         mass, com = body_mass_and_com(rover, payload=payload)
-        self._linkage = pack_linkage(rover, mass, com)
-        self._linkage.has_tool_load = True
-        self._linkage.tool[0] = _centre_of_mass(self._linkage)
-        self._linkages, self._works = array_of(self._linkage), array_of(new_record(ROWS_WORK))
-        self._given = np.zeros(GIVEN)
-        self.weight = float(self._linkage.mass * self._linkage.gravity)
+        linkage = pack_linkage(rover, mass, com)
+        self._linkages = array_of(linkage)
+        self._works = array_of(new_record(BALANCE_WORK, com=_centre_of_mass(linkage)))
+        # Looking up a field of a record takes as long as writing it.
+        measured = self._works["measured"]
+        self._q, self._push = measured["q"][0], measured["push"]
+        self._contact_angles = measured["contact_angles"][0]
+        self._contact_offsets = measured["contact_offsets"][0]
+        self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
 
     def write(self, state: MeasuredState, net_traction: float) -> BalanceRows:
@@ -130,21 +194,23 @@ class BalanceWriter:
             ModelError: The equations do not determine the forces: the contact angles contradict
                 one another so that the rover could not roll.
         """
-        given = self._given
-        given[0], given[1], given[2] = state.roll, state.pitch, state.rocker_angle
-        given[3:5], given[5] = state.bogie_angles, net_traction
-        A, b, along = np.zeros((9, FORCES)), np.empty(9), np.empty(6)
-        angles, offsets = state.contact_angles, state.contact_offsets
-        if not _write_state(self._linkages, self._works, given, angles, offsets, A, b, along):
+        q = self._q
+        q[1], q[2], q[3] = state.roll, state.pitch, state.rocker_angle
+        q[4:] = state.bogie_angles
+        self._contact_angles[:] = state.contact_angles
+        self._contact_offsets[:] = state.contact_offsets
+        self._push[0] = net_traction
+        packed = np.zeros(1, MEASURED_BALANCE)
+        if not _write_balance(self._linkages, self._works, packed):
             raise ModelError(
-                f"contact angles {np.round(angles, 3).tolist()} rad leave the balance "
-                "without a solution; they must be such that all wheels can roll at once"
+                f"contact angles {np.round(state.contact_angles, 3).tolist()} rad leave the "
+                "balance without a solution; they must be such that all wheels can roll at once"
             )
-        return BalanceRows(A, b, along, self.weight / WHEEL_COUNT)
+        return BalanceRows(packed)
 
 
 def _centre_of_mass(linkage: Any) -> np.ndarray:
-    """Return the centre of mass (3,) of the whole rover on flat ground, body frame."""
+    """Return the centre of mass (3,) [m] of the whole rover on flat ground, body frame."""
     total = linkage.body_mass * linkage.body_com
     total = total + linkage.rocker_mass * linkage.rocker_coms.sum(axis=0)
     total = total + linkage.bogie_mass * linkage.bogie_coms.sum(axis=0)
@@ -153,79 +219,106 @@ def _centre_of_mass(linkage: Any) -> np.ndarray:
 
 
 @kernel
-def _complete(A, b, tractions, x):
-    """Write x (14,) that keeps all nine equations A x = b, with these differences of tractions."""
-    for row in range(9):
+def _complete(balances, tractions, x):
+    """Write x (14,) that keeps all nine equations, with these differences of tractions (6,)."""
+    balance = balances[0]
+    A, b = balance.A, balance.b
+    last = tractions[LAST_WHEEL]
+    for row in range(EQUATIONS):
         rest = b[row]
-        for wheel in range(6):
-            rest -= A[row, wheel] * (tractions[wheel] - tractions[5])
-        if row < 8:
-            x[6 + row] = rest
-    for wheel in range(6):
-        x[wheel] = tractions[wheel] - tractions[5] + rest
+        for wheel in range(WHEEL_COUNT):
+            rest -= A[row, TRACTION + wheel] * (tractions[wheel] - last)
+        if row < TRACTION_EQUATION:
+            x[LOAD + row] = rest
+    for wheel in range(WHEEL_COUNT):
+        x[TRACTION + wheel] = tractions[wheel] - last + rest
 
 
 @kernel
-def _write_state(linkages, works, given, angles, offsets, A, b, along):
-    """Write the nine equations at a measured state; False where they are singular."""
-    work = works[0]
-    work.q[0], work.push = 0.0, given[5]
-    for k in range(5):
-        work.q[1 + k] = given[k]
-    for wheel in range(6):
-        work.angles[wheel], work.offsets[wheel] = angles[wheel], offsets[wheel]
-    return _write_rows(linkages[0], work, A, b, along)
-
-
-@kernel
-def _write_rows(linkage, work, A, b, along):
-    """Write the nine equations at what `work` was given; False where they are singular."""
-    placement, contacts, balance = work.placement, work.contacts, work.balance
-    linkage.tool[1, 0] = -work.push
-    place(linkage, work.pose, work.q, placement)
-    place_masses(linkage, work.q, placement)
-    _write_contact(linkage.radius, placement, work.angles, work.offsets, contacts)
-    if not balance_forces(linkage, placement, contacts, 1 + FREE_TORQUES, balance):
+def _write_balance(linkages, works, balances):
+    """Write the nine equations at the measurement in `works`; False where they are singular."""
+    linkage, work, rows = linkages[0], works[0], balances[0]
+    placement, balance, measured = work.placement, work.balance, work.measured
+    columns = 1 + FREE_TORQUES
+    place(linkage, measured.pose, measured.q, placement)
+    place_masses(linkage, measured.q, placement)
+    _write_contacts(linkage.radius, work)
+    write_equations(linkage, placement, work.contacts, columns, balance)
+    _add_push(linkage, work)
+    if not solve_equations(linkage, placement, columns, balance):
         return False
-    for i in range(6):
-        along[i] = 0.0
-        for k in range(3):
-            along[i] += placement.R[k, 0] * (placement.centres[i, k] - placement.origin[k])
-        along[i] /= linkage.length
-    span = along[2] - along[0]
-    for column in range(1 + FREE_TORQUES):
-        slope = (balance.lateral[2, column] - balance.lateral[0, column]) / span
-        for row in range(9):
-            if row < 6:
-                value = balance.normal[row, column]
-                A[row, 6 + row] = 1.0
-            elif row == 6:
-                value = balance.lateral[0, column] - slope * along[0]
-                A[row, 12] = 1.0
-            elif row == 7:
-                value = slope
-                A[row, 13] = 1.0
-            else:
-                value = balance.tangential[5, column]
-            if column == 0:
-                b[row] = 6.0 * value
-            else:
-                A[row, column - 1] = -value
-                A[row, 5] += value
-    A[8, 5] += 1.0
+    rows.force_unit = linkage.mass * linkage.gravity / WHEEL_COUNT
+    _write_places(linkage.length, placement, rows.along)
+    _write_rows(balance, rows)
     return True
 
 
 @kernel
-def _write_contact(radius, placement, angles, offsets, contacts):
-    """Write where wheels of known contact angles touch."""
+def _write_contacts(radius, work):
+    """Write where wheels of measured contact angles touch."""
+    placement, contacts, measured = work.placement, work.contacts, work.measured
     R, forward, up = placement.R, placement.forward, placement.up
-    for wheel in range(6):
-        s, c = np.sin(angles[wheel]), np.cos(angles[wheel])
+    for wheel in range(WHEEL_COUNT):
+        angle, offset = measured.contact_angles[wheel], measured.contact_offsets[wheel]
+        s, c = np.sin(angle), np.cos(angle)
         contacts.sine[wheel], contacts.cosine[wheel] = s, c
         for k in range(3):
             contacts.point[wheel, k] = (
                 placement.centres[wheel, k]
                 + radius * (s * forward[k] - c * up[k])
-                + offsets[wheel] * R[k, 1]
+                + offset * R[k, 1]
             )
+
+
+@kernel
+def _add_push(linkage, work):
+    """Add d'Alembert's force of the wanted push to the right-hand sides of the equations.
+
+    It acts on the body at the centre of mass, against the push: along body -x.
+    """
+    R, com, B = work.placement.R, work.com, work.balance.B
+    weight = linkage.mass * linkage.gravity
+    force = -work.measured.push
+    moment_y, moment_z = com[2] * force, -com[1] * force
+    for i in range(3):
+        B[FORCE_ROW + i, 0] -= R[i, 0] * force / weight
+        moment = R[i, 2] * moment_z + R[i, 1] * moment_y
+        B[MOMENT_ROW + i, 0] -= moment / (weight * linkage.length)
+
+
+@kernel
+def _write_places(length, placement, along):
+    """Write the places (6,) of the wheels along the body, in lengths of the rover."""
+    R, origin, centres = placement.R, placement.origin, placement.centres
+    for wheel in range(WHEEL_COUNT):
+        along[wheel] = 0.0
+        for k in range(3):
+            along[wheel] += R[k, 0] * (centres[wheel, k] - origin[k])
+        along[wheel] /= length
+
+
+@kernel
+def _write_rows(balance, rows):
+    """Write A x = b from the solved balance, which is in weights; A comes as zeros."""
+    A, b, along = rows.A, rows.b, rows.along
+    span = along[FRONT] - along[REAR]
+    for column in range(1 + FREE_TORQUES):
+        slope = (balance.lateral[FRONT, column] - balance.lateral[REAR, column]) / span
+        for row in range(EQUATIONS):
+            if row < LATERAL_SHARE_EQUATION:
+                value = balance.normal[row, column]
+                A[row, LOAD + row] = 1.0
+            elif row == LATERAL_SHARE_EQUATION:
+                value = balance.lateral[REAR, column] - slope * along[REAR]
+                A[row, LATERAL_SHARE] = 1.0
+            elif row == LATERAL_SLOPE_EQUATION:
+                value = slope
+                A[row, LATERAL_SLOPE] = 1.0
+            else:
+                value = balance.tangential[LAST_WHEEL, column]
+            if column == 0:
+                b[row] = WHEEL_COUNT * value
+            else:
+                A[row, TRACTION + column - 1] = -value
+                A[row, LAST_WHEEL] += value
+    A[TRACTION_EQUATION, LAST_WHEEL] += 1.0

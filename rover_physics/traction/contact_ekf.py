@@ -1,12 +1,12 @@
 """Contact angles from motion: a wheel moves along the ground where it touches.
 
 The centre of a wheel that rolls without slip moves at its rolling speed along its contact
-tangent, and the links say how the centres move relative to one another: the wheels of a bogie turn
-about each other at the bogie's rate, the rocker carries bogie and last wheel, the body both
-rockers. That makes ten equations in six contact angles, which an extended Kalman filter solves as
-the rover moves. Where all parts only shift, as on an even slope, the equations cannot tell the
-angles; then what is left is the slope of the lines between neighbouring wheels, towards which the
-angles drift as the rover rolls away from where they were found.
+tangent, and the links determine how the centres move relative to one another: the wheels of a
+bogie turn about each other at the bogie's rate, the rocker carries bogie and last wheel, the body
+both rockers. That makes ten equations in six contact angles, which an extended Kalman filter (EKF)
+solves as the rover moves. Where no link turns, as on an even slope, the equations do not determine
+the angles. Then the slopes of the lines between neighbouring wheels take their place: the angles
+drift towards them as the rover rolls away from where they were found.
 
 Source: Iagnemma and Dubowsky, "Vehicle wheel-ground contact angle estimation: with application to
 mobile robot traction control", Advances in Robot Kinematics, 2000.
@@ -16,30 +16,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rover_physics.names import WHEELS
+from rover_physics.names import WHEEL_COUNT, WHEEL_POSITIONS
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import pack_linkage, rocker_sign
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 
-WHEEL_COUNT = len(WHEELS)
-EQUATIONS = 5
-"""Pairs of wheels, or of rocker pivots, whose velocities are compared along body x and z."""
-MEMORY = 1.5
+PAIRS = 5
+"""Pairs of wheels whose velocities are compared along body x and z.
+
+On the right side both wheels of the bogie, then the rocker's wheel and the rear one of the bogie;
+the same on the left side; then the wheels of both rockers.
+"""
+ROCKER_PAIR = 4
+"""The last of them. What is compared there is the velocity of the rocker pivots."""
+MEMORY_DISTANCE = 1.5
 """Distance after which an angle is forgotten, in wheel radii."""
-SPREAD = 0.35
+SLOPE_DEVIATION = 0.35
 """Standard deviation of a contact angle about the slope between its neighbours [rad]."""
-SLIP = 0.1
+SLIP_DEVIATION = 0.1
 """Standard deviation of a wheel's speed from its rolling speed, as a share of it."""
-GYRO_NOISE = 0.005
+GYRO_DEVIATION = 0.005
 """Standard deviation of a turning rate [rad/s]."""
-MIN_SPEED = 0.02
-"""Rolling speed below which nothing is learnt, as a share of a wheel radius a second."""
+MIN_ROLLING_RATE = 0.02
+"""Rolling rate below which the angles stay as they are [rad/s]."""
 MAX_ANGLE = 1.7
-"""Largest angle [rad]: a wheel on a face, and a little more."""
-DOUBT = 3.0
-"""Standard deviations beyond which an equation counts less: a wheel that slips obeys none."""
+"""Largest angle [rad]: a wheel on a vertical face, and a little more."""
+MAX_RESIDUAL = 3.0
+"""Standard deviations beyond which an equation counts less: a wheel that slips violates it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,23 +82,24 @@ class Motion:
 
 
 def level_estimate() -> ContactEstimate:
-    """Return zero angles, for where nothing is known but that the ground may be uneven."""
-    return ContactEstimate(np.zeros(WHEEL_COUNT), SPREAD**2 * np.eye(WHEEL_COUNT), "zero")
+    """Return zero angles, as uncertain as those of uneven ground."""
+    covariance = SLOPE_DEVIATION**2 * np.eye(WHEEL_COUNT)
+    return ContactEstimate(np.zeros(WHEEL_COUNT), covariance, "zero")
 
 
 FILTER = record_type(
-    ("angles", float, (6,)),  # contact angles [rad]
-    ("covariance", float, (6, 6)),  # their covariance [rad^2]
-    ("prior", float, (6,)),  # angles before a correction [rad]
-    ("places", float, (6, 2)),  # wheel centres, body x and z [m]
+    ("angles", float, (WHEEL_COUNT,)),  # contact angles [rad]
+    ("covariance", float, (WHEEL_COUNT, WHEEL_COUNT)),  # their covariance [rad^2]
+    ("prior", float, (WHEEL_COUNT,)),  # angles before a correction [rad]
+    ("places", float, (WHEEL_COUNT, 2)),  # wheel centres, body x and z [m]
     ("bogies", float, (2, 2)),  # bogie pivots, body x and z [m]
-    ("turning", float, (6,)),  # turning rate of the link that carries each wheel [rad/s]
-    ("speeds", float, (6,)),  # rolling speeds [m/s]
-    ("slopes", float, (6,)),  # slopes of the lines between neighbouring wheels [rad]
-    ("first", np.int64, (EQUATIONS,)),  # wheel whose velocity counts positive
-    ("second", np.int64, (EQUATIONS,)),  # wheel whose velocity counts negative
-    ("known", float, (EQUATIONS, 2)),  # difference of their velocities by the links [m/s]
-    ("row", float, (6,)),  # an equation's coefficients, times the covariance
+    ("turning", float, (WHEEL_COUNT,)),  # turning rate of the link that carries each wheel [rad/s]
+    ("speeds", float, (WHEEL_COUNT,)),  # rolling speeds [m/s]
+    ("slopes", float, (WHEEL_COUNT,)),  # slopes of the lines between neighbouring wheels [rad]
+    ("first", np.int64, (PAIRS,)),  # wheel whose velocity counts positive
+    ("second", np.int64, (PAIRS,)),  # wheel whose velocity counts negative
+    ("known", float, (PAIRS, 2)),  # difference of their velocities by the links [m/s]
+    ("gain", float, (WHEEL_COUNT,)),  # covariance times an equation's coefficients
 )
 """State and work space of the filter."""
 
@@ -101,7 +107,7 @@ MOTION = record_type(
     ("attitude", float, (2,)),  # roll and pitch [rad]
     ("joints", float, (3,)),  # right rocker, right and left bogie [rad]
     ("joint_rates", float, (3,)),  # of the same [rad/s]
-    ("wheel_rates", float, (6,)),  # [rad/s]
+    ("wheel_rates", float, (WHEEL_COUNT,)),  # [rad/s]
     ("body_rates", float, (3,)),  # [rad/s]
 )
 """A `Motion` as the kernels read it."""
@@ -113,13 +119,12 @@ class MotionContactEstimator:
     def __init__(self, rover: Rover):
         """Prepare for a rover on level ground."""
         self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
-        names = ("rear", "middle", "front")
-        low, high = (names.index(name) for name in rover.suspension.bogie_wheels)
-        own = names.index(rover.suspension.rocker_wheel)
+        low, high = map(WHEEL_POSITIONS.index, rover.suspension.bogie_wheels)
+        own = WHEEL_POSITIONS.index(rover.suspension.rocker_wheel)
         self._filters = array_of(
             new_record(
                 FILTER,
-                covariance=SPREAD**2 * np.eye(WHEEL_COUNT),
+                covariance=SLOPE_DEVIATION**2 * np.eye(WHEEL_COUNT),
                 first=[high, own, 3 + high, 3 + own, 3 + own],
                 second=[low, low, 3 + low, 3 + low, own],
             )
@@ -138,10 +143,10 @@ class MotionContactEstimator:
         return ContactEstimate(self._angles.copy(), self._covariance.copy(), "motion")
 
     def update(self, motion: Motion, duration: float) -> ContactEstimate:
-        """Take a measurement into account.
+        """Correct the angles by a measurement and return them.
 
         Args:
-            motion: All finite.
+            motion: All values finite.
             duration: Time since the last measurement [s].
         """
         self._attitude[:] = motion.roll, motion.pitch
@@ -154,24 +159,24 @@ class MotionContactEstimator:
 
 @kernel
 def _update(linkages, motions, duration, filters):
-    """Place the wheels, let the angles drift, and correct them if the rover moves."""
+    """Place the wheels; if the rover moves, let the angles drift and correct them."""
     linkage, motion, state = linkages[0], motions[0], filters[0]
     roll, pitch = motion.attitude[0], motion.attitude[1]
     level = np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(roll))
     _place(linkage, motion, state)
-    fastest = 0.0
-    for wheel in range(6):
+    max_speed = 0.0
+    for wheel in range(WHEEL_COUNT):
         rate = motion.wheel_rates[wheel] + state.turning[wheel]
         state.speeds[wheel] = linkage.radius * rate
-        fastest = max(fastest, abs(state.speeds[wheel]))
-    if fastest > MIN_SPEED * linkage.radius:
+        max_speed = max(max_speed, abs(state.speeds[wheel]))
+    if max_speed > MIN_ROLLING_RATE * linkage.radius:
         _drift(linkage.radius, level, duration, state)
         _correct(linkage.length, level, state)
 
 
 @kernel
 def _place(linkage, motion, state):
-    """Write places, turning rates, slopes, and the differences of velocity that links make."""
+    """Write places, turning rates, slopes, and the differences of velocity that the links give."""
     wheels, places, known = linkage.wheels, state.places, state.known
     for side in range(2):
         angle = rocker_sign(side) * motion.joints[0]
@@ -202,10 +207,12 @@ def _place(linkage, motion, state):
                 bogie_rate * (pivot - places[low, j]) + rocker_rate * (places[own, j] - pivot)
             )
             arm = places[own, j] - (pz if i == 0 else px)
-            known[4, i] = sign * rocker_rate * arm - (known[4, i] if side == 1 else 0.0)
+            known[ROCKER_PAIR, i] = sign * rocker_rate * arm - (
+                known[ROCKER_PAIR, i] if side == 1 else 0.0
+            )
     width = linkage.rocker_pivots[1, 1] - linkage.rocker_pivots[0, 1]
-    known[4, 0] -= width * motion.body_rates[2]
-    known[4, 1] += width * motion.body_rates[0]
+    known[ROCKER_PAIR, 0] -= width * motion.body_rates[2]
+    known[ROCKER_PAIR, 1] += width * motion.body_rates[0]
 
 
 @kernel
@@ -217,7 +224,7 @@ def _rotate(angle, x, z):
 
 @kernel
 def _write_slopes(places, side, slopes):
-    """Write for each wheel of a side the slope of the lines to its neighbours, in their middle."""
+    """Write for each wheel of a side the mean slope [rad] of the lines to its neighbours."""
     rear = 3 * side
     behind = np.arctan2(
         places[rear + 1, 1] - places[rear, 1], places[rear + 1, 0] - places[rear, 0]
@@ -232,39 +239,42 @@ def _write_slopes(places, side, slopes):
 def _drift(radius, level, duration, state):
     """Let the angles tend to the slopes between wheels over the way that each has rolled."""
     P = state.covariance
-    for i in range(6):
-        kept = np.exp(-abs(state.speeds[i]) * duration / (MEMORY * radius))
+    for i in range(WHEEL_COUNT):
+        kept = np.exp(-abs(state.speeds[i]) * duration / (MEMORY_DISTANCE * radius))
         slope = state.slopes[i] - level
         state.angles[i] = slope + kept * (state.angles[i] - slope)
-        for j in range(6):
+        for j in range(WHEEL_COUNT):
             P[i, j] *= kept
             P[j, i] *= kept
-        P[i, i] += SPREAD * SPREAD * (1.0 - kept * kept)
+        P[i, i] += SLOPE_DEVIATION * SLOPE_DEVIATION * (1.0 - kept * kept)
 
 
 @kernel
-def _correct(reach, level, state):
-    """Correct the angles by each equation in turn, all linearised at the same angles."""
+def _correct(length, level, state):
+    """Correct the angles by each equation in turn, all linearised at the same angles.
+
+    `length` [m] is that of the rover, `level` [rad] the direction of the horizontal in body x, z.
+    """
     angles, prior, speeds = state.angles, state.prior, state.speeds
-    for i in range(6):
+    for i in range(WHEEL_COUNT):
         prior[i] = angles[i]
-    for pair in range(EQUATIONS):
+    for pair in range(PAIRS):
         a, b = state.first[pair], state.second[pair]
-        noise = SLIP * SLIP * (speeds[a] * speeds[a] + speeds[b] * speeds[b])
-        noise += GYRO_NOISE * GYRO_NOISE * reach * reach
+        noise = SLIP_DEVIATION * SLIP_DEVIATION * (speeds[a] * speeds[a] + speeds[b] * speeds[b])
+        noise += GYRO_DEVIATION * GYRO_DEVIATION * length * length
         for axis in range(2):
             va, sa = _resolve(speeds[a], prior[a] + level, axis)
             vb, sb = _resolve(speeds[b], prior[b] + level, axis)
             residual = state.known[pair, axis] - (va - vb)
             residual -= sa * (angles[a] - prior[a]) - sb * (angles[b] - prior[b])
-            _take_equation(a, sa, b, -sb, residual, noise, state)
-    for i in range(6):
+            _take_equation((a, b), (sa, -sb), residual, noise, state)
+    for i in range(WHEEL_COUNT):
         angles[i] = min(max(angles[i], -MAX_ANGLE), MAX_ANGLE)
 
 
 @kernel
 def _resolve(speed, direction, axis):
-    """Return the velocity along body x (axis 0) or z, and how it changes with the direction."""
+    """Return the velocity along body x (axis 0) or z, and its derivative by the direction."""
     along, up = speed * np.cos(direction), speed * np.sin(direction)
     if axis == 0:
         return along, -up
@@ -272,16 +282,20 @@ def _resolve(speed, direction, axis):
 
 
 @kernel
-def _take_equation(a, ha, b, hb, residual, noise, state):
-    """Correct by one equation ha angle_a + hb angle_b = residual, doubted if far from it."""
-    P, row = state.covariance, state.row
-    for i in range(6):
-        row[i] = P[i, a] * ha + P[i, b] * hb
-    spread = ha * row[a] + hb * row[b]
-    doubt = residual * residual / (DOUBT * DOUBT * (spread + noise))
-    spread += noise * max(doubt, 1.0)
-    for i in range(6):
-        state.angles[i] += row[i] * residual / spread
-    for i in range(6):
-        for j in range(6):
-            P[i, j] -= row[i] * row[j] / spread
+def _take_equation(wheels, slopes, residual, noise, state):
+    """Correct by the equation slopes[0] angle_a + slopes[1] angle_b = residual of two wheels.
+
+    `noise` is the variance of the equation; it grows where the residual is far too large.
+    """
+    P, gain = state.covariance, state.gain
+    a, b = wheels
+    for i in range(WHEEL_COUNT):
+        gain[i] = P[i, a] * slopes[0] + P[i, b] * slopes[1]
+    variance = slopes[0] * gain[a] + slopes[1] * gain[b]
+    excess = residual * residual / (MAX_RESIDUAL * MAX_RESIDUAL * (variance + noise))
+    variance += noise * max(excess, 1.0)
+    for i in range(WHEEL_COUNT):
+        state.angles[i] += gain[i] * residual / variance
+    for i in range(WHEEL_COUNT):
+        for j in range(WHEEL_COUNT):
+            P[i, j] -= gain[i] * gain[j] / variance

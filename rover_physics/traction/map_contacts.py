@@ -3,15 +3,15 @@
 Attitude and suspension angles are measured, so the wheels' places relative to one another are
 known better than from the map; the height of the body is taken from the map, since odometry
 drifts. A wheel at the foot of a face touches ground and face: it is the face that it has to
-climb, so of places about equally near the one most ahead counts.
+climb, so of several places about equally near, the one farthest ahead counts.
 """
 
 import numpy as np
 
 from rover_physics.errors import ModelError
-from rover_physics.names import WHEELS
+from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.records import array_of, new_record
+from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
@@ -20,16 +20,36 @@ from rover_physics.terrain.ground import height_at_cell, is_cell_on_map, pack_gr
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import ContactEstimate
 
-STEPS = 14
-"""Samples of the ground from under a wheel's centre to REACH ahead, and as many behind."""
-REACH = 1.25
-"""How far ahead and behind the ground is looked at, in wheel radii."""
-NEARLY = 0.06
-"""How much farther than the nearest place another may be that still counts, in wheel radii."""
-PLACES = 6
-"""Places that are remembered of one profile of the ground."""
-OWN_ERROR = 0.05
+PROFILE_STEPS = 14
+"""Samples of the ground from below a wheel's centre to PROFILE_REACH ahead, as many behind."""
+PROFILE_REACH = 1.25
+"""How far ahead of a wheel's centre and behind it the ground is sampled, in wheel radii."""
+PROFILES, MIDDLE_PROFILE = 3, 1
+"""Profiles of the ground below a wheel: along its right edge, its middle and its left edge."""
+NEAREST_TOLERANCE = 0.06
+"""How much farther than the nearest place another one may be that still counts, in wheel radii."""
+MAX_PLACES = 6
+"""Largest number of near places kept of one profile."""
+ANGLE_DEVIATION = 0.05
 """Standard deviation of an angle where map and pose are exact [rad]."""
+CELL_DEVIATION = 0.3
+"""Standard deviation of a place within its cell, in cells."""
+
+MAP_SEARCH = record_type(
+    ("pose", float, (3,)),  # x, y [m] and yaw [rad] of the body's origin, map frame
+    (
+        "q",
+        float,
+        (6,),
+    ),  # z [m], roll, pitch, right rocker, right and left bogie [rad], for `place`
+    ("direction", float),  # 1 where the rover drives forward, -1 where backward
+    ("placement", PLACEMENT),
+    ("distance", float, (PROFILES, MAX_PLACES)),  # of near places from the wheel's centre [m]
+    ("angle", float, (PROFILES, MAX_PLACES)),  # contact angles of the same [rad]
+    ("gaps", float, (WHEEL_COUNT,)),  # between wheel and ground at the given height [m]
+    ("angles", float, (WHEEL_COUNT,)),  # contact angles found [rad]
+)
+"""Input, work space and result of a `MapContactFinder`; NaN where the ground is unknown."""
 
 
 class MapContactFinder:
@@ -41,8 +61,15 @@ class MapContactFinder:
         self._radius = rover.wheel.radius
         self._ground = pack_ground(terrain)
         self._resolution = terrain.resolution
-        self._placements = array_of(new_record(PLACEMENT))
-        self._found = np.empty((3, PLACES, 2))
+        self._searches = array_of(new_record(MAP_SEARCH))
+        # Looking up a field of a record takes as long as writing it.
+        search = self._searches
+        self._pose, self._q, self._direction = (
+            search["pose"][0],
+            search["q"][0],
+            search["direction"],
+        )
+        self._gaps, self._angles = search["gaps"][0], search["angles"][0]
 
     def find(
         self, state: MeasuredState, pose: np.ndarray, deviation: float, forward: bool = True
@@ -50,102 +77,105 @@ class MapContactFinder:
         """Find the contact angles.
 
         Args:
-            state: Attitude and suspension; its contact angles are not looked at.
+            state: Attitude and suspension; its contact angles are not used.
             pose: (4,) x, y, z [m] and yaw [rad] of the body's origin in the map frame.
             deviation: Standard deviation of x and y [m].
-            forward: Whether the rover drives forwards: ahead is in front.
+            forward: Whether the rover drives forward: ahead is in front.
 
         Raises:
             ModelError: A wheel is beyond the map, over unknown ground, or not near the ground.
         """
-        q = np.array([pose[2], state.roll, state.pitch, state.rocker_angle, *state.bogie_angles])
-        angles, gaps, pose = np.zeros(6), np.empty(6), np.asarray(pose, dtype=float)
-        _find_angles(
-            self._ground.records, self._linkages, self._placements,
-            1.0 if forward else -1.0, pose[[0, 1, 3]], q, self._found, gaps, angles,
-        )  # fmt: skip
-        known = np.isfinite(gaps) & np.isfinite(angles)
+        self._pose[:] = pose[0], pose[1], pose[3]
+        self._q[:4] = pose[2], state.roll, state.pitch, state.rocker_angle
+        self._q[4:] = state.bogie_angles
+        self._direction[0] = 1.0 if forward else -1.0
+        _find_angles(self._ground.records, self._linkages, self._searches)
+        known = np.isfinite(self._gaps) & np.isfinite(self._angles)
         if not known.all():
             raise ModelError(
                 f"{WHEELS[int(np.argmin(known))]} of a rover at {np.round(pose[:2], 2)} m is over "
                 "ground that the map does not have"
             )
-        error = np.hypot(deviation, 0.3 * self._resolution) / self._radius
-        return ContactEstimate(angles, (OWN_ERROR**2 + error**2) * np.eye(6), "map")
+        error = np.hypot(deviation, CELL_DEVIATION * self._resolution) / self._radius
+        covariance = (ANGLE_DEVIATION**2 + error**2) * np.eye(WHEEL_COUNT)
+        return ContactEstimate(self._angles.copy(), covariance, "map")
 
 
 @kernel
-def _find_angles(grounds, linkages, placements, ahead, pose, q, found, gaps, angles):
-    """Write gaps [m] at the given height, and angles [rad] at the height that the map tells."""
-    ground, linkage, placement = grounds[0], linkages[0], placements[0]
-    place(linkage, pose, q, placement)
-    _measure_gaps(ground, linkage, placement, found, gaps)
-    q[0] -= _median(gaps)
-    if np.isfinite(q[0]):
-        place(linkage, pose, q, placement)
-        _find_nearest(ground, linkage, placement, ahead, found, angles)
+def _find_angles(grounds, linkages, searches):
+    """Write gaps at the given height, and angles at the height at which the wheels touch."""
+    ground, linkage, search = grounds[0], linkages[0], searches[0]
+    search.angles[:] = 0.0
+    place(linkage, search.pose, search.q, search.placement)
+    _measure_gaps(ground, linkage, search)
+    search.q[0] -= _find_median(search.gaps)
+    if np.isfinite(search.q[0]):
+        place(linkage, search.pose, search.q, search.placement)
+        _find_nearest(ground, linkage, search)
 
 
 @kernel
-def _median(values):
+def _find_median(values):
     """Return the median of (6,) values, NaN where one is."""
     lower = upper = np.nan
-    for i in range(6):
+    for i in range(WHEEL_COUNT):
         if values[i] != values[i]:
             return np.nan
         rank = 0
-        for j in range(6):
+        for j in range(WHEEL_COUNT):
             rank += values[j] < values[i] or (values[j] == values[i] and j < i)
-        if rank == 2:
+        if rank == WHEEL_COUNT // 2 - 1:
             lower = values[i]
-        if rank == 3:
+        if rank == WHEEL_COUNT // 2:
             upper = values[i]
     return 0.5 * (lower + upper)
 
 
 @kernel
-def _measure_gaps(ground, linkage, placement, found, gaps):
+def _measure_gaps(ground, linkage, search):
     """Write how far the ground is off each wheel's middle circle [m], NaN where unknown."""
-    for wheel in range(6):
-        _scan_profile(ground, placement, wheel, 0.0, linkage.radius, found, 0)
-        gaps[wheel] = found[0, 0, 0] - linkage.radius
+    for wheel in range(WHEEL_COUNT):
+        _scan_profile(ground, linkage, search, wheel, MIDDLE_PROFILE)
+        search.gaps[wheel] = search.distance[MIDDLE_PROFILE, 0] - linkage.radius
 
 
 @kernel
-def _find_nearest(ground, linkage, placement, ahead, found, angles):
-    """Write for each wheel the angle most ahead of those where it is about nearest."""
-    for wheel in range(6):
+def _find_nearest(ground, linkage, search):
+    """Write for each wheel the angle farthest ahead of those where it is about nearest."""
+    direction, angles = search.direction, search.angles
+    for wheel in range(WHEEL_COUNT):
         nearest = np.inf
-        for across in range(3):
-            offset = 0.5 * (across - 1) * linkage.width
-            _scan_profile(ground, placement, wheel, offset, linkage.radius, found, across)
-            nearest = min(nearest, found[across, 0, 0])
-        limit = nearest + NEARLY * linkage.radius
+        for profile in range(PROFILES):
+            _scan_profile(ground, linkage, search, wheel, profile)
+            nearest = min(nearest, search.distance[profile, 0])
+        limit = nearest + NEAREST_TOLERANCE * linkage.radius
         angles[wheel] = np.nan
-        for across in range(3):
-            for k in range(PLACES):
-                distance, angle = found[across, k, 0], found[across, k, 1]
-                if distance <= limit and not ahead * angles[wheel] >= ahead * angle:
+        for profile in range(PROFILES):
+            for k in range(MAX_PLACES):
+                distance, angle = search.distance[profile, k], search.angle[profile, k]
+                if distance <= limit and not direction * angles[wheel] >= direction * angle:
                     angles[wheel] = angle
 
 
 @kernel
-def _scan_profile(ground, placement, wheel, offset, radius, found, across):
-    """Look along the ground in the plane of a wheel, `offset` [m] from its middle.
+def _scan_profile(ground, linkage, search, wheel, profile):
+    """Look along the ground below a wheel, in a plane across its axis.
 
-    Writes into found[across] (PLACES, 2) distance [m] from the wheel's centre and contact angle
-    [rad] of the nearest place first, then of places nearer than their surroundings.
+    Writes into row `profile` of search.distance and search.angle: the nearest place first, then
+    places nearer than their surroundings; infinite where there are no more.
     """
+    placement, distances, angles = search.placement, search.distance, search.angle
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    offset = 0.5 * (profile - MIDDLE_PROFILE) * linkage.width
     cx = centres[wheel, 0] + offset * R[0, 1]
     cy = centres[wheel, 1] + offset * R[1, 1]
     cz = centres[wheel, 2] + offset * R[2, 1]
-    for k in range(PLACES):
-        found[across, k, 0] = found[across, k, 1] = np.inf
-    step = REACH * radius / STEPS
+    for k in range(MAX_PLACES):
+        distances[profile, k] = angles[profile, k] = np.inf
+    step = PROFILE_REACH * linkage.radius / PROFILE_STEPS
     x0 = z0 = 0.0
     count, falling, last, last_angle = 0, False, np.inf, 0.0
-    for k in range(-STEPS, STEPS + 1):
+    for k in range(-PROFILE_STEPS, PROFILE_STEPS + 1):
         x1 = k * step
         gx = (cx + x1 * forward[0] - ground.x0) * ground.inverse_resolution
         gy = (cy + x1 * forward[1] - ground.y0) * ground.inverse_resolution
@@ -153,20 +183,26 @@ def _scan_profile(ground, placement, wheel, offset, radius, found, across):
         if is_cell_on_map(ground, gx, gy):
             height = height_at_cell(ground, gx, gy)
         if height != height:
-            found[across, 0, 0] = np.nan
+            distances[profile, 0] = np.nan
             return
         z1 = (height - cz) * up[2]
-        if k > -STEPS:
-            dx, dz = x1 - x0, z1 - z0
-            share = min(max(-(x0 * dx + z0 * dz) / (dx * dx + dz * dz), 0.0), 1.0)
-            px, pz = x0 + share * dx, z0 + share * dz
-            distance, angle = np.sqrt(px * px + pz * pz), np.arctan2(px, -pz)
-            if distance < found[across, 0, 0]:
-                found[across, 0, 0], found[across, 0, 1] = distance, angle
-            if falling and distance >= last and count < PLACES - 1:
+        if k > -PROFILE_STEPS:
+            distance, angle = _find_nearest_on_segment(x0, z0, x1, z1)
+            if distance < distances[profile, 0]:
+                distances[profile, 0], angles[profile, 0] = distance, angle
+            if falling and distance >= last and count < MAX_PLACES - 1:
                 count += 1
-                found[across, count, 0], found[across, count, 1] = last, last_angle
+                distances[profile, count], angles[profile, count] = last, last_angle
             if distance != last:
                 falling = distance < last
             last, last_angle = distance, angle
         x0, z0 = x1, z1
+
+
+@kernel
+def _find_nearest_on_segment(x0, z0, x1, z1):
+    """Return distance [m] and angle [rad] of a segment's nearest point from the wheel's centre."""
+    dx, dz = x1 - x0, z1 - z0
+    share = min(max(-(x0 * dx + z0 * dz) / (dx * dx + dz * dz), 0.0), 1.0)
+    px, pz = x0 + share * dx, z0 + share * dz
+    return np.sqrt(px * px + pz * pz), np.arctan2(px, -pz)

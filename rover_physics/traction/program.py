@@ -1,64 +1,83 @@
-"""The quadratic program that shares the torques: no wheel slips before all give their part.
+"""The quadratic program (QP) that shares the torques: no wheel slips before all give their part.
 
-Variables, x = scale * variables + shift in sixths of the weight: tractions T (6), loads N (6),
-lateral terms s0 and s1 with S_i = s0 + s1 along_i, the peak friction utilisation u, and three
-slacks: of the friction limit, of contact and of the torque limit. Rows: the nine equations of the
-balance; for each wheel the friction cone that u opens; u <= 1, N >= 0 and |T| <= largest torque
-over wheel radius, each with its slack; u and slacks >= 0. So an answer always exists, and the
-slacks say by how much it gives way. `scale` makes tractions and peak of order one: a peak of 0.1
-is no smaller a matter than one of 1.
+Variables, x = scale * y + shift in sixths of the weight: tractions T (6), loads N (6), lateral
+terms s0 and s1 with S_i = s0 + s1 along_i, the peak friction utilisation u, and three slacks: of
+the friction limit, of contact and of the torque limit. Rows: the nine equations of the balance;
+for each wheel the friction cone that u opens; u <= 1, N >= 0 and |T| <= largest torque over wheel
+radius, each with its slack; u and slacks >= 0. So an answer always exists, and the slacks say by
+how much a limit is exceeded. `scale` makes tractions and peak of order one: a peak of 0.1 matters
+as much as one of 1. `layout.py` names all variables and rows.
 
-The cone sqrt(T^2 + S^2) <= u mu N is nothing that a quadratic program can hold:
+A quadratic program cannot hold the cone sqrt(T^2 + S^2) <= u mu N itself:
 
 - u N is a product. It is expanded to first order about the last peak and load, so that the
   smallest peak is found by a sequence of programs, as Dinkelbach does for ratios. A controller,
   whose last answer is near, needs one or two of them.
-- The cone is round. It is replaced by SIDES of its tangents, one of them where the last forces
-  point. Where the sequence settles that is exact; elsewhere the polygon is outside the cone.
+- The cone is round. It is replaced by CONE_SIDES of its tangents, one of them where the last
+  forces point. Where the sequence converges that is exact; elsewhere the polygon is outside the
+  cone.
 
-So an answer is looked at by the round cone and the product, both from the last forces on towards
-it, and the best place on that line is taken (`traction_merit`): the peak never rises from one
-program to the next, and what is reported is the utilisation by the round cone.
+So an answer is measured by the round cone and the product, from the last forces on towards it, and
+the best place on that line is taken (`line_search.py`): the peak never rises from one program to
+the next, and the reported utilisation is that of the round cone.
 
-The change from the last forces is weighed as well: it makes the program well conditioned, and
-it vanishes where the sequence settles, so that it costs nothing there (a proximal point method).
+The change from the last forces has a weight as well: it makes the program well conditioned, and
+it vanishes where the sequence converges, so that it costs nothing there (a proximal point method).
 
 Sources: Crouzeix, Ferland and Schaible, "An algorithm for generalized fractional programs",
 Journal of Optimization Theory and Applications 47, 1985; Rockafellar, "Monotone operators and the
 proximal point algorithm", SIAM Journal on Control and Optimization 14, 1976.
 """
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from functools import cached_property
 
 import numpy as np
 
-from rover_physics.errors import ModelError
+from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.kernels import kernel
-from rover_physics.traction.balance import WHEEL_COUNT, BalanceRows
+from rover_physics.numerics.records import record_type
+from rover_physics.traction.balance import BalanceRows
+from rover_physics.traction.layout import (
+    BACKWARD_PULL_ROWS,
+    BALANCE_ROWS,
+    CONE_ROWS,
+    CONE_SIDES,
+    EQUATIONS,
+    FORCES,
+    FORWARD_PULL_ROWS,
+    FRICTION_SLACK,
+    LATERAL_SHARE,
+    LATERAL_SLOPE,
+    LOAD,
+    LOAD_ROWS,
+    LOAD_SLACK,
+    PEAK,
+    PEAK_LIMIT_ROW,
+    ROWS,
+    SIGN_ROWS,
+    TORQUE_SLACK,
+    TRACTION,
+    VARIABLES,
+)
+from rover_physics.traction.wheel_limits import WheelLimits, max_pull_of
 
-SIDES = 4
-"""Tangents around each friction cone."""
-SHARE, SLOPE, PEAK = 12, 13, 14
-"""Columns of s0, s1 and u; before them T and N."""
-FRICTION_SLACK, LOAD_SLACK, TORQUE_SLACK = 15, 16, 17
-VARIABLES = 18
-CONES = 9
-LIMIT = CONES + WHEEL_COUNT * SIDES
-LOAD_ROWS = LIMIT + 1
-FORWARD = LOAD_ROWS + WHEEL_COUNT
-BACKWARD = FORWARD + WHEEL_COUNT
-SIGNS = BACKWARD + WHEEL_COUNT
-ROWS = SIGNS + 4
-"""Rows: balance (9), cones, limit of the peak, contacts (6), torques (2 x 6), signs (4)."""
-MIN_LOAD, MIN_PEAK, MAX_PEAK = 0.05, 0.02, 3.0
-"""Bounds of what the cones are expanded about: load in sixths of the weight, utilisation."""
+MIN_LOAD = 0.05
+"""Smallest load that a cone is expanded about, in sixths of the weight."""
+MIN_PEAK, MAX_PEAK = 0.02, 3.0
+"""Smallest and largest utilisation that the cones are expanded about."""
 REGULARISATION = 1e-2
-"""Curvature of what has no cost: loads and slacks."""
+"""Curvature of what has no cost of its own: loads and lateral terms."""
+SLACK_CURVATURE = 0.1
+"""Curvature of a slack, as a share of its price."""
+
+WEIGHTS = record_type(("peak", float), ("effort", float), ("change", float), ("slack", float))
+"""`TractionWeights` as the kernels read them."""
 
 
 @dataclass(frozen=True)
 class TractionWeights:
-    """What the objective weighs, for scaled variables: tractions and peak are of order one.
+    """Weights of the objective, for scaled variables: tractions and peak are of order one.
 
     1/2 peak u^2 + 1/2 effort |T|^2 + 1/2 change |(T, s0, s1) - last|^2 + slack * (slacks).
     """
@@ -72,6 +91,18 @@ class TractionWeights:
     slack: float = 100.0
     """Price of a slack: more than a peak can be worth, so that no limit gives way to another."""
 
+    @cached_property
+    def packed(self) -> np.ndarray:
+        """Array (1,) of WEIGHTS, made once."""
+        return np.array([astuple(self)], WEIGHTS)
+
+
+DEFAULT_WEIGHTS = TractionWeights()
+"""Weights where none are given."""
+
+REFERENCE = record_type(("x", float, (FORCES,)), ("peak", float))
+"""`Reference` as the kernels read it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Reference:
@@ -80,130 +111,183 @@ class Reference:
     x: np.ndarray
     """(14,) tractions, loads and lateral terms in force units."""
     peak: float
-    """Its peak friction utilisation, or what is wanted of it."""
+    """Its peak friction utilisation, or the one to expand about."""
+
+    @property
+    def packed(self) -> np.ndarray:
+        """Array (1,) of REFERENCE."""
+        packed = np.empty(1, REFERENCE)
+        packed["x"], packed["peak"] = self.x, self.peak
+        return packed
+
+
+QP = record_type(
+    ("P", float, (VARIABLES,)),  # diagonal of the cost's matrix
+    ("q", float, (VARIABLES,)),  # linear cost
+    ("A", float, (ROWS, VARIABLES)),  # rows
+    ("lower", float, (ROWS,)),  # lower bounds
+    ("upper", float, (ROWS,)),  # upper bounds
+    ("scale", float, (VARIABLES,)),  # x = scale * y + shift
+    ("shift", float, (VARIABLES,)),  # the same
+    ("start", float, (VARIABLES,)),  # y of the reference
+)
+"""The numbers of a `TractionQP` as the kernels write them."""
 
 
 @dataclass(frozen=True, eq=False)
 class TractionQP:
-    """minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; see the module for rows."""
+    """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; `layout` names y and the rows."""
 
-    P: np.ndarray
-    """(18,) diagonal of the cost's matrix."""
-    q: np.ndarray
-    """(18,) linear cost."""
-    A: np.ndarray
-    """(ROWS, 18) rows."""
-    lower: np.ndarray
-    """(ROWS,) lower bounds."""
-    upper: np.ndarray
-    """(ROWS,) upper bounds."""
-    scale: np.ndarray
-    """(18,) x = scale * y + shift in force units, and in units of one for the peak."""
-    shift: np.ndarray
-    """(18,) see scale."""
-    start: np.ndarray
-    """(18,) y of the reference."""
+    packed: np.ndarray
+    """Array (1,) of QP."""
+
+    @property
+    def P(self) -> np.ndarray:  # noqa: N802
+        """Diagonal (18,) of the cost's matrix."""
+        return self.packed["P"][0]
+
+    @property
+    def q(self) -> np.ndarray:
+        """Linear cost (18,)."""
+        return self.packed["q"][0]
+
+    @property
+    def A(self) -> np.ndarray:  # noqa: N802
+        """Rows (ROWS, 18)."""
+        return self.packed["A"][0]
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower bounds (ROWS,)."""
+        return self.packed["lower"][0]
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds (ROWS,)."""
+        return self.packed["upper"][0]
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Scale (18,): x = scale * y + shift in force units, and in units of one for the peak."""
+        return self.packed["scale"][0]
+
+    @property
+    def shift(self) -> np.ndarray:
+        """Shift (18,), see `scale`."""
+        return self.packed["shift"][0]
+
+    @property
+    def start(self) -> np.ndarray:
+        """Variables y (18,) of the reference."""
+        return self.packed["start"][0]
 
 
 def build_traction_qp(
     rows: BalanceRows,
-    friction: np.ndarray,
-    most_pull: float,
+    limits: WheelLimits,
     reference: Reference,
-    weights: TractionWeights | None = None,
+    weights: TractionWeights = DEFAULT_WEIGHTS,
 ) -> TractionQP:
     """Write the program for one state of the rover.
 
     Args:
         rows: Balance at that state, with the wanted net traction.
-        friction: (6,) friction coefficients.
-        most_pull: Largest torque over the wheel radius, in force units.
+        limits: Friction and torque of the wheels.
         reference: The last answer; at first that of equal torques.
-        weights: What the objective weighs.
-
-    Raises:
-        ModelError: A friction coefficient or largest pull that is not above 0.
+        weights: Weights of the objective.
     """
-    weights = weights or TractionWeights()
-    check_limits(friction, most_pull)
-    vectors, A, bounds = np.zeros((5, VARIABLES)), np.zeros((ROWS, VARIABLES)), np.empty((2, ROWS))
-    peak = min(max(reference.peak, MIN_PEAK), MAX_PEAK)
-    unit = peak * float(friction.sum()) / WHEEL_COUNT
-    P, q, scale, shift, start = vectors
-    _write_constraints(
-        rows.A, rows.b, rows.along, friction, most_pull, reference.x, peak, unit,
-        A, bounds[0], bounds[1], shift,
-    )  # fmt: skip
-    _write_start(reference.x, peak, unit, scale, shift, start)
-    _write_costs(weights.peak, weights.effort, weights.change, weights.slack, start, P, q)
-    return TractionQP(P, q, A, bounds[0], bounds[1], scale, shift, start)
-
-
-def check_limits(friction: np.ndarray, most_pull: float) -> None:
-    """Raise ModelError where a friction coefficient (6,) or the largest pull is not above 0."""
-    if not (friction.min() > 0.0 and most_pull > 0.0):
-        raise ModelError(f"friction {friction} and largest pull {most_pull} must all be above 0")
+    packed = np.zeros(1, QP)
+    _write_program(rows.packed, limits.packed, weights.packed, reference.packed, packed)
+    return TractionQP(packed)
 
 
 @kernel
-def _write_start(last, peak, unit, scale, shift, start):
-    """Write the units of the variables, and the last answer in them."""
+def _write_program(balances, all_limits, all_weights, references, programs):
+    """Write a record QP of zeros from MEASURED_BALANCE, WHEEL_LIMITS, WEIGHTS and REFERENCE."""
+    balance, limits, last, qp = balances[0], all_limits[0], references[0].x, programs[0]
+    peak = min(max(references[0].peak, MIN_PEAK), MAX_PEAK)
+    friction = 0.0
+    for wheel in range(WHEEL_COUNT):
+        friction += limits.friction[wheel]
+    unit = peak * friction / WHEEL_COUNT
+    _write_units(last, peak, unit, qp)
+    _write_costs(all_weights[0], qp)
+    for row in range(ROWS):
+        qp.lower[row], qp.upper[row] = -np.inf, np.inf
+    _write_balance_rows(balance, unit, qp)
+    for wheel in range(WHEEL_COUNT):
+        _write_cone(balance.along[wheel], limits.friction[wheel], last, wheel, qp)
+    _write_limit_rows(max_pull_of(limits, balance.force_unit), qp)
+
+
+@kernel
+def _write_units(last, peak, unit, qp):
+    """Write scale and shift of the variables, and in them the last forces (14,)."""
+    for wheel in range(WHEEL_COUNT):
+        qp.shift[LOAD + wheel] = max(last[LOAD + wheel], MIN_LOAD)
     for k in range(VARIABLES):
-        scale[k] = peak if k in (PEAK, FRICTION_SLACK) else unit
-        start[k] = (last[k] - shift[k]) / unit if k < PEAK else 0.0
-    start[PEAK] = 1.0
+        qp.scale[k] = peak if k in (PEAK, FRICTION_SLACK) else unit
+        qp.start[k] = (last[k] - qp.shift[k]) / unit if k < FORCES else 0.0
+    qp.start[PEAK] = 1.0
 
 
 @kernel
-def _write_costs(peak, effort, change, slack, start, P, q):
+def _write_costs(weights, qp):
     """Write the diagonal and the linear part of the cost."""
+    P, q, start = qp.P, qp.q, qp.start
     for k in range(VARIABLES):
         P[k], q[k] = REGULARISATION, 0.0
-        if k < 6 or k in (SHARE, SLOPE):
-            P[k] = change + (effort if k < 6 else REGULARISATION)
-            q[k] = -change * start[k]
+        if k < LOAD or k in (LATERAL_SHARE, LATERAL_SLOPE):
+            P[k] = weights.change + (weights.effort if k < LOAD else REGULARISATION)
+            q[k] = -weights.change * start[k]
         if k >= FRICTION_SLACK:
-            P[k], q[k] = 0.1 * slack, slack
-    P[PEAK] = peak
+            P[k], q[k] = SLACK_CURVATURE * weights.slack, weights.slack
+    P[PEAK] = weights.peak
 
 
 @kernel
-def _write_constraints(
-    balance, wanted, along, friction, most_pull, last, peak, unit, A, lower, upper, shift
-):
-    """Write all rows, each divided by `unit`, and the shift of the loads; A comes as zeros."""
-    lower[:] = -np.inf
-    upper[:] = np.inf
-    for wheel in range(6):
-        shift[6 + wheel] = max(last[6 + wheel], MIN_LOAD)
-    for row in range(9):
-        room = wanted[row]
-        for column in range(14):
-            A[row, column] = balance[row, column]
-            room -= balance[row, column] * shift[column]
-        lower[row] = upper[row] = room / unit
-    for wheel in range(6):
-        lateral = last[12] + last[13] * along[wheel]
-        direction = np.arctan2(lateral, last[wheel])
-        load, mu = shift[6 + wheel], friction[wheel]
-        for side in range(SIDES):
-            row = CONES + wheel * SIDES + side
-            angle = direction + 2.0 * np.pi * side / SIDES
-            A[row, wheel] = np.cos(angle)
-            A[row, 12] = np.sin(angle)
-            A[row, 13] = np.sin(angle) * along[wheel]
-            A[row, 6 + wheel] = -mu * peak
-            A[row, 14] = -mu * load * peak / unit
-            upper[row] = 0.0
+def _write_balance_rows(balance, unit, qp):
+    """Write the equations of the balance, divided by `unit`, for shifted loads."""
+    for equation in range(EQUATIONS):
+        rest = balance.b[equation]
+        for k in range(FORCES):
+            qp.A[BALANCE_ROWS + equation, k] = balance.A[equation, k]
+            rest -= balance.A[equation, k] * qp.shift[k]
+        row = BALANCE_ROWS + equation
+        qp.lower[row] = qp.upper[row] = rest / unit
+
+
+@kernel
+def _write_cone(along, friction, last, wheel, qp):
+    """Write the tangents of one wheel's cone, one of them where the last forces (14,) point."""
+    A, unit, peak, load = qp.A, qp.scale[TRACTION], qp.scale[PEAK], qp.shift[LOAD + wheel]
+    lateral = last[LATERAL_SHARE] + last[LATERAL_SLOPE] * along
+    direction = np.arctan2(lateral, last[TRACTION + wheel])
+    for side in range(CONE_SIDES):
+        row = CONE_ROWS + wheel * CONE_SIDES + side
+        angle = direction + 2.0 * np.pi * side / CONE_SIDES
+        A[row, TRACTION + wheel] = np.cos(angle)
+        A[row, LATERAL_SHARE] = np.sin(angle)
+        A[row, LATERAL_SLOPE] = np.sin(angle) * along
+        A[row, LOAD + wheel] = -friction * peak
+        A[row, PEAK] = -friction * load * peak / unit
+        qp.upper[row] = 0.0
+
+
+@kernel
+def _write_limit_rows(max_pull, qp):
+    """Write the limits of peak, loads and tractions with their slacks, and the signs."""
+    A, lower, upper, unit = qp.A, qp.lower, qp.upper, qp.scale[TRACTION]
+    for wheel in range(WHEEL_COUNT):
         row = LOAD_ROWS + wheel
-        A[row, 6 + wheel] = A[row, 16] = 1.0
-        lower[row] = -load / unit
-        for row, sign in ((FORWARD + wheel, 1.0), (BACKWARD + wheel, -1.0)):
-            A[row, wheel] = sign
-            A[row, 17] = -1.0
-            upper[row] = most_pull / unit
-    A[LIMIT, 14], A[LIMIT, 15] = 1.0, -1.0
-    upper[LIMIT] = 1.0 / peak
-    for k in range(4):
-        A[SIGNS + k, 14 + k] = 1.0
-        lower[SIGNS + k] = 0.0
+        A[row, LOAD + wheel] = A[row, LOAD_SLACK] = 1.0
+        lower[row] = -qp.shift[LOAD + wheel] / unit
+        for row, sign in ((FORWARD_PULL_ROWS + wheel, 1.0), (BACKWARD_PULL_ROWS + wheel, -1.0)):
+            A[row, TRACTION + wheel] = sign
+            A[row, TORQUE_SLACK] = -1.0
+            upper[row] = max_pull / unit
+    A[PEAK_LIMIT_ROW, PEAK], A[PEAK_LIMIT_ROW, FRICTION_SLACK] = 1.0, -1.0
+    upper[PEAK_LIMIT_ROW] = 1.0 / qp.scale[PEAK]
+    for k in range(PEAK, VARIABLES):
+        A[SIGN_ROWS + k - PEAK, k] = 1.0
+        lower[SIGN_ROWS + k - PEAK] = 0.0

@@ -1,28 +1,33 @@
-"""Solving for the torques: programs about one another's answers by OSQP, equal torque else."""
+"""Solving for the torques: a sequence of quadratic programs by OSQP, each about the last one."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import osqp
 from scipy import sparse
 
-from rover_physics.traction.balance import FORCES, WHEEL_COUNT, BalanceRows
-from rover_physics.traction.line_search import find_best_between, measure_peak, write_forces
+from rover_physics.names import WHEEL_COUNT
+from rover_physics.numerics.records import array_of, new_record
+from rover_physics.traction.balance import MEASURED_BALANCE, BalanceRows
+from rover_physics.traction.fallback import fall_back_to_equal_torques
+from rover_physics.traction.layout import FORCES, ROWS, TRACTION, TRACTIONS, VARIABLES
+from rover_physics.traction.line_search import find_best_between, measure_peak
 from rover_physics.traction.program import (
-    ROWS,
-    VARIABLES,
+    DEFAULT_WEIGHTS,
     Reference,
     TractionQP,
     TractionWeights,
     build_traction_qp,
-    check_limits,
 )
+from rover_physics.traction.wheel_forces import WHEEL_FORCES, write_wheel_forces
+from rover_physics.traction.wheel_limits import WheelLimits
 
-SETTINGS = {
+OSQP_SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
     "eps_abs": 1e-4,
     "eps_rel": 1e-4,
-    # The program is scaled already; a scaling of its own, anew each time, spoils the start.
+    # The program is scaled already; OSQP's own scaling, anew each time, spoils the start.
     "scaling": 0,
     "rho": 3.0,
     "adaptive_rho_interval": 100,
@@ -31,17 +36,20 @@ SETTINGS = {
     "warm_starting": True,
     "verbose": False,
 }
-"""Of OSQP."""
+"""Settings of OSQP."""
 MAX_ITERATIONS = 4000
-SETTLED = 0.02
-"""Change of the scaled tractions, which are of order one, at which a sequence has settled."""
-SOLVED = 1
+"""Iterations after which OSQP gives up."""
+MAX_PROGRAMS = 2
+"""Programs of one answer; more change little where the last answer is near."""
+CONVERGED_SHARE = 0.02
+"""Change of the scaled tractions, which are of order one, at which a sequence has converged."""
+OSQP_SOLVED = 1
 """OSQP's status_val of a solved problem; the first versions have no name for it."""
 
 
 @dataclass(frozen=True, eq=False)
 class TractionAnswer:
-    """Torques, the forces that go with them, and by how much limits give way."""
+    """Torques, the forces that go with them, and by how much limits are exceeded."""
 
     torques: np.ndarray
     """(6,) torques in [N m], within the limit."""
@@ -58,28 +66,28 @@ class TractionAnswer:
     load_slack: float
     """By how much the smallest load is below 0 in [N]."""
     torque_slack: float
-    """By how much the largest torque would be above the limit in [N m]; it is cut off."""
+    """By how much the largest torque would be above the limit in [N m]; torques are cut off."""
     iterations: int
     """Iterations of OSQP."""
     programs: int
     """Programs solved."""
     fallback: bool
-    """Whether OSQP failed and torques are equal."""
+    """Whether OSQP failed and torques are equal; see `fallback.py`."""
     status: str
-    """What OSQP said last."""
+    """OSQP's last status in its own words."""
 
 
 class TractionWorkspace:
     """An OSQP problem that is set up once, updated in place and started from the last answer."""
 
     def __init__(self, max_iterations: int = MAX_ITERATIONS):
-        """Set up the problem; `max_iterations` is where OSQP gives up."""
+        """Set up the problem; OSQP gives up after `max_iterations`."""
         self._cells, pattern = _find_pattern()
         self._solver = osqp.OSQP()
         unbounded = np.full(ROWS, np.inf)
         self._solver.setup(
             sparse.eye(VARIABLES, format="csc"), np.zeros(VARIABLES), pattern,
-            -unbounded, unbounded, max_iter=max_iterations, **SETTINGS,
+            -unbounded, unbounded, max_iter=max_iterations, **OSQP_SETTINGS,
         )  # fmt: skip
 
     def solve(self, qp: TractionQP) -> tuple[np.ndarray, int, str, bool]:
@@ -92,85 +100,109 @@ class TractionWorkspace:
         self._solver.update(Px=qp.P, Ax=values, q=qp.q, l=qp.lower, u=qp.upper)
         self._solver.warm_start(x=qp.start)
         result = self._solver.solve(raise_error=False)
-        solved = result.info.status_val == SOLVED and bool(np.isfinite(result.x).all())
+        solved = result.info.status_val == OSQP_SOLVED and bool(np.isfinite(result.x).all())
         return result.x, result.info.iter, result.info.status, solved
 
 
 def _find_pattern() -> tuple[np.ndarray, sparse.csc_matrix]:
     """Return where the entries of a sparse A are in a full one, and a sparse A."""
-    rows = BalanceRows(np.ones((9, FORCES)), np.ones(9), np.ones(6), 1.0)
+    ones = new_record(MEASURED_BALANCE, A=1.0, b=1.0, along=1.0, force_unit=1.0)
+    limits = WheelLimits(np.ones(WHEEL_COUNT), 1.0, 1.0)
     reference = Reference(np.full(FORCES, 0.5), 0.5)
-    A = build_traction_qp(rows, np.ones(6), 1.0, reference).A
-    columns, places = np.nonzero(A.T)
-    return places * VARIABLES + columns, sparse.csc_matrix(A != 0.0).astype(float)
+    A = build_traction_qp(BalanceRows(array_of(ones)), limits, reference).A
+    columns, rows = np.nonzero(A.T)
+    return rows * VARIABLES + columns, sparse.csc_matrix(A != 0.0).astype(float)
 
 
 def solve_traction(
     workspace: TractionWorkspace,
     rows: BalanceRows,
-    friction: np.ndarray,
-    max_torque: float,
-    wheel_radius: float,
+    limits: WheelLimits,
     last: np.ndarray | None = None,
-    max_programs: int = 2,
-    weights: TractionWeights | None = None,
+    max_programs: int = MAX_PROGRAMS,
+    weights: TractionWeights = DEFAULT_WEIGHTS,
 ) -> TractionAnswer:
     """Find the torques with the smallest peak friction utilisation.
 
     Args:
         workspace: OSQP's problem, kept from one call to the next.
         rows: Balance with the wanted net traction.
-        friction: (6,) friction coefficients.
-        max_torque: Largest torque of a wheel [N m].
-        wheel_radius: Wheel radius [m].
+        limits: Friction and torque of the wheels.
         last: (6,) tractions of the last answer [N], near which the search starts; None starts
             from equal torques.
-        max_programs: Largest number of programs, fewer where they settle before; 0 asks for
+        max_programs: Largest number of programs, fewer where they converge before; 0 asks for
             equal torques.
-        weights: What the objective weighs.
+        weights: Weights of the objective.
 
     Returns:
         The answer; equal torques, marked as fallback, where OSQP does not solve the first.
-
-    Raises:
-        ModelError: A friction coefficient or largest torque that is not above 0.
     """
-    most_pull = max_torque / (wheel_radius * rows.force_unit)
-    check_limits(friction, most_pull)
-    weights = weights or TractionWeights()
-    x = rows.complete(np.zeros(WHEEL_COUNT) if last is None else last / rows.force_unit)
-    peak = measure_peak(rows, friction, x)
+    if max_programs == 0:
+        return _describe_answer(rows, limits, Run(rows.pull_equally(), 0, 0, ""))
+    run = _run_programs(workspace, rows, limits, last, max_programs, weights)
+    if run.programs > 0:
+        return _describe_answer(rows, limits, run)
+    equal = run._replace(x=fall_back_to_equal_torques(rows))
+    return _describe_answer(rows, limits, equal, fallback=True)
+
+
+class Run(NamedTuple):
+    """What a sequence of programs came to."""
+
+    x: np.ndarray
+    """(14,) forces in force units."""
+    iterations: int
+    """Iterations of OSQP."""
+    programs: int
+    """Programs solved."""
+    status: str
+    """OSQP's last status."""
+
+
+def _run_programs(
+    workspace: TractionWorkspace,
+    rows: BalanceRows,
+    limits: WheelLimits,
+    last: np.ndarray | None,
+    max_programs: int,
+    weights: TractionWeights,
+) -> Run:
+    """Solve one program about the answer of another until they converge, or OSQP fails."""
+    x = rows.pull_equally() if last is None else rows.complete(last / rows.force_unit)
+    forces = Reference(x, measure_peak(rows, limits, x))
     status, iterations, programs = "", 0, 0
     while programs < max_programs:
-        qp = build_traction_qp(rows, friction, most_pull, Reference(x, peak), weights)
+        qp = build_traction_qp(rows, limits, forces, weights)
         y, count, status, solved = workspace.solve(qp)
         iterations += count
         if not solved:
             break
         programs += 1
-        unit = float(qp.scale[0])
-        aim = rows.complete(unit * y[:WHEEL_COUNT])
-        x, peak, moved = find_best_between(rows, friction, most_pull, weights, x, aim)
-        if moved <= SETTLED * unit:
+        unit = float(qp.scale[TRACTION])
+        aim = rows.complete(unit * y[TRACTIONS])
+        forces, moved = find_best_between(rows, limits, weights, forces, aim)
+        if moved <= CONVERGED_SHARE * unit:
             break
-    if programs == 0:
-        x = rows.complete(np.zeros(WHEEL_COUNT))
-    table, unit = np.empty((5, WHEEL_COUNT)), rows.force_unit
-    torques, loads, tractions, lateral, utilisation = table
-    peak, least, pull = write_forces(
-        rows.along, friction, unit, wheel_radius, max_torque, x, table
-    )
+    return Run(forces.x, iterations, programs, status)
+
+
+def _describe_answer(
+    rows: BalanceRows, limits: WheelLimits, run: Run, fallback: bool = False
+) -> TractionAnswer:
+    """Return the answer of a run in SI units."""
+    found = np.empty(1, WHEEL_FORCES)
+    peak, min_load, max_traction = write_wheel_forces(rows.packed, limits.packed, run.x, found)
     return TractionAnswer(
-        torques=torques,
-        loads=loads,
-        tractions=tractions,
-        lateral=lateral,
-        utilisation=utilisation,
+        torques=found["torques"][0],
+        loads=found["loads"][0],
+        tractions=found["tractions"][0],
+        lateral=found["lateral"][0],
+        utilisation=found["utilisation"][0],
         friction_slack=max(peak - 1.0, 0.0),
-        load_slack=max(-least, 0.0),
-        torque_slack=max(wheel_radius * pull - max_torque, 0.0),
-        iterations=iterations,
-        programs=programs,
-        fallback=programs == 0 and max_programs > 0,
-        status=status,
+        load_slack=max(-min_load, 0.0),
+        torque_slack=max(limits.radius * max_traction - limits.max_torque, 0.0),
+        iterations=run.iterations,
+        programs=run.programs,
+        fallback=fallback,
+        status=run.status,
     )

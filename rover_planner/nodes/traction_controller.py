@@ -39,10 +39,11 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.declare import check_changes, declare_parameters
 from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.ros.map_intake import MapIntake, PreparedMap, prepare_map
+from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
 from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.traction_service import (
     TractionService,

@@ -1,37 +1,17 @@
-"""Maps for a loop that must not wait: taken as bytes, made ready once in their own thread."""
+"""Maps for a loop that must not wait: taken as bytes, prepared once in a thread of their own."""
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.ros.refusals import BAD_INPUT
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedMap:
-    """A map, and what finds contact angles on it."""
-
-    rover: Rover
-    """The rover that it was made ready for."""
-    terrain: Terrain
-    """The map."""
-    finder: MapContactFinder
-    """What looks up the contacts of that rover."""
-
-
-def prepare_map(rover: Rover, terrain: Terrain) -> PreparedMap:
-    """Make a map ready for a rover; that takes some ms."""
-    return PreparedMap(rover, terrain, MapContactFinder(rover, terrain))
+from rover_planner.traction.prepared_map import PreparedMap
 
 
 class MapIntake:
-    """Takes clouds as they come over the wire, and has the latest map ready when asked."""
+    """Takes serialised clouds, prepares a map of the latest one, and returns it when asked."""
 
     def __init__(
         self, prepare: Callable[[PointCloud2], PreparedMap], refuse: Callable[[str], None]
@@ -39,8 +19,8 @@ class MapIntake:
         """Start the thread.
 
         Args:
-            prepare: Makes a map of a cloud; BAD_INPUT is what it may raise.
-            refuse: Told why a cloud cannot be used. Both are called in the thread.
+            prepare: Makes a map of a cloud, called in the thread; it may raise BAD_INPUT.
+            refuse: Called in the thread with the reason why a cloud cannot be used.
         """
         self._prepare, self._refuse = prepare, refuse
         self._changed = threading.Condition()
@@ -52,7 +32,7 @@ class MapIntake:
         self._thread.start()
 
     def offer(self, cloud: bytes) -> None:
-        """Take a serialised cloud; one that is like the last, byte by byte, is passed over."""
+        """Take a serialised cloud; one with the same bytes as the last is ignored."""
         if cloud == self._last:
             return
         self._last = cloud
@@ -61,12 +41,12 @@ class MapIntake:
             self._changed.notify()
 
     def take(self) -> PreparedMap | None:
-        """Return a map that has become ready since the last call, if any."""
+        """Return a map that was prepared since the last call, if any."""
         ready, self._ready = self._ready, None
         return ready
 
     def close(self) -> None:
-        """End the thread once it has finished what it is at."""
+        """End the thread once it has prepared the map that it is working on."""
         with self._changed:
             self._ending = True
             self._changed.notify()

@@ -6,13 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.names import WHEELS
+from rover_physics.names import SIDES, WHEEL_COUNT, WHEELS
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
+from rover_physics.traction.layout import LATERAL_SHARE, LATERAL_SLOPE, LOADS, TRACTIONS
 
 Floats = NDArray[np.float64]
 ROUNDS = 6
-"""Loads hang on tractions, and by friction tractions on loads: so often each follows the other."""
+"""Rounds in which loads and tractions are found from each other: friction links them."""
+MIN_CAPACITY = 1e-9
+"""Smallest friction force that a utilisation is a share of [N]: unloaded wheels have none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +23,7 @@ class DrivingForces:
     """The forces of a rover that moves, or stays, under given torques."""
 
     push: float
-    """Force along the way beyond what holds the rover where it is [N]."""
+    """Force along body +x beyond what holds the rover where it is [N]."""
     tractions: Floats
     """(6,) along the ground, forward, within the friction of each wheel [N]."""
     loads: Floats
@@ -36,56 +39,55 @@ class DrivingForces:
 
 
 def find_driving_forces(
-    writer: BalanceWriter, radius: float, here: PathPrediction, torques: Floats, moving: float
+    writer: BalanceWriter, radius: float, here: PathPrediction, torques: Floats, direction: float
 ) -> DrivingForces:
-    """Find the forces under given torques, by d'Alembert: the push is held by the rover's mass.
+    """Find the forces under given torques, by d'Alembert: the push accelerates the rover's mass.
 
     Args:
-        writer: Of the rover.
-        radius: Of its wheels [m].
-        here: One row: where the rover is.
+        writer: Writes the balance of the rover.
+        radius: Wheel radius [m].
+        here: One waypoint: where the rover is.
         torques: (6,) of the motors [N m], positive forward.
-        moving: 1 where it moves forward, -1 backward, 0 where it rests.
+        direction: 1 where the rover moves forward, -1 backward, 0 where it rests.
 
     Returns:
-        The forces; no push and those of `here` where the balance does not determine them.
+        The forces; no push and the loads of `here` where the balance does not determine them.
     """
     friction, loads, lateral = here.friction[0], here.wheel_loads[0], here.lateral[0]
     resistance = np.nan_to_num(here.motion_resistance[0])
-    wanted = torques / radius - moving * resistance
-    state = _state(here)
-    tractions, push, sliding = wanted, 0.0, np.zeros(len(WHEELS), dtype=bool)
+    wanted = torques / radius - direction * resistance
+    state = _measure_state(here)
+    tractions, push, sliding = wanted, 0.0, np.zeros(WHEEL_COUNT, dtype=bool)
     for _ in range(ROUNDS):
         loads = np.maximum(loads, 0.0)
-        most = np.sqrt(np.clip((friction * loads) ** 2 - lateral**2, 0.0, None))
-        sliding = np.abs(wanted) > most
-        tractions = np.clip(wanted, -most, most)
+        limit = np.sqrt(np.clip((friction * loads) ** 2 - lateral**2, 0.0, None))
+        sliding = np.abs(wanted) > limit
+        tractions = np.clip(wanted, -limit, limit)
         try:
             rows = writer.write(state, push)
         except ModelError:
             return DrivingForces(0.0, tractions, loads, here.friction_utilisation[0], sliding)
-        held = rows.complete(tractions / rows.force_unit) * rows.force_unit
-        push += float((tractions - held[:6]).sum())
-        loads, lateral = held[6:12], held[12] + held[13] * rows.along
+        x = rows.complete(tractions / rows.force_unit) * rows.force_unit
+        push += float((tractions - x[TRACTIONS]).sum())
+        loads, lateral = x[LOADS], x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along
     loads = np.maximum(loads, 0.0)
-    used = np.hypot(tractions, lateral) / np.maximum(friction * loads, 1e-9)
-    if not moving:  # soil gives way only to what is more than its resistance
+    used = np.hypot(tractions, lateral) / np.maximum(friction * loads, MIN_CAPACITY)
+    if not direction:  # soil gives way only to what is more than its resistance
         push = float(np.sign(push) * max(abs(push) - resistance.sum(), 0.0))
-    return DrivingForces(push, tractions, loads, np.where(sliding, 1.0, np.minimum(used, 1.0)),
-                         sliding)  # fmt: skip
+    utilisation = np.where(sliding, 1.0, np.minimum(used, 1.0))
+    return DrivingForces(push, tractions, loads, utilisation, sliding)
 
 
-def _state(here: PathPrediction) -> MeasuredState:
-    """Return what would be measured of the rover there, contacts included."""
-    offsets = (here.contact_points[0] - here.wheel_centres[0]) @ _axis(here)
+def _measure_state(here: PathPrediction) -> MeasuredState:
+    """Return what would be measured of the rover at the waypoint, contacts included."""
+    offsets = (here.contact_points[0] - here.wheel_centres[0]) @ _find_wheel_axis(here)
     return MeasuredState(
         float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
         here.bogie_angle[0], here.contact_angle[0], offsets,
     )  # fmt: skip
 
 
-def _axis(here: PathPrediction) -> Floats:
-    """Return the direction (3,) of the wheel axes, map frame."""
-    left = here.wheel_centres[0, 3:].mean(axis=0)
-    right = here.wheel_centres[0, :3].mean(axis=0)
+def _find_wheel_axis(here: PathPrediction) -> Floats:
+    """Return the direction (3,) of the wheel axes, right to left, map frame."""
+    right, left = here.wheel_centres[0].reshape(len(SIDES), -1, 3).mean(axis=1)
     return np.asarray((left - right) / np.linalg.norm(left - right))

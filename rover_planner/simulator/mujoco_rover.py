@@ -1,4 +1,4 @@
-"""A rover on rigid ground in MuJoCo, moved by wheel torques: a plant for controllers.
+"""A rover on rigid ground in MuJoCo, moved by wheel torques or by speed servos.
 
 It needs the package mujoco (extra `bench`) and shares nothing with the model of `rover_physics`
 but the rover's numbers: rigid bodies, hinges, a differential that couples the rockers, cylindrical
@@ -19,17 +19,21 @@ from rover_planner.errors import PlanningError
 
 Floats = NDArray[np.float64]
 TIMESTEP = 0.004
-"""Of the simulation [s]."""
-FALL = 0.02
-"""Height above the ground from which the rover is let down [m]."""
+"""Time step of the simulation [s]."""
+DROP_HEIGHT = 0.02
+"""Height above the ground from which the rover is dropped [m]."""
+SETTLING_TIME = 3.0
+"""Time for which the servos hold the wheels until the rover rests [s]."""
 SERVO_SHARE = 0.5
-"""Share of an error of speed that a servo takes away in one step of the simulation."""
+"""Share of a speed error that a servo corrects in one step of the simulation."""
 SERVO_RATE = 5.0
-"""Rate at which a servo adds up its error [1/s]."""
+"""Integral gain of a servo over its gain [1/s]."""
 MOTOR_INERTIA = 1.0
 """Inertia of a geared motor at the wheel, in wheel radii squared times a sixth of the mass."""
 MIN_LOAD = 1e-3
-"""Load, in weights, from which a wheel counts as on the ground."""
+"""Load from which a wheel counts as on the ground, in weights of the rover."""
+DERATING_SHARE = 0.2
+"""Last share of the largest speed in which the torque of a motor falls to zero."""
 
 _MODEL = """
 <mujoco model={name}>
@@ -63,7 +67,7 @@ _MODEL = """
 
 @dataclass(frozen=True, eq=False)
 class WheelContacts:
-    """What acts on the wheels at one moment."""
+    """Forces and slip of the wheels at one moment."""
 
     loads: Floats
     """(6,) sums of normal forces [N]."""
@@ -73,8 +77,8 @@ class WheelContacts:
     """(6,) speeds of the treads over the ground [m/s], weighted by load; zero without contact."""
 
 
-class RoverPlant:
-    """One rover on one terrain."""
+class MujocoRover:
+    """A rover on one terrain, simulated by MuJoCo."""
 
     def __init__(
         self,
@@ -84,14 +88,14 @@ class RoverPlant:
         friction: float | None = None,
         timestep: float = TIMESTEP,
     ):
-        """Let a rover down on the ground and wait until it rests.
+        """Drop a rover onto the ground and wait until it rests.
 
         Args:
             rover: The rover.
             terrain: The ground; all of it known. A friction layer is not used.
             pose: x, y [m] and yaw [rad] of the body's origin.
             friction: Coefficient between wheels and ground instead of the rover's own.
-            timestep: Of the simulation [s].
+            timestep: Time step of the simulation [s].
 
         Raises:
             PlanningError: Unknown cells, or a pose beyond the terrain.
@@ -119,17 +123,16 @@ class RoverPlant:
         self._inertia = float(self._model.dof_M0[self._velocities[-1]])
         self._integral = np.zeros(6)
         self._bodies = np.array([self._model.body(name).id for name in WHEELS])
-        self._let_down(pose)
+        self._drop(pose)
 
-    def _let_down(self, pose: tuple[float, float, float]) -> None:
+    def _drop(self, pose: tuple[float, float, float]) -> None:
         x, y, yaw = pose
         highest = self._height_above_ground(x, y, yaw)
         if not np.isfinite(highest):
             raise PlanningError(f"a rover at {pose} stands beyond the terrain")
-        self._data.qpos[:7] = x, y, highest + FALL, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)
+        self._data.qpos[:7] = x, y, highest + DROP_HEIGHT, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)
         mujoco.mj_forward(self._model, self._data)
-        for _ in range(150):
-            self.servo(np.zeros(6), 0.02)
+        self.servo(np.zeros(6), SETTLING_TIME)
         self._data.time = 0.0
 
     def _height_above_ground(self, x: float, y: float, yaw: float) -> float:
@@ -148,23 +151,24 @@ class RoverPlant:
         return float(np.max(highest))
 
     def step(self, torques: Floats, duration: float) -> None:
-        """Let torques (6,) [N m] in wheel order act for a time [s]; the motors limit them."""
+        """Apply torques (6,) [N m] in wheel order for a time [s]; the motors limit them."""
         for _ in range(max(round(duration / self._model.opt.timestep), 1)):
             self._data.ctrl[:] = self._limit(torques)
             mujoco.mj_step(self._model, self._data)
 
     def _limit(self, torques: Floats) -> Floats:
-        """Return what the motors can give: nothing that drives a wheel beyond its speed."""
+        """Return the torques that the motors can give: none beyond their largest speed."""
         wheel, rates = self.rover.wheel, self.wheel_rates
-        most = np.clip((wheel.max_speed - np.abs(rates)) / (0.2 * wheel.max_speed), 0.0, 1.0)
-        most = np.where(rates * torques > 0.0, most, 1.0) * wheel.max_torque
-        return np.clip(torques, -most, most)
+        derating = DERATING_SHARE * wheel.max_speed
+        share = np.clip((wheel.max_speed - np.abs(rates)) / derating, 0.0, 1.0)
+        limit = np.where(rates * torques > 0.0, share, 1.0) * wheel.max_torque
+        return np.clip(torques, -limit, limit)
 
     def servo(self, rates: Floats, duration: float) -> Floats:
-        """Let speed servos drive the wheels at rates (6,) [rad/s] for a time [s].
+        """Drive the wheels at rates (6,) [rad/s] for a time [s] by speed servos.
 
-        Each is a controller of its own, run at every step of the simulation: proportional, with
-        an integral that a limited torque stops.
+        Each wheel has a PI controller of its own, run at every step of the simulation; its
+        integral does not grow while the torque is limited.
 
         Returns:
             Torques (6,) at the end [N m].

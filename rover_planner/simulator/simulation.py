@@ -111,7 +111,7 @@ def make_plant(settings: SimulationSettings) -> Plant:
             "servos hold speeds"
         )
     try:
-        from rover_planner.simulator.mujoco_engine import MujocoPlant
+        from rover_planner.simulator.mujoco_plant import MujocoPlant
     except ImportError:
         raise PlanningError(
             "engine is mujoco, which is not installed: pip install 'rover_planner[bench]'"

@@ -7,22 +7,22 @@ import numpy as np
 
 from rover_planner.traction.traction_service import TractionUpdate
 
-REMEMBERED = 6000
-"""Updates that times are told of."""
+MAX_TIMES = 6000
+"""Number of the last updates whose times are kept."""
 
 
 class TractionStatistics:
-    """What the updates were like."""
+    """Counts updates and keeps their times."""
 
     def __init__(self, period: float):
-        """Start to count; `period` [s] is that of the updates."""
+        """Start at zero; `period` [s] is that of the updates."""
         self._period = period
         self._last_start: float | None = None
-        self._times: deque[float] = deque(maxlen=REMEMBERED)
+        self._times: deque[float] = deque(maxlen=MAX_TIMES)
         self.missed = 0
-        """Cycles that were passed over because an update came late."""
+        """Cycles without an update, because one came late."""
         self.fallbacks = 0
-        """Updates with equal torques because OSQP did not solve."""
+        """Updates with equal torques because OSQP failed."""
         self.updates = 0
         """Updates in all."""
         self.last: TractionUpdate | None = None
@@ -30,7 +30,7 @@ class TractionStatistics:
 
     @property
     def times(self) -> np.ndarray:
-        """How long the last updates took, publishing included [s]."""
+        """Durations of the last updates, publishing included [s]."""
         return np.array(self._times)
 
     def take(self, update: TractionUpdate, start: float, end: float) -> None:
@@ -44,30 +44,34 @@ class TractionStatistics:
         self.last = update
 
     def describe(self) -> dict[str, Any]:
-        """Return what there is to say by name, times in ms."""
-        words: dict[str, Any] = {
+        """Return counts, times [ms] and the last update by name."""
+        values: dict[str, Any] = {
             "updates": self.updates,
             "missed_cycles": self.missed,
             "fallbacks": self.fallbacks,
         }
         if self._times:
             times = 1e3 * self.times
-            words["update_time_median_ms"] = round(float(np.median(times)), 3)
-            words["update_time_p99_ms"] = round(float(np.percentile(times, 99)), 3)
-        update = self.last
-        if update is None or update.answer is None or update.estimate is None:
-            return words
-        answer = update.answer
-        return words | {
-            "solve_time_ms": round(1e3 * update.duration, 3),
-            "iterations": answer.iterations,
-            "programs": answer.programs,
-            "status": answer.status,
-            "fallback": answer.fallback,
-            "contact_source": update.estimate.source,
-            "peak_friction_utilisation": round(float(answer.utilisation.max()), 4),
-            "friction_slack": round(answer.friction_slack, 4),
-            "load_slack_N": round(answer.load_slack, 3),
-            "torque_slack_Nm": round(answer.torque_slack, 4),
-            "warning": update.warning,
-        }
+            values["update_time_median_ms"] = round(float(np.median(times)), 3)
+            values["update_time_p99_ms"] = round(float(np.percentile(times, 99)), 3)
+        return values if self.last is None else values | _describe_update(self.last)
+
+
+def _describe_update(update: TractionUpdate) -> dict[str, Any]:
+    """Return what an update came to by name, empty where there is a fault."""
+    answer, estimate = update.answer, update.estimate
+    if answer is None or estimate is None:
+        return {}
+    return {
+        "solve_time_ms": round(1e3 * update.duration, 3),
+        "iterations": answer.iterations,
+        "programs": answer.programs,
+        "status": answer.status,
+        "fallback": answer.fallback,
+        "contact_source": estimate.source,
+        "peak_friction_utilisation": round(float(answer.utilisation.max()), 4),
+        "friction_slack": round(answer.friction_slack, 4),
+        "load_slack_N": round(answer.load_slack, 3),
+        "torque_slack_Nm": round(answer.torque_slack, 4),
+        "warning": update.warning,
+    }

@@ -1,4 +1,4 @@
-"""What a traction controller knows and decides, without ROS: measurements in, torques out."""
+"""The traction controller without ROS: it keeps measurements and makes torques of them."""
 
 import time
 from collections.abc import Mapping
@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
+from rover_physics.prediction.sweep_options import POLICIES
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import (
@@ -22,29 +24,38 @@ from rover_physics.traction.contact_ekf import (
     level_estimate,
 )
 from rover_physics.traction.map_contacts import MapContactFinder
-from rover_physics.traction.solver import TractionAnswer, TractionWorkspace, solve_traction
-from rover_planner.ros.map_intake import PreparedMap, prepare_map
+from rover_physics.traction.solver import (
+    MAX_PROGRAMS,
+    TractionAnswer,
+    TractionWorkspace,
+    solve_traction,
+)
+from rover_physics.traction.wheel_limits import WheelLimits
 from rover_planner.traction.input_monitor import InputMonitor
 from rover_planner.traction.loops import (
     LoopGains,
     PIController,
     StallDetector,
+    estimate_rolling_rates,
     limit_rate,
-    rolling_rates,
 )
+from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 
 Floats = NDArray[np.float64]
 INPUTS = ("joint_states", "imu", "cmd_vel")
 ODOMETRY = "odometry"
 OWN_PAYLOAD = -1.0
 """Value of the parameter payload that takes what the rover file has."""
-EQUAL, OPTIMAL = "equal", "optimal"
 MAX_PUSH = 0.6
 """Largest push of the speed loop, in weights."""
+HEADING_INTEGRAL_GAIN = 0.5
+"""Integral gain of the heading loop over its gain [1/s]."""
 SERVO_STIFFNESS = 6.0
-"""Gain of the servos that take over where the rover does not get on, in gains against slip."""
+"""Gain of the servos that take over from a stalled rover, over the gain against slip."""
 MAX_STEP = 0.1
 """Longest time between two updates that loops and filter count [s]."""
+TURN_LEFT = np.repeat([1.0, -1.0], 3)
+"""Sign of each wheel's torque that turns the rover left: the right wheels drive forward."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +71,7 @@ class TractionSettings:
     payload: float | None
     """Mass at the arm's tip [kg], None for the rover's own."""
     policy: str
-    """EQUAL or OPTIMAL."""
+    """How the wheels share the traction: a name of POLICIES."""
     timeout: float
     """Age from which an input is stale [s]."""
     odometry_timeout: float
@@ -71,14 +82,14 @@ class TractionSettings:
 
 @dataclass(frozen=True, eq=False)
 class TractionUpdate:
-    """What one update made of the measurements."""
+    """What came of one update."""
 
     torques: Floats
     """(6,) torques to command, wheel order [N m]; zero where there is a fault."""
     fault: str
-    """Why there are none, empty where nothing is wrong."""
+    """Why there is no torque, empty where nothing is wrong."""
     warning: str
-    """What is amiss though the rover drives, empty where nothing is."""
+    """What is wrong though the rover drives, empty where nothing is."""
     answer: TractionAnswer | None
     """The shared torques, before heading and slip; None where there is a fault."""
     estimate: ContactEstimate | None
@@ -118,19 +129,20 @@ def settings_from_parameters(values: Mapping[str, Any]) -> TractionSettings:
 
 
 class TractionService:
-    """The last measurements, the estimate of where wheels touch, and the loops."""
+    """Keeps the last measurements, the estimate of the contact angles, and the loops."""
 
     def __init__(self, settings: TractionSettings):
+        """Start without measurements."""
         self._workspace = TractionWorkspace()
-        self._watch = InputMonitor(INPUTS, settings.timeout)
-        self._odometry_watch = InputMonitor((ODOMETRY,), settings.odometry_timeout)
-        self._positions = np.zeros(len(SUSPENSION_JOINTS))
-        self._rates: Floats | None = None
-        self._wheel_rates = np.zeros(len(WHEEL_JOINTS))
+        self._monitor = InputMonitor(INPUTS, settings.timeout)
+        self._odometry_monitor = InputMonitor((ODOMETRY,), settings.odometry_timeout)
+        self._suspension_angles = np.zeros(len(SUSPENSION_JOINTS))
+        self._suspension_rates: Floats | None = None
+        self._wheel_rates = np.zeros(WHEEL_COUNT)
         self._mean_rate = 0.0
         self._attitude = (0.0, 0.0)
         self._body_rates: Floats | None = None
-        self._wanted = (0.0, 0.0)
+        self._wanted_speed, self._wanted_yaw_rate = 0.0, 0.0
         self._pose, self._deviation = np.zeros(4), 0.0
         self._terrain: Terrain | None = None
         self._last_time: float | None = None
@@ -145,28 +157,31 @@ class TractionService:
     @settings.setter
     def settings(self, settings: TractionSettings) -> None:
         self._settings = settings
-        rover, gains = settings.rover, settings.gains
-        self._watch.timeout = settings.timeout
-        self._odometry_watch.timeout = settings.odometry_timeout
+        rover = settings.rover
+        self._monitor.timeout = settings.timeout
+        self._odometry_monitor.timeout = settings.odometry_timeout
         self._writer = BalanceWriter(rover, settings.payload)
         self._estimator = MotionContactEstimator(rover)
-        self._friction = np.full(len(WHEEL_JOINTS), settings.friction)
-        weight = self._writer.weight
-        mass = weight / rover.gravity
-        self._arm = rover.suspension.wheels["middle"][1]
-        most = MAX_PUSH * weight
-        self._speed = PIController(mass * gains.speed, mass * gains.travel, most)
-        inertia = mass * self._arm**2
-        heading = inertia * gains.heading
-        self._heading = PIController(heading, 0.5 * heading, most * self._arm)
+        self._optimal = POLICIES[settings.policy] == TorquePolicy.OPTIMAL
+        friction = np.full(WHEEL_COUNT, settings.friction)
+        self._limits = WheelLimits(friction, settings.max_torque, rover.wheel.radius)
+        self._create_loops()
         if self._terrain is not None:
             self.take_terrain(self._terrain)
-        self._let_go()
+        self._reset()
 
-    @property
-    def watch(self) -> InputMonitor:
-        """Which inputs are there and fresh."""
-        return self._watch
+    def _create_loops(self) -> None:
+        """Create the loops of speed and heading with the gains in force."""
+        rover, gains = self._settings.rover, self._settings.gains
+        weight = self._writer.weight
+        mass, max_push = weight / rover.gravity, MAX_PUSH * weight
+        self._half_track = rover.suspension.wheels["middle"][1]
+        inertia = mass * self._half_track**2
+        heading = inertia * gains.heading
+        self._speed = PIController(mass * gains.speed, mass * gains.travel, max_push)
+        self._heading = PIController(
+            heading, HEADING_INTEGRAL_GAIN * heading, max_push * self._half_track
+        )
 
     def take_joints(
         self, positions: Mapping[str, float], velocities: Mapping[str, float], now: float
@@ -176,64 +191,69 @@ class TractionService:
         missing += [name for name in WHEEL_JOINTS if name not in velocities]
         if missing:
             what = "position" if missing[0] in SUSPENSION_JOINTS else "velocity"
-            self._watch.refuse(
+            self._monitor.refuse(
                 "joint_states", f"joint_states has no {what} of {', '.join(missing)}"
             )
             return
-        self._positions = np.array([positions[name] for name in SUSPENSION_JOINTS])
+        self._suspension_angles = np.array([positions[name] for name in SUSPENSION_JOINTS])
         self._wheel_rates = np.array([velocities[name] for name in WHEEL_JOINTS])
-        self._mean_rate = float(self._wheel_rates.sum()) / len(WHEEL_JOINTS)
+        self._mean_rate = float(self._wheel_rates.sum()) / WHEEL_COUNT
         known = all(name in velocities for name in SUSPENSION_JOINTS)
-        self._rates = np.array([velocities[name] for name in SUSPENSION_JOINTS]) if known else None
-        self._watch.take("joint_states", now)
+        self._suspension_rates = (
+            np.array([velocities[name] for name in SUSPENSION_JOINTS]) if known else None
+        )
+        self._monitor.take("joint_states", now)
 
     def take_attitude(self, roll: float, pitch: float, rates: Floats | None, now: float) -> None:
-        """Take roll and pitch [rad] and, where measured, angular velocity (3,) [rad/s]."""
+        """Take roll and pitch [rad] at a time [s].
+
+        `rates` is the angular velocity (3,) in the body frame [rad/s], None where not measured.
+        """
         self._attitude, self._body_rates = (roll, pitch), rates
-        self._watch.take("imu", now)
+        self._monitor.take("imu", now)
 
     def take_command(self, speed: float, yaw_rate: float, now: float) -> None:
-        """Take the wanted speed [m/s] and yaw rate [rad/s]."""
-        self._wanted = (speed, yaw_rate)
-        self._watch.take("cmd_vel", now)
+        """Take the wanted speed [m/s] and yaw rate [rad/s], at a time [s]."""
+        self._wanted_speed, self._wanted_yaw_rate = speed, yaw_rate
+        self._monitor.take("cmd_vel", now)
 
     def take_odometry(self, pose: Floats, deviation: float, now: float) -> None:
-        """Take (4,) x, y, z [m] and yaw [rad] in the map frame, and how well x, y are known."""
+        """Take (4,) x, y, z [m] and yaw [rad] in the map frame, and the deviation of x, y [m]."""
         self._pose, self._deviation = pose, deviation
-        self._odometry_watch.take(ODOMETRY, now)
+        self._odometry_monitor.take(ODOMETRY, now)
 
     def take_terrain(self, terrain: Terrain) -> None:
-        """Take a map; it is used while odometry comes."""
+        """Take a map; it is used while odometry is fresh."""
         self.take_map(prepare_map(self._settings.rover, terrain))
 
     def take_map(self, prepared: PreparedMap) -> None:
-        """Take a map that was made ready before; anew if it was for another rover."""
+        """Take a prepared map; it is prepared anew if it was for another rover."""
         rover = self._settings.rover
         if prepared.rover is not rover:
             prepared = prepare_map(rover, prepared.terrain)
         self._terrain, self._finder = prepared.terrain, prepared.finder
 
     def refuse(self, name: str, error: str) -> None:
-        """Note that an input came that cannot be used."""
-        (self._odometry_watch if name == ODOMETRY else self._watch).refuse(name, error)
+        """Note that an unusable input came, and why it is."""
+        (self._odometry_monitor if name == ODOMETRY else self._monitor).refuse(name, error)
 
     def update(self, now: float) -> TractionUpdate:
-        """Return the torques for now [s], by the clock of the inputs."""
+        """Return the torques for a time [s], by the clock of the inputs."""
         start = time.perf_counter()
-        fault = self._watch.find_fault(now)
+        fault = self._monitor.find_fault(now)
         if fault:
             return self.rest(fault, start)
         duration = 0.0 if self._last_time is None else min(now - self._last_time, MAX_STEP)
         self._last_time = now
         estimate, warning = self._estimate_contacts(now, duration)
-        state = self._measured_state(estimate)
-        push = self._push(duration)
+        state = self._measure_state(estimate)
+        push = self._find_push(duration)
         try:
             rows = self._writer.write(state, push)
         except ModelError as error:
-            rows, warning = self._writer.write(self._level_state(), push), str(error)
-        answer = self._share(rows)
-        torques = self._finish(answer, rows, duration)
+            rows, warning = self._writer.write(self._measure_level_state(), push), str(error)
+        answer = self._share_torques(rows)
+        torques = self._command_torques(answer, rows, duration)
         if not np.isfinite(torques).all():
             return self.rest(
                 f"torques {torques.tolist()} N m came out; they must be finite", start
@@ -241,96 +261,104 @@ class TractionService:
         return TractionUpdate(torques, "", warning, answer, estimate, time.perf_counter() - start)
 
     def rest(self, fault: str, start: float | None = None) -> TractionUpdate:
-        """Return zero torques at once, and forget what the loops have added up."""
-        self._let_go()
+        """Return zero torques at once, and reset the loops."""
+        self._reset()
         start = time.perf_counter() if start is None else start
-        zero = np.zeros(len(WHEEL_JOINTS))
+        zero = np.zeros(WHEEL_COUNT)
         return TractionUpdate(zero, fault, "", None, None, time.perf_counter() - start)
 
-    def _let_go(self) -> None:
+    def _reset(self) -> None:
+        """Forget the last answer, and set all integrals to zero."""
         self._speed.reset()
         self._heading.reset()
         self._stall = StallDetector()
         self._last_time = None
         self._last: Floats | None = None
         self._limited = False
-        self._torques = np.zeros(len(WHEEL_JOINTS))
+        self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
-        """Return the contact angles from the best source there is, and what is amiss."""
-        moving, warning = self._estimate_from_motion(duration)
-        if self._finder is None or not self._odometry_watch.is_fresh(ODOMETRY, now):
-            return moving, warning
+        """Return the contact angles from the best source, and what is wrong, empty if nothing."""
+        from_motion, warning = self._estimate_from_motion(duration)
+        if self._finder is None or not self._odometry_monitor.is_fresh(ODOMETRY, now):
+            return from_motion, warning
         try:
-            forward = self._wanted[0] >= 0.0
-            state = self._measured_state(moving)
+            forward = self._wanted_speed >= 0.0
+            state = self._measure_state(from_motion)
             return self._finder.find(state, self._pose, self._deviation, forward), ""
         except ModelError as error:
-            return moving, warning or str(error)
+            return from_motion, warning or str(error)
 
     def _estimate_from_motion(self, duration: float) -> tuple[ContactEstimate, str]:
-        if self._rates is None or self._body_rates is None:
+        """Return the contact angles from motion, zero with a warning where rates are missing."""
+        if self._suspension_rates is None or self._body_rates is None:
             lacking = "joint_states has no velocities of the suspension"
-            if self._rates is not None:
+            if self._suspension_rates is not None:
                 lacking = "imu has no angular velocity"
             return level_estimate(), f"contact angles are taken as zero: {lacking}"
-        rocker = 0.5 * (self._rates[0] - self._rates[1])
-        state = self._level_state()
+        rocker = 0.5 * (self._suspension_rates[0] - self._suspension_rates[1])
+        state = self._measure_level_state()
         motion = Motion(
             state.roll, state.pitch, state.rocker_angle, state.bogie_angles,
-            rocker, self._rates[2:], self._wheel_rates, self._body_rates,
+            rocker, self._suspension_rates[2:], self._wheel_rates, self._body_rates,
         )  # fmt: skip
         return self._estimator.update(motion, duration), ""
 
-    def _level_state(self) -> MeasuredState:
+    def _measure_level_state(self) -> MeasuredState:
         """Return the measured state with zero contact angles."""
         roll, pitch = self._attitude
-        right, left, *bogies = self._positions
-        angles = np.zeros(len(WHEEL_JOINTS))
+        right, left, *bogies = self._suspension_angles
+        angles = np.zeros(WHEEL_COUNT)
         return MeasuredState(roll, pitch, 0.5 * (right - left), np.array(bogies), angles)
 
-    def _measured_state(self, estimate: ContactEstimate) -> MeasuredState:
-        state = self._level_state()
+    def _measure_state(self, estimate: ContactEstimate) -> MeasuredState:
+        """Return the measured state with estimated contact angles."""
+        state = self._measure_level_state()
         state.contact_angles[:] = estimate.angles
         return state
 
-    def _push(self, duration: float) -> float:
+    def _find_push(self, duration: float) -> float:
         """Return the wanted net traction [N] by the mean travel of the wheels."""
         speed = self._mean_rate * self._settings.rover.wheel.radius
-        return self._speed.update(self._wanted[0] - speed, duration, self._limited)
+        return self._speed.update(self._wanted_speed - speed, duration, self._limited)
 
-    def _share(self, rows: BalanceRows) -> TractionAnswer:
-        settings = self._settings
+    def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
+        """Return the torques by the policy, and note whether a limit holds them back."""
         answer = solve_traction(
-            self._workspace, rows, self._friction, settings.max_torque,
-            settings.rover.wheel.radius, self._last,
-            max_programs=2 if settings.policy == OPTIMAL else 0,
+            self._workspace, rows, self._limits, self._last,
+            max_programs=MAX_PROGRAMS if self._optimal else 0,
         )  # fmt: skip
         self._last = answer.tractions
         self._limited = answer.torque_slack > 0.0 or answer.friction_slack > 0.0
         return answer
 
-    def _finish(self, answer: TractionAnswer, rows: BalanceRows, duration: float) -> Floats:
-        """Return the torques with what heading and slip ask for, limited in size and rate."""
-        settings = self._settings
-        gains, torques = settings.gains, answer.torques.copy()
+    def _command_torques(
+        self, answer: TractionAnswer, rows: BalanceRows, duration: float
+    ) -> Floats:
+        """Return the torques (6,) with those of the other loops, limited in size and rate."""
+        settings, torques = self._settings, answer.torques.copy()
         if self._body_rates is not None:
-            error = self._wanted[1] - float(self._body_rates[2])
+            error = self._wanted_yaw_rate - float(self._body_rates[2])
             moment = self._heading.update(error, duration, self._limited)
-            torques += settings.rover.wheel.radius * moment / (6.0 * self._arm) * TURNING
-        if settings.policy == OPTIMAL:
-            wanted = self._wanted[0] / settings.rover.wheel.radius
-            rolling = rolling_rates(self._wheel_rates, rows.wheel_speeds, wanted)
-            torques -= gains.slip * (self._wheel_rates - rolling)
-            # Wheels that spin turn faster than the rover goes: the median is nearer to that.
-            share = self._stall.update(median(self._wheel_rates.tolist()), wanted, duration)
-            if share > 0.0:
-                servo = gains.slip * SERVO_STIFFNESS * (wanted - self._wheel_rates)
-                torques += share * (servo - torques)
+            torques += (
+                settings.rover.wheel.radius * moment / (WHEEL_COUNT * self._half_track) * TURN_LEFT
+            )
+        if self._optimal:
+            self._add_slip_control(torques, rows, duration)
         torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)
-        self._torques = limit_rate(torques, self._torques, gains.torque_rate * duration)
+        max_change = settings.gains.torque_rate * duration
+        self._torques = limit_rate(torques, self._torques, max_change)
         return self._torques
 
-
-TURNING = np.repeat([1.0, -1.0], 3)
-"""Which way wheels drive to turn left: the right ones forwards."""
+    def _add_slip_control(self, torques: Floats, rows: BalanceRows, duration: float) -> None:
+        """Add torques against slip, and let speed servos take over from a stalled rover."""
+        gain, wheel_rates = self._settings.gains.slip, self._wheel_rates
+        wanted = self._wanted_speed / self._settings.rover.wheel.radius
+        torques -= gain * (
+            wheel_rates - estimate_rolling_rates(wheel_rates, rows.wheel_speeds, wanted)
+        )
+        # Wheels that spin turn faster than the rover goes: the median is nearer to that.
+        share = self._stall.update(median(wheel_rates.tolist()), wanted, duration)
+        if share > 0.0:
+            servo = gain * SERVO_STIFFNESS * (wanted - wheel_rates)
+            torques += share * (servo - torques)

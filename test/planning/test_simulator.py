@@ -10,7 +10,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter
 from rover_planner.errors import PlanningError
 from rover_planner.simulator.driving_forces import find_driving_forces
-from rover_planner.simulator.mujoco_engine import MujocoPlant
+from rover_planner.simulator.mujoco_plant import MujocoPlant
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor

@@ -8,7 +8,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import (
-    SPREAD,
+    SLOPE_DEVIATION,
     Motion,
     MotionContactEstimator,
     level_estimate,
@@ -97,7 +97,7 @@ def test_covariances_stay_symmetric_and_positive():
 def test_without_a_source_the_angles_are_zero_and_as_uncertain_as_ground_is():
     estimate = level_estimate()
     assert estimate.source == "zero" and not estimate.angles.any()
-    assert np.diag(estimate.covariance) == pytest.approx(np.full(6, SPREAD**2))
+    assert np.diag(estimate.covariance) == pytest.approx(np.full(6, SLOPE_DEVIATION**2))
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.05, -0.05])
@@ -123,6 +123,24 @@ def test_at_the_foot_of_a_face_it_is_the_face_that_counts():
     assert angles[[0, 1, 3, 4]] == pytest.approx(np.zeros(4), abs=0.02)
     back = MapContactFinder(LSR1, ground).find(level, pose, 0.0, forward=False).angles
     assert back == pytest.approx(np.zeros(6), abs=0.02)
+
+
+def test_an_estimate_stays_as_it_is_when_the_next_one_is_made():
+    ground = fractal(1)
+    prediction, motions, duration = drive_states(LSR1, ground)
+    finder, estimator = MapContactFinder(LSR1, ground), MotionContactEstimator(LSR1)
+
+    def estimate(i):
+        pose = np.array([*prediction.position[i], 0.0])
+        found = finder.find(state_of(prediction, i), pose, 0.0)
+        return found, estimator.update(motions[i], duration)
+
+    first = estimate(400)
+    kept = [(one.angles.copy(), one.covariance.copy()) for one in first]
+    second = estimate(700)
+    for one, (angles, covariance), other in zip(first, kept, second, strict=True):
+        assert np.array_equal(one.angles, angles) and np.array_equal(one.covariance, covariance)
+        assert not np.array_equal(one.angles, other.angles)
 
 
 def test_uncertain_odometry_makes_uncertain_angles():

@@ -8,7 +8,7 @@ from rover_physics.traversability.classification import classify_path
 from support.reference_drives import drive_ground, drive_path, unlimited
 
 pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
-from benchmarks.traction import EQUAL, MAP, Obstacle, drive
+from benchmarks.traction import EQUAL_CONTROLLER, MAP_CONTROLLER, Obstacle, drive
 
 STEP = Obstacle("step", 0.10, 0.5)
 """As high as a wheel radius, at a friction with which equal torques do not do."""
@@ -24,8 +24,10 @@ def test_the_planner_calls_the_step_passable_only_with_traction_control():
     assert "passable with traction control" in classes and "impassable" not in classes
 
 
-@pytest.mark.parametrize(("controller", "passes"), [(EQUAL, False), (MAP, True)])
-def test_in_mujoco_the_step_is_passed_with_the_programme_and_not_with_equal_torques(
+@pytest.mark.parametrize(
+    ("controller", "passes"), [(EQUAL_CONTROLLER, False), (MAP_CONTROLLER, True)]
+)
+def test_in_mujoco_the_step_is_passed_with_the_program_and_not_with_equal_torques(
     controller, passes
 ):
     assert drive(STEP, controller).passed is passes

@@ -7,17 +7,26 @@ import pytest
 
 from rover_physics.errors import ModelError
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
-from rover_physics.traction.line_search import find_best_between, measure_peak
-from rover_physics.traction.program import (
-    CONES,
-    LIMIT,
-    Reference,
-    TractionWeights,
-    build_traction_qp,
+from rover_physics.traction.layout import (
+    CONE_ROWS,
+    EQUATIONS,
+    FORCES,
+    LATERAL_SHARE,
+    LATERAL_SLOPE,
+    LOADS,
+    PEAK,
+    PEAK_LIMIT_ROW,
+    TRACTION,
+    TRACTIONS,
+    VARIABLES,
 )
+from rover_physics.traction.line_search import find_best_between, measure_peak
+from rover_physics.traction.program import Reference, TractionWeights, build_traction_qp
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
+from rover_physics.traction.wheel_limits import WheelLimits
 from support.best_torques import can_stand
 from support.rough_grounds import plane
 from support.rover_geometry import balance_matrix
@@ -25,6 +34,8 @@ from support.traction_states import rough_states, state_of
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FRICTION = np.full(6, 0.8)
+LIMITS = WheelLimits(FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius)
+CONES = slice(CONE_ROWS, PEAK_LIMIT_ROW)
 
 
 def level(angles=(0.0,) * 6):
@@ -33,11 +44,9 @@ def level(angles=(0.0,) * 6):
 
 def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **more):
     rows = BalanceWriter(rover).write(state, net)
-    wheel = rover.wheel
-    return solve_traction(
-        more.pop("workspace", None) or TractionWorkspace(), rows, friction,
-        torque or wheel.max_torque, wheel.radius, max_programs=programs, **more,
-    )  # fmt: skip
+    limits = WheelLimits(friction, torque or rover.wheel.max_torque, rover.wheel.radius)
+    workspace = more.pop("workspace", None) or TractionWorkspace()
+    return solve_traction(workspace, rows, limits, max_programs=programs, **more)
 
 
 def test_equal_torques_are_those_of_the_sweep():
@@ -46,9 +55,9 @@ def test_equal_torques_are_those_of_the_sweep():
         rows = writer.write(state_of(prediction, i), 0.0)
         x = rows.force_unit * rows.complete(np.zeros(6))
         for values, name in (
-            (x[6:12], "wheel_loads"),
-            (x[:6], "tangential"),
-            (x[12] + x[13] * rows.along, "lateral"),
+            (x[LOADS], "wheel_loads"),
+            (x[TRACTIONS], "tangential"),
+            (x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along, "lateral"),
         ):
             assert values == pytest.approx(getattr(prediction, name)[i], abs=1e-9 * LSR1.weight)
 
@@ -57,10 +66,7 @@ def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_opti
     workspace, writer, short = TractionWorkspace(), BalanceWriter(LSR1), []
     for prediction, i in rough_states(LSR1, 1000):
         rows = writer.write(state_of(prediction, i), 0.0)
-        answer = solve_traction(
-            workspace, rows, FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius,
-            max_programs=12,
-        )  # fmt: skip
+        answer = solve_traction(workspace, rows, LIMITS, max_programs=12)
         assert not answer.fallback and answer.load_slack == answer.torque_slack == 0.0
         A, b, along = balance_matrix(LSR1, prediction, i)
         forces = np.concatenate([answer.loads, answer.tractions])
@@ -72,19 +78,19 @@ def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_opti
     assert short == []
 
 
-def test_rows_of_the_programme_hold_to_a_ten_thousandth_of_the_weight():
+def test_rows_of_the_program_hold_to_a_ten_thousandth_of_the_weight():
     workspace, writer = TractionWorkspace(), BalanceWriter(LSR1)
     for prediction, i in rough_states(LSR1, 100):
         rows = writer.write(state_of(prediction, i), 0.0)
         x = rows.complete(np.zeros(6))
-        qp = build_traction_qp(rows, FRICTION, 12.0, Reference(x, measure_peak(rows, FRICTION, x)))
+        qp = build_traction_qp(rows, LIMITS, Reference(x, measure_peak(rows, LIMITS, x)))
         y, _, status, solved = workspace.solve(qp)
         assert solved, status
-        unit = qp.scale[0] / 6.0
+        unit = qp.scale[TRACTION] / 6.0
         values = qp.A @ y
         outside = np.maximum(values - qp.upper, qp.lower - values)
-        assert outside[:9].max() * unit < 1e-4
-        assert outside[CONES:LIMIT].max() * unit < 1e-4
+        assert outside[:EQUATIONS].max() * unit < 1e-4
+        assert outside[CONES].max() * unit < 1e-4
 
 
 def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
@@ -92,22 +98,23 @@ def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
     rows = BalanceWriter(LSR1).write(state_of(prediction, i), 5.0)
     x = rows.complete(np.array([0.1, -0.05, 0.0, 0.05, 0.1, 0.2]))
     reference = Reference(x, 0.4)
-    qp = build_traction_qp(rows, FRICTION, 12.0, reference)
+    qp = build_traction_qp(rows, LIMITS, reference)
 
     def rounded(x, peak):
-        across = np.hypot(x[:6], x[12] + x[13] * rows.along)
-        return across - peak * FRICTION * x[6:12]
+        across = np.hypot(x[TRACTIONS], x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along)
+        return across - peak * FRICTION * x[LOADS]
 
     def polygon(x, peak):
-        y = np.zeros(18)
-        y[:14], y[14] = (x - qp.shift[:14]) / qp.scale[:14], peak / qp.scale[14]
-        rows_ = (qp.A @ y - qp.upper)[CONES:LIMIT].reshape(6, -1)
-        return qp.scale[0] * rows_.max(axis=1)
+        y = np.zeros(VARIABLES)
+        y[:FORCES] = (x - qp.shift[:FORCES]) / qp.scale[:FORCES]
+        y[PEAK] = peak / qp.scale[PEAK]
+        sides = (qp.A @ y - qp.upper)[CONES].reshape(6, -1)
+        return qp.scale[TRACTION] * sides.max(axis=1)
 
     assert polygon(x, 0.4) == pytest.approx(rounded(x, 0.4), abs=1e-12)
     step, rng = 1e-6, np.random.default_rng(1)
     for _ in range(20):
-        dx, du = rng.standard_normal(14), rng.standard_normal()
+        dx, du = rng.standard_normal(FORCES), rng.standard_normal()
         slopes = [
             (f(x + step * dx, 0.4 + step * du) - f(x - step * dx, 0.4 - step * du)) / (2 * step)
             for f in (polygon, rounded)
@@ -123,11 +130,12 @@ def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
         ((0.0, -0.2, 0.2), (0.0, 0.0, 0.0)),
     ],
 )
-def test_the_rows_of_the_programme_have_the_slopes_of_figure_4(torques, changes):
+def test_the_rows_of_the_program_have_the_slopes_of_figure_4(torques, changes):
     rows = BalanceWriter(LSR1).write(level(), 0.0)
     reference = Reference(rows.complete(np.zeros(6)), 0.1)
-    qp = build_traction_qp(rows, FRICTION, 12.0, reference)
-    determined, pulls = qp.A[:9, 6:14], qp.A[:9, :6]
+    qp = build_traction_qp(rows, LIMITS, reference)
+    balance = qp.A[:EQUATIONS]
+    determined, pulls = balance[:, TRACTIONS.stop : FORCES], balance[:, TRACTIONS]
     tractions = np.tile(torques, 2) / LSR1.wheel.radius
     loads = np.linalg.lstsq(determined, -pulls @ tractions, rcond=None)[0][:6]
     assert loads == pytest.approx(np.tile(changes, 2), abs=5e-4)
@@ -143,6 +151,33 @@ def test_tractions_add_up_to_the_wanted_push():
     answer = solve(LSR1, level(), net=12.0)
     assert answer.tractions.sum() == pytest.approx(12.0, abs=1e-6)
     assert answer.loads.sum() == pytest.approx(LSR1.weight, rel=1e-9)
+
+
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+@pytest.mark.parametrize("push", [0.1, -0.2])
+def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
+    # Body frame on level ground: what the wheels give has no moment about the centre of mass.
+    rows = BalanceWriter(rover).write(level(), push * rover.weight)
+    x = rows.force_unit * rows.complete(np.linspace(-0.1, 0.1, 6))
+    lateral = x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along
+    forces = np.column_stack([x[TRACTIONS], lateral, x[LOADS]])
+    places, com = wheel_contacts_and_com(rover)
+    assert np.sum(forces, axis=0) == pytest.approx(rover.weight * np.array([push, 0.0, 1.0]))
+    moments = np.cross(places - com, forces).sum(axis=0)
+    assert moments == pytest.approx(np.zeros(3), abs=1e-9 * rover.weight)
+
+
+def wheel_contacts_and_com(rover):
+    """Return the lowest points (6, 3) of the wheels and the centre of mass (3,), flat ground."""
+    suspension, masses, mass = rover.suspension, rover.masses, rover.wheel.mass
+    left = np.array([suspension.wheels[name] for name in ("rear", "middle", "front")])
+    centres = np.vstack([left * [1.0, -1.0, 1.0], left])
+    body, com = body_mass_and_com(rover)
+    first = body * np.asarray(com) + mass * centres.sum(axis=0)
+    for part in (masses.rocker, masses.bogie):  # one on each side
+        first = first + 2.0 * part.mass * np.array([part.com[0], 0.0, part.com[2]])
+    total = body + 6.0 * mass + 2.0 * (masses.rocker.mass + masses.bogie.mass)
+    return centres - [0.0, 0.0, rover.wheel.radius], first / total
 
 
 def test_any_rover_is_balanced():
@@ -176,13 +211,13 @@ def test_a_wheel_that_has_to_lift_is_told_with_its_missing_load():
     assert np.isinf(answer.utilisation.max()) and np.isinf(answer.friction_slack)
 
 
-def test_the_peak_never_rises_from_one_programme_to_the_next():
+def test_the_peak_never_rises_from_one_program_to_the_next():
     writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
     for prediction, i in rough_states(LSR1, 50):
         rows = writer.write(state_of(prediction, i), 0.0)
-        last, peak = None, measure_peak(rows, FRICTION, rows.complete(np.zeros(6)))
+        last, peak = None, measure_peak(rows, LIMITS, rows.complete(np.zeros(6)))
         for _ in range(6):
-            answer = solve_traction(workspace, rows, FRICTION, 2.0, 0.1, last=last, max_programs=1)
+            answer = solve_traction(workspace, rows, LIMITS, last=last, max_programs=1)
             assert not answer.fallback
             assert answer.utilisation.max() <= peak * (1.0 + 1e-3)
             last, peak = answer.tractions, answer.utilisation.max()
@@ -193,28 +228,28 @@ def test_the_best_place_on_the_line_is_no_worse_than_any_other_and_keeps_the_bal
     for prediction, i in rough_states(LSR1, 30):
         rows = BalanceWriter(LSR1).write(state_of(prediction, i), 0.0)
         start, aim = (rows.complete(0.1 * rng.standard_normal(6)) for _ in range(2))
-        x, peak, _ = find_best_between(rows, FRICTION, 12.0, weights, start, aim)
-        assert rows.A @ x == pytest.approx(rows.b, abs=1e-12)
-        assert peak == measure_peak(rows, FRICTION, x)
+        found, _ = find_best_between(rows, LIMITS, weights, Reference(start, np.nan), aim)
+        assert rows.A @ found.x == pytest.approx(rows.b, abs=1e-12)
+        assert found.peak == measure_peak(rows, LIMITS, found.x)
         places = [start + t * (aim - start) for t in np.linspace(0.0, 1.5, 301)]
-        lifted = [min(place[6:12].min(), 0.0) for place in places]
+        lifted = [min(place[LOADS].min(), 0.0) for place in places]
         least = min(
-            measure_peak(rows, FRICTION, place)
+            measure_peak(rows, LIMITS, place)
             for place, lift in zip(places, lifted, strict=True)
             if lift == 0.0
         )
-        assert peak <= 1.01 * least
+        assert found.peak <= 1.01 * least
 
 
 def test_limits_of_torque_turn_to_wheels_with_torque_left():
     prediction, i = next(rough_states(LSR1, 1))
     free = solve(LSR1, state_of(prediction, i), net=10.0)
-    most = 0.9 * np.abs(free.torques).max()
-    held = solve(LSR1, state_of(prediction, i), net=10.0, torque=most)
-    assert np.abs(held.torques).max() <= most and held.torque_slack < 1e-3 * most
+    limit = 0.9 * np.abs(free.torques).max()
+    held = solve(LSR1, state_of(prediction, i), net=10.0, torque=limit)
+    assert np.abs(held.torques).max() <= limit and held.torque_slack < 1e-3 * limit
 
 
-def test_an_unsolved_programme_falls_back_to_equal_torques_and_says_so():
+def test_an_unsolved_program_falls_back_to_equal_torques_and_says_so():
     prediction, i = next(rough_states(LSR1, 1))
     answer = solve(LSR1, state_of(prediction, i), workspace=TractionWorkspace(max_iterations=1))
     assert answer.fallback and answer.programs == 0 and answer.status != "solved"

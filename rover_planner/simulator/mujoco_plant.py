@@ -1,20 +1,20 @@
-"""The same interface on MuJoCo: rigid bodies with inertia, wheels that slip."""
+"""A rover in MuJoCo as a plant: rigid bodies with inertia, wheels that slip."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.simulator.mujoco_rover import RoverPlant
+from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.plant import PlantState
 
 Floats = NDArray[np.float64]
-TIPPED = 1.2
-"""Tilt from which a rover lies [rad]."""
+MAX_TILT = 1.2
+"""Tilt from which a rover counts as tipped over [rad]."""
 
 
 class MujocoPlant:
-    """A `RoverPlant` that is driven by speeds, or by torques; it steers by its wheels' speeds."""
+    """A `MujocoRover` driven by speeds or by torques; it steers by the speeds of its wheels."""
 
     def __init__(
         self,
@@ -23,12 +23,12 @@ class MujocoPlant:
         pose: tuple[float, float, float],
         friction: float | None = None,
     ):
-        """Let a rover down on the ground.
+        """Drop a rover onto the ground.
 
         Raises:
             PlanningError: Unknown cells, or a pose beyond the terrain.
         """
-        self._plant = RoverPlant(rover, terrain, pose, friction)
+        self._plant = MujocoRover(rover, terrain, pose, friction)
         self._rover = rover
         sides = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
         self._arms = sides * abs(rover.suspension.wheels["middle"][1])
@@ -47,7 +47,7 @@ class MujocoPlant:
         self._measure(duration)
 
     def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
-        """Let torques (6,) [N m] act for a time [s]; steering is in the torques."""
+        """Apply torques (6,) [N m] for a time [s]; they steer too, `yaw_rate` is not used."""
         self._torques = np.asarray(torques, dtype=float)
         self._plant.step(self._torques, duration)
         self._measure(duration)
@@ -76,5 +76,5 @@ class MujocoPlant:
             joint_positions=plant.joint_positions,
             joint_velocities=plant.joint_velocities,
             wheel_torques=self._torques,
-            stopped="the rover has tipped over" if plant.tilt > TIPPED else "",
+            stopped="the rover has tipped over" if plant.tilt > MAX_TILT else "",
         )

@@ -7,8 +7,6 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.traction.input_monitor import InputMonitor
-from rover_planner.traction.loops import PIController, StallDetector, limit_rate, rolling_rates
 from rover_planner.traction.traction_service import TractionService, settings_from_parameters
 from support.rough_grounds import plane
 
@@ -193,40 +191,6 @@ def test_new_settings_are_taken_over_at_once():
     assert np.abs(rig.run().torques).max() <= 0.01
 
 
-def test_a_watch_tells_what_is_missing_then_wrong_then_stale():
-    watch = InputMonitor(("a", "b"), 0.1)
-    assert watch.find_fault(0.0) == "waiting for a, b"
-    watch.take("a", 0.0)
-    watch.refuse("b", "b is nan")
-    assert watch.find_fault(0.0) == "b is nan"
-    watch.take("b", 0.05)
-    assert watch.find_fault(0.1) == ""
-    assert watch.find_fault(0.12) == "a stale: none for 100 ms"
-
-
-def test_a_push_that_cannot_be_given_does_not_add_up():
-    free, held = PIController(1.0, 10.0, 5.0), PIController(1.0, 10.0, 5.0)
-    for k in range(100):
-        free.update(0.1, 0.02, False)
-        held.update(0.1, 0.02, k > 10)
-    assert free.update(0.0, 0.0, False) > 2.0 * held.update(0.0, 0.0, False)
-    assert held.update(-0.1, 0.02, True) < held.update(0.0, 0.0, True) + 0.1
-
-
-def test_all_changes_are_limited_alike():
-    limited = limit_rate(np.array([2.0, 1.0, 0.0, 0.0, 0.0, -1.0]), np.zeros(6), 0.5)
-    assert limited == pytest.approx([0.5, 0.25, 0.0, 0.0, 0.0, -0.25])
-
-
-def test_rolling_goes_with_the_wheels_but_not_with_those_that_spin():
-    ratios = np.array([1.0, 1.2, 0.8, 1.0, 1.0, 1.0])
-    rates = 0.3 * ratios
-    assert rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
-    rates[[2, 5]] = 9.0
-    assert rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
-    assert rolling_rates(np.full(6, 9.0), ratios, 0.3) == pytest.approx(0.39 * ratios)
-
-
 def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():
     rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
     rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.0)
@@ -234,13 +198,3 @@ def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():
     standing = [0, 1, 3, 4]
     before, after = rig.run(10).torques, rig.run(200).torques
     assert after[standing].min() > 2.0 * before[standing].max() > 0.0
-
-
-def test_servos_take_over_only_where_the_rover_does_not_get_on():
-    watch = StallDetector()
-    assert watch.update(0.3, 0.3, 5.0) == 0.0
-    assert watch.update(0.0, 0.3, 0.4) == 0.0
-    for _ in range(20):
-        share = watch.update(0.0, 0.3, 0.1)
-    assert share == 1.0
-    assert watch.update(0.3, 0.3, 0.3) < 1.0

@@ -1,0 +1,44 @@
+"""Loops: limited outputs do not add up, changes keep their shares, slip does not hide rolling."""
+
+import numpy as np
+import pytest
+
+from rover_planner.traction.loops import (
+    PIController,
+    StallDetector,
+    estimate_rolling_rates,
+    limit_rate,
+)
+
+
+def test_a_push_that_cannot_be_given_does_not_add_up():
+    free, held = PIController(1.0, 10.0, 5.0), PIController(1.0, 10.0, 5.0)
+    for k in range(100):
+        free.update(0.1, 0.02, False)
+        held.update(0.1, 0.02, k > 10)
+    assert free.update(0.0, 0.0, False) > 2.0 * held.update(0.0, 0.0, False)
+    assert held.update(-0.1, 0.02, True) < held.update(0.0, 0.0, True) + 0.1
+
+
+def test_all_changes_are_limited_alike():
+    limited = limit_rate(np.array([2.0, 1.0, 0.0, 0.0, 0.0, -1.0]), np.zeros(6), 0.5)
+    assert limited == pytest.approx([0.5, 0.25, 0.0, 0.0, 0.0, -0.25])
+
+
+def test_rolling_goes_with_the_wheels_but_not_with_those_that_spin():
+    ratios = np.array([1.0, 1.2, 0.8, 1.0, 1.0, 1.0])
+    rates = 0.3 * ratios
+    assert estimate_rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
+    rates[[2, 5]] = 9.0
+    assert estimate_rolling_rates(rates, ratios, 0.3) == pytest.approx(0.3 * ratios)
+    assert estimate_rolling_rates(np.full(6, 9.0), ratios, 0.3) == pytest.approx(0.39 * ratios)
+
+
+def test_servos_take_over_only_where_the_rover_does_not_get_on():
+    detector = StallDetector()
+    assert detector.update(0.3, 0.3, 5.0) == 0.0
+    assert detector.update(0.0, 0.3, 0.4) == 0.0
+    for _ in range(20):
+        share = detector.update(0.0, 0.3, 0.1)
+    assert share == 1.0
+    assert detector.update(0.3, 0.3, 0.3) < 1.0
