@@ -21,6 +21,7 @@ from support.browser import (
     wait_until,
 )
 from support.grounds import make_terrain, waves
+from support.viewer_sessions import ramp
 
 pytestmark = needs_browser
 
@@ -266,6 +267,26 @@ def test_a_soil_changes_the_verdict_on_slip(visitor, page):
     wait_until(lambda: page.session.shown.verdict.max_sinkage > 0.0, "wheels that sink")
     visitor.choose("Soil", "none (Coulomb)")
     wait_until(lambda: page.session.options.soil is None, "hard ground")
+
+
+def test_a_slider_that_makes_the_shown_path_impassable_is_answered_and_the_page_goes_on(browser):
+    session = ViewSession(LSR1, make_terrain(ramp), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    steep = Page(session, port=0)
+    try:
+        visitor = Visitor(browser, steep.url)
+        visitor.wait_for("paused")
+        assert visitor.text("#verdict").startswith("traversable")
+        visitor.open_tab("Rover")
+        visitor.drag_slider("friction [-]", 0.0)
+        visitor.wait_for("not traversable")
+        friction = visitor.slider_value("friction [-]")
+        wait_until(lambda: session.rover.friction == friction, "the last value")
+        wait_until(lambda: "slips" in visitor.text("#verdict"), "the reason")
+        visitor.set_slider("friction [-]", "0.9")
+        wait_until(lambda: visitor.text("#verdict").startswith("traversable"), "the new verdict")
+        assert visitor.faults == []
+    finally:
+        steep.close()
 
 
 def test_the_browser_meets_no_fault_in_all_of_this(visitor):

@@ -251,14 +251,16 @@ def test_the_history_of_a_live_rover_keeps_what_is_known_every_centimetre():
 
 def test_ghosts_stand_at_refused_waypoints_apart_from_each_other():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    ghosts = choose_ghosts(LSR1, list(session.answer.candidates))
+    candidates = session.candidates
+    ghosts = choose_ghosts(LSR1, candidates, shown=1)
     assert 0 < len(ghosts) <= MAX_GHOSTS
-    places = np.array([candidate.poses[row, :2] for candidate, row in ghosts])
-    assert all(candidate.verdict.reasons[row] for candidate, row in ghosts)
+    assert ghosts[0] == (1, candidates[1].verdict.first_failure)
+    places = np.array([candidates[index].poses[row, :2] for index, row in ghosts])
+    assert all(candidates[index].verdict.reasons[row] for index, row in ghosts)
     away = np.linalg.norm(places[:, None] - places[None], axis=2)
     assert (away[~np.eye(len(places), dtype=bool)] > 0.8).all()
 
 
 def test_a_passable_path_has_no_ghosts():
     session = session_on(lambda x, y: 0.0 * x)
-    assert choose_ghosts(LSR1, list(session.answer.candidates)) == []
+    assert choose_ghosts(LSR1, session.candidates, shown=0) == []

@@ -20,12 +20,16 @@ BOARD_FRAME = 0.2
 """Time between two pictures of board and plots [s]."""
 GROUND_FRAME = 2.0
 """Shortest time between two pictures of the ground [s]."""
+RETRY = 2.0
+"""Time from an error to the next picture, of what was heard since [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is shown [rad]."""
 
 
 class LivePage(PageBase):
     """Shows what a listener hears; a click on the ground asks the server for a plan."""
+
+    retry_after = RETRY
 
     def __init__(
         self,
@@ -48,7 +52,8 @@ class LivePage(PageBase):
         self._listener = listener
         self._history = History()
         self._refusal = ""
-        self._told: tuple[Any, ...] = ()
+        self._told: Heard | None = None
+        self._told_refusal = ""
         self._heard_ground: Terrain | None = None
         self._board_at = self._ground_at = 0.0
         self._looked = False
@@ -85,8 +90,10 @@ class LivePage(PageBase):
         self._refusal = reason
 
     def _draw_ground(self) -> None:
-        if not self._has_ground:
-            return
+        if self._has_ground:
+            self.errors.run("the ground is not drawn", self._build_ground)
+
+    def _build_ground(self) -> None:
         tab, session = self.ground_tab, self.session
         heading = float(np.radians(tab.heading))
         ground = draw_ground(session.rover, session.terrain, tab.layer, heading)
@@ -126,20 +133,30 @@ class LivePage(PageBase):
             return
         assert heard.terrain is not None
         self._heard_ground = self.session.terrain = heard.terrain
-        self._ground_at, self._has_ground, self._told = now, True, ()
+        self._ground_at, self._has_ground, self._told = now, True, None
         self._draw_ground()
 
     def _tell(self, heard: Heard) -> None:
         """Show plan and verdict where they are others than before."""
-        told = (id(heard.plan), heard.verdict, self._refusal)
-        if told == self._told:
+        told = self._told
+        if (
+            told is not None
+            and told.plan is heard.plan
+            and told.verdict == heard.verdict
+            and self._told_refusal == self._refusal
+        ):
             return
-        self._told = told
-        self.scene.paths.show_plan(self.session.rover, self.session.terrain, heard.plan)
+        # What was shown is kept, so that no other plan can come to lie at the same address.
+        self._told, self._told_refusal = heard, self._refusal
         verdict = heard.verdict
         passable = None if verdict is None else verdict.traversable
         reason = "click the ground to ask for a plan" if verdict is None else verdict.reason
         self.drive_tab.show_verdict(describe_verdict(passable, reason, self._refusal, ""))
+        session = self.session
+        self.errors.run(
+            "the plan is not drawn",
+            lambda: self.scene.paths.show_plan(session.rover, session.terrain, heard.plan),
+        )
 
     def _turn_arm(self, heard: Heard) -> None:
         arm = self.session.rover.manipulator

@@ -19,6 +19,7 @@ from rover_planner.viewer.state.session import REFUSALS, ViewSession
 
 REST = 0.5
 """Time after the last change of the rover when all candidates are judged anew [s]."""
+NO_ROVER = "the rover is not drawn"
 
 
 class Page(PageBase):
@@ -85,17 +86,17 @@ class Page(PageBase):
     def tell_refusal(self, reason: str) -> None:
         """Say why something was refused."""
         self.session.refusal = reason
-        self._take_judgement()
+        self._show_verdict()
 
     def _change_value(self, value: RoverValue, number: float) -> None:
         if self.session.change_rover(value.keys, number):
-            self.scene.draw_rover(self.session.rover, self.session.arm_angles)
+            self._draw_rover()
         self._changed_at = time.monotonic()
         self._take_judgement()
 
     def _turn_arm(self, joint: str, angle: float) -> None:
         if self.session.change_arm(joint, angle):
-            self.scene.turn_arm(self.session.arm_angles)
+            self.errors.run(NO_ROVER, lambda: self.scene.turn_arm(self.session.arm_angles))
         self._changed_at = time.monotonic()
         self._take_judgement()
 
@@ -117,19 +118,25 @@ class Page(PageBase):
         if taken:
             self._take_rover()
         else:
-            self._take_judgement()
+            self._show_verdict()
 
     # What the session holds, onto the page.
 
     def _take_rover(self) -> None:
         """Show another rover, and what it makes of ground and path."""
-        session = self.session
         self._draw_ground()
-        self.scene.draw_rover(session.rover, session.arm_angles)
-        self.rover_tab.take(session.rover)
+        self._draw_rover()
+        self.rover_tab.take(self.session.rover)
         self._take_answer()
 
+    def _draw_rover(self) -> None:
+        session = self.session
+        self.errors.run(NO_ROVER, lambda: self.scene.draw_rover(session.rover, session.arm_angles))
+
     def _draw_ground(self) -> None:
+        self.errors.run("the ground is not drawn", self._build_ground)
+
+    def _build_ground(self) -> None:
         session, tab = self.session, self.ground_tab
         heading = float(np.radians(tab.heading))
         ground = draw_ground(
@@ -150,7 +157,14 @@ class Page(PageBase):
 
     def _take_judgement(self) -> None:
         """Show how the path that is shown is judged now."""
-        self.rover_tab.show_verdict(self._drive.take_judgement())
+        self._show_verdict()
+        self._drive.restart()
+        self.errors.run("the plots are not drawn", self._drive.draw_plots)
+        self.errors.run("the paths are not drawn", self._drive.draw_paths)
+
+    def _show_verdict(self) -> None:
+        """Show the verdict as text, and draw nothing."""
+        self.rover_tab.show_verdict(self._drive.show_verdict())
 
     def _judge_all_again(self) -> None:
         """After the rover has changed: judge the other candidates, and colour the ground."""
@@ -166,5 +180,5 @@ class Page(PageBase):
         changed = self._changed_at
         if changed is not None and time.monotonic() - changed > REST:
             self._changed_at = None
-            self._judge_all_again()
+            self.wishes.ask(self._judge_all_again, "all candidates")
         self._drive.advance(seconds)

@@ -1,8 +1,8 @@
 """What every page has: a viser server, its panels, and the one thread that changes them."""
 
+import math
 import threading
 import time
-import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rover_planner.viewer.panel.charts import Charts
+from rover_planner.viewer.panel.error_notice import ErrorNotice
 from rover_planner.viewer.scene.ground_mesh import hit_ground
 from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.state.session import REFUSALS, ViewSession
@@ -22,7 +23,13 @@ PANEL_WIDTH, PLOTS_WIDTH = 380, 300
 
 
 class PageBase(ABC):
-    """A served page. Callbacks of the browser only leave wishes for the page's own thread."""
+    """A served page. Callbacks of the browser only leave wishes for the page's own thread.
+
+    No error ends that thread. One in a request is shown, and the next request is taken. One in
+    `advance` stops the pictures until the next request, or for `retry_after` [s].
+    """
+
+    retry_after = math.inf
 
     def __init__(self, session: ViewSession, host: str, port: int):
         """Start to serve; `port` 0 takes a free one. `run` starts the thread."""
@@ -31,6 +38,8 @@ class PageBase(ABC):
         self.session = session
         self.wishes = VisitorRequests()
         self._ended = threading.Event()
+        self._stopped_at: float | None = None
+        """When the pictures stopped because of an error [s]; None while they go on."""
         self.server = viser.ViserServer(host, port, label="rover_planner", verbose=False)
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.scene = Scene(self.server)
@@ -80,6 +89,7 @@ class PageBase(ABC):
         gui = self.server.gui
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
+        self.errors = ErrorNotice(gui)
         self.fill_panel(gui.add_tab_group())
         plots = gui.add_panel()
         with plots.add_tab("Plots over distance [m]"):
@@ -102,17 +112,24 @@ class PageBase(ABC):
         while not self._ended.is_set():
             self.wishes.wait(due - time.monotonic())
             for act in self.wishes.take():
-                self._try(act)
+                self._fulfil(act)
             now = time.monotonic()
             passed, last, due = now - last, now, now + FRAME
-            self._try(lambda passed=passed: self.advance(passed))  # type: ignore[misc]
+            if self._stopped_at is None or now - self._stopped_at > self.retry_after:
+                self._draw_picture(passed)
+
+    def _fulfil(self, act: Callable[[], None]) -> None:
+        """Do what a visitor asks for; the pictures go on if an error had stopped them."""
+        self.errors.run("the last request failed", lambda: self._try(act))
+        self._stopped_at = None
 
     def _try(self, act: Callable[[], None]) -> None:
-        """Do something; whatever is wrong with it is told, and the page lives on."""
         try:
             act()
         except REFUSALS as error:
             self.tell_refusal(str(error))
-        except Exception as error:
-            traceback.print_exc()
-            self.tell_refusal(f"a fault of this program: {type(error).__name__}: {error}")
+
+    def _draw_picture(self, passed: float) -> None:
+        """Move on by a time [s]; stop after an error, for the same would fail again."""
+        drawn = self.errors.run("drawing stopped", lambda: self.advance(passed))
+        self._stopped_at = None if drawn else time.monotonic()

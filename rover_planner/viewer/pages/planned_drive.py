@@ -30,31 +30,43 @@ class PlannedDrive:
         self._scene, self._tab, self._charts = scene, tab, charts
         self._board_at = 0.0
 
-    def take_judgement(self) -> str:
+    def show_verdict(self) -> str:
         """Show how the path is judged now; return that as HTML."""
         session, shown = self._session, self._session.shown
-        journey = shown.journey
-        self._tab.take(journey)
-        if journey.length:
-            values = {name: journey.series(name) for name in CHARTS}
-            self._charts.take(session.rover, journey.series("distance"), values)
-        else:
-            self._charts.take(session.rover, np.empty(0), {})
-        self._scene.paths.show(session.rover, session.terrain, session.answer, shown.candidate)
         verdict = shown.verdict
         text = describe_verdict(verdict.traversable, verdict.reason, session.refusal, shown.judged)
         self._tab.show_verdict(text)
         return text
 
+    def restart(self) -> None:
+        """Play the journey of the path that is shown now."""
+        self._tab.take(self._session.shown.journey)
+
+    def draw_plots(self) -> None:
+        """Plot the path that is shown."""
+        rover, journey = self._session.rover, self._session.shown.journey
+        if journey.length:
+            values = {name: journey.series(name) for name in CHARTS}
+            self._charts.take(rover, journey.series("distance"), values)
+        else:
+            self._charts.take(rover, np.empty(0), {})
+
+    def draw_paths(self) -> None:
+        """Draw the candidate paths over the ground."""
+        session = self._session
+        self._scene.paths.show(
+            session.rover, session.terrain, session.candidates, session.shown.index
+        )
+
     def advance(self, seconds: float) -> None:
         """Move on by the time that passed for the visitor [s]."""
         self._tab.settle_scrubber()
-        moved = self._playback.advance(seconds) or self._tab.moved
-        if not moved:
+        self._tab.moved = self._playback.advance(seconds) or self._tab.moved
+        if not self._tab.moved:
             return
-        self._tab.moved = False
         frame = self._session.shown.journey.frame(self._playback.time)
         self._scene.show(frame)
+        self._tab.moved = False
         now = time.monotonic()
         if now - self._board_at < BOARD_FRAME and self._playback.rate != 0.0:
             return

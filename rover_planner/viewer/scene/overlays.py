@@ -1,6 +1,7 @@
 """What is drawn over the ground: candidate paths, where they are refused, start and goal."""
 
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.path_query import Candidate, PathAnswer
+from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.colours import PASSABLE, REFUSED, UNKNOWN, Colour, mix
 from rover_planner.viewer.scene.quaternions import of_attitude
 from rover_planner.viewer.scene.rover_figure import outline_mesh
@@ -31,21 +32,29 @@ class PathOverlay:
         self._scene = scene
         self._nodes: list[Any] = []
 
-    def show(self, rover: Rover, terrain: Terrain, answer: PathAnswer, shown: Candidate) -> None:
-        """Draw an answer anew; `shown` is the path that is played, and drawn thicker."""
+    def show(
+        self, rover: Rover, terrain: Terrain, candidates: Sequence[Candidate], shown: int
+    ) -> None:
+        """Draw candidates; the one of index `shown` is played, and drawn thicker than the others.
+
+        A ghost on the shown path tells the whole reason, one on another path its number and code.
+        """
         self.clear()
         lift = 0.15 * rover.wheel.radius
-        others = [one for one in answer.candidates if one.poses is not shown.poses]
-        for k, candidate in enumerate([*others, shown]):
-            self._draw_candidate(f"/paths/{k}", terrain, candidate, lift, candidate is shown)
-        for k, (candidate, row) in enumerate(choose_ghosts(rover, [shown, *others])):
-            verdict = candidate.verdict
-            same = (one.poses is candidate.poses for one in answer.candidates)
-            text = f"path {list(same).index(True) + 1}: {verdict.codes[row].replace('_', ' ')}"
-            if candidate is shown:
+        order = [*(k for k in range(len(candidates)) if k != shown), shown]
+        for index in order:
+            self._draw_candidate(
+                f"/paths/{index}", terrain, candidates[index], lift, index == shown
+            )
+        for k, (index, row) in enumerate(choose_ghosts(rover, candidates, shown)):
+            verdict = candidates[index].verdict
+            if index == shown:
                 text = "\n".join(textwrap.wrap(verdict.reasons[row], LABEL_WIDTH))
-            self._draw_ghost(f"/ghosts/{k}", rover, terrain, candidate, row, text)
-        for name, pose in (("start", shown.poses[0]), ("goal", shown.poses[-1])):
+            else:
+                text = f"path {index + 1}: {verdict.codes[row].replace('_', ' ')}"
+            self._draw_ghost(f"/ghosts/{k}", rover, terrain, candidates[index], row, text)
+        poses = candidates[shown].poses
+        for name, pose in (("start", poses[0]), ("goal", poses[-1])):
             self._draw_flag(name, terrain, pose, rover.wheel.radius)
 
     def show_plan(self, rover: Rover, terrain: Terrain, plan: Floats | None) -> None:
@@ -135,28 +144,29 @@ def _thin(count: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(0, count - 1, min(count, MAX_POINTS)).round().astype(np.intp))
 
 
-def choose_ghosts(rover: Rover, candidates: list[Candidate]) -> list[tuple[Candidate, int]]:
+def choose_ghosts(
+    rover: Rover, candidates: Sequence[Candidate], shown: int
+) -> list[tuple[int, int]]:
     """Choose waypoints to show as ghosts: at most MAX_GHOSTS, one and a half wheelbases apart.
 
-    Of each path the places come in order where a stretch of refused waypoints begins; the first
-    failures of all paths come before what lies further along them.
+    A ghost stands where a stretch of refused waypoints begins. The first failures of all paths
+    come before later ones, and those of the shown path before those of the others.
 
     Returns:
-        Paths and the index of a refused waypoint on each.
+        Indices of candidates, and of a refused waypoint on each.
     """
-    stretches = [_refused_stretches(candidate.verdict.reasons) for candidate in candidates]
-    first = [(one, rows[0]) for one, rows in zip(candidates, stretches, strict=True) if rows]
-    later = [
-        (one, row) for one, rows in zip(candidates, stretches, strict=True) for row in rows[1:]
-    ]
+    order = [shown, *(k for k in range(len(candidates)) if k != shown)]
+    stretches = {index: _refused_stretches(candidates[index].verdict.reasons) for index in order}
+    first = [(index, rows[0]) for index, rows in stretches.items() if rows]
+    later = [(index, row) for index, rows in stretches.items() for row in rows[1:]]
     wheels = rover.suspension.wheels
     apart = 1.5 * (wheels["front"][0] - wheels["rear"][0])
-    chosen: list[tuple[Candidate, int]] = []
-    for candidate, row in [*first, *later]:
-        here = candidate.poses[row, :2]
-        taken = [np.hypot(*(one.poses[other, :2] - here)) for one, other in chosen]
+    chosen: list[tuple[int, int]] = []
+    for index, row in [*first, *later]:
+        here = candidates[index].poses[row, :2]
+        taken = [np.hypot(*(candidates[k].poses[other, :2] - here)) for k, other in chosen]
         if len(chosen) < MAX_GHOSTS and all(away >= apart for away in taken):
-            chosen.append((candidate, row))
+            chosen.append((index, row))
     return chosen
 
 

@@ -34,8 +34,10 @@ Pose = tuple[float, float, float]
 class Shown:
     """The path that is shown, and how it was judged."""
 
+    index: int
+    """Which candidate of the last answer it is."""
     candidate: Candidate
-    """The path."""
+    """The path, as it was judged last."""
     journey: Journey
     """What is played of it."""
     judged: str
@@ -91,19 +93,33 @@ class ViewSession:
         words = f"{passable} of {total} candidate paths passable, judged in"
         if self.recorded:
             words = "recorded path judged again in"
-        self._show(self.answer.chosen, f"{words} {_milliseconds(began)}")
+        self._show(self.answer.nearest, self.answer.chosen, f"{words} {_milliseconds(began)}")
 
-    def _show(self, candidate: Candidate, judged: str) -> None:
+    def _show(self, index: int, candidate: Candidate, judged: str) -> None:
         journey = Journey(self.rover, candidate.prediction, candidate.verdict)
-        self.shown = Shown(candidate, journey, judged)
+        self.shown = Shown(index, candidate, journey, judged)
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The candidate paths of the last answer; the one that is shown as it was judged last."""
+        candidates = list(self.answer.candidates)
+        candidates[self.shown.index] = self.shown.candidate
+        return tuple(candidates)
 
     def sweep_options(self) -> SweepOptions:
         """Return what the model is asked with now."""
         return self.options.sweep_options(self.arm_angles)
 
     def show_candidate(self, index: int) -> None:
-        """Show another candidate of the last answer, by its index."""
-        self._show(self.answer.candidates[index], self.shown.judged)
+        """Show another candidate of the last answer, by its index.
+
+        Raises:
+            PlanningError: The last answer has no such candidate.
+        """
+        candidates = self.answer.candidates
+        if not 0 <= index < len(candidates):
+            raise PlanningError(f"no path {index + 1}; there are paths 1 to {len(candidates)}")
+        self._show(index, candidates[index], self.shown.judged)
 
     def plan_to(self, goal: NDArray[np.float64]) -> bool:
         """Plan to a place (2,) [m], arriving on the straight way; return whether it was taken."""
@@ -175,7 +191,7 @@ class ViewSession:
             return False
         self.rover, self.arm_angles, self.refusal = rover, arm_angles, ""
         words = f"path of {candidate.length:.1f} m judged again in {_milliseconds(began)}"
-        self._show(candidate, words)
+        self._show(self.shown.index, candidate, words)
         return True
 
     def replay(self, prediction: PathPrediction, reasons: Sequence[str]) -> None:
@@ -192,7 +208,7 @@ class ViewSession:
         self.answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
         self.start, self.goal = (_as_pose(prediction.poses[row]) for row in (0, -1))
         self.recorded = True
-        self._show(candidate, "recorded")
+        self._show(0, candidate, "recorded")
 
     def plan_again(self) -> bool:
         """Judge all candidates anew, after the rover was changed; return whether that worked."""

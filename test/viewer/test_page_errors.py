@@ -1,0 +1,137 @@
+"""The page when something on it fails: it says what and why, and goes on."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from support.ros_fixtures import wait_until
+from support.viewer_sessions import ramp, session_on
+
+pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
+
+import viser
+
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.scene.overlays import PathOverlay
+
+pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+
+
+@pytest.fixture
+def page():
+    """A page that nobody looks at."""
+    served = Page(session_on(ramp), port=0)
+    yield served
+    served.close()
+
+
+def do(page, work) -> None:
+    """Let the thread of the page do some work, and wait until it has done it."""
+    done = threading.Event()
+
+    def work_and_tell():
+        try:
+            work()
+        finally:
+            done.set()
+
+    page.wishes.ask(work_and_tell)
+    assert done.wait(20.0), "the thread of the page does nothing"
+
+
+def shown_errors(page) -> str:
+    """Return the notice that a visitor sees, empty if it is hidden."""
+    return page.errors._box.content if page.errors._box.visible else ""
+
+
+def fail(*_arguments) -> None:
+    raise ValueError("a line of <no> points")
+
+
+@pytest.fixture
+def scene():
+    server = viser.ViserServer(port=0, verbose=False)
+    yield server.scene
+    server.stop()
+
+
+def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(scene):
+    session = session_on(ramp)
+    assert session.shown.verdict.traversable
+    assert session.change_rover([("friction",)], 0.4)
+    assert not session.shown.verdict.traversable
+    overlay = PathOverlay(scene)
+    overlay.show(session.rover, session.terrain, session.candidates, session.shown.index)
+    names = {node.name for node in overlay._nodes}
+    assert {"/ghosts/0", f"/paths/{session.shown.index}-beyond"} <= names
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_path_that_is_judged_again_stays_the_one_candidate_that_it_is(index):
+    session = session_on(ramp)
+    session.show_candidate(index)
+    session.change_rover([("friction",)], 0.4)
+    assert len(session.candidates) == len(session.answer.candidates)
+    assert session.candidates[index] is session.shown.candidate
+    np.testing.assert_array_equal(
+        session.candidates[index].poses, session.answer.candidates[index].poses
+    )
+    traversable = [candidate.verdict.traversable for candidate in session.candidates]
+    assert traversable == [k != index for k in range(len(traversable))]
+
+
+def test_a_page_whose_shown_path_is_refused_shows_the_verdict_and_goes_on(page):
+    do(page, lambda: page.session.change_rover([("friction",)], 0.4))
+    do(page, page._take_judgement)
+    assert "not traversable" in page.drive_tab._verdict.content
+    assert shown_errors(page) == ""
+
+
+def test_a_request_that_fails_is_told_until_one_succeeds(page):
+    do(page, lambda: fail())
+    wait_until(lambda: shown_errors(page), "the notice")
+    assert "the last request failed" in shown_errors(page)
+    assert "ValueError: a line of &lt;no&gt; points" in shown_errors(page)
+    do(page, lambda: page.playback.jump(1.0))
+    wait_until(lambda: not shown_errors(page), "the notice to go")
+
+
+def test_paths_that_cannot_be_drawn_leave_the_verdict_right_and_the_rest_drawn(page, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(page.scene.paths, "show", fail)
+        do(page, lambda: page.session.change_rover([("friction",)], 0.4))
+        do(page, page._take_judgement)
+        assert "the paths are not drawn" in shown_errors(page)
+        assert "not traversable" in page.drive_tab._verdict.content
+        do(page, page.playback.play)
+        wait_until(lambda: page.playback.time > 0.0, "the rover to drive all the same")
+        assert "the paths are not drawn" in shown_errors(page)
+    do(page, page._take_judgement)
+    assert shown_errors(page) == ""
+
+
+def test_a_picture_that_fails_is_not_drawn_again_before_the_next_request(page, monkeypatch):
+    wait_until(lambda: not page.drive_tab.moved, "the first picture")
+    tried = []
+
+    def fail_and_count(_frame):
+        tried.append(True)
+        fail()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(page.scene, "show", fail_and_count)
+        do(page, page.playback.play)
+        wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
+        stopped_at = page.playback.time
+        # Time for a dozen pictures.
+        threading.Event().wait(0.5)
+        assert len(tried) == 1 and page.playback.time == stopped_at
+    do(page, page.playback.play)
+    wait_until(lambda: page.playback.time > stopped_at, "the rover to drive on")
+    wait_until(lambda: not shown_errors(page), "the notice to go")
+
+
+def test_a_path_that_is_not_there_any_more_is_refused_by_its_number(page):
+    do(page, lambda: page._choose_path(7))
+    assert "no path 8; there are paths 1 to" in page.drive_tab._verdict.content
