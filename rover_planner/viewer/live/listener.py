@@ -23,6 +23,7 @@ from msg_adapters.paths import path_to_poses, stamped_pose, yaw_from_quaternion
 from msg_adapters.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
+from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_physics.terrain.grid import Terrain
 from rover_planner.ros.qos import map_subscriptions_qos, result_qos, sensor_qos, topic_qos
 from rover_planner.viewer.live.live_frame import LiveState
@@ -166,8 +167,7 @@ class LiveListener(Node):
             yaw = yaw_from_quaternion(q)
         except MessageError:
             return
-        roll = math.atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x**2 + q.y**2))
-        pitch = math.asin(max(-1.0, min(1.0, 2 * (q.w * q.y - q.z * q.x))))
+        roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w))
         position = np.array([place.x, place.y, place.z])
         if not np.isfinite(position).all():
             return

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.colours import LOAD, PULL
-from rover_planner.viewer.scene.quaternions import matrix_of
 from rover_planner.viewer.state.journey import Frame
 
 LENGTH = 4.0
@@ -30,7 +30,7 @@ class ForceArrows:
 
     def show(self, frame: Frame) -> None:
         """Draw the forces of a frame; their length is in proportion, 0 where not known."""
-        R = matrix_of(*frame.attitude)
+        R = matrix_from_xyzw(xyzw_from_rpy(*frame.attitude))
         axis = R[:, 1]
         out = frame.wheel_centres - frame.contact_points
         normal = out - np.outer(out @ axis, axis)

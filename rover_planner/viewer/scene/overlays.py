@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.quaternions import wxyz_from_rpy
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.colours import PASSABLE, REFUSED, UNKNOWN, Colour, mix
-from rover_planner.viewer.scene.quaternions import of_attitude
 from rover_planner.viewer.scene.rover_figure import outline_mesh
 
 Floats = NDArray[np.float64]
@@ -113,11 +113,11 @@ class PathOverlay:
         x, y, yaw = prediction.poses[row]
         if prediction.settled[row]:
             place = prediction.position[row]
-            attitude = of_attitude(prediction.roll[row], prediction.pitch[row], yaw)
+            attitude = wxyz_from_rpy(prediction.roll[row], prediction.pitch[row], yaw)
         else:
             standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
             place = np.array([x, y, _height(terrain, x, y) + standing])
-            attitude = of_attitude(0.0, 0.0, yaw)
+            attitude = wxyz_from_rpy(0.0, 0.0, yaw)
         mesh = outline_mesh(rover)
         ghost = self._scene.add_mesh_simple(
             name, mesh.vertices, mesh.faces, color=REFUSED, opacity=0.3, cast_shadow=False,

@@ -9,10 +9,10 @@ import trimesh
 from numpy.typing import NDArray
 
 from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
 from rover_planner.viewer.scene.colours import BODY, DARK, METAL, of_use
-from rover_planner.viewer.scene.quaternions import about_y, of_attitude
 from rover_planner.viewer.state.journey import Frame
 
 Floats = NDArray[np.float64]
@@ -78,12 +78,12 @@ class RoverFigure:
     def show(self, frame: Frame) -> None:
         """Bring the figure to a frame."""
         self._root.position = frame.position
-        self._root.wxyz = of_attitude(*frame.attitude)
+        self._root.wxyz = wxyz_from_rpy(*frame.attitude)
         for k, side in enumerate(SIDES):
-            self._joints[f"rocker_{side}"].wxyz = about_y(float(frame.rocker_angle[k]))
-            self._joints[f"bogie_{side}"].wxyz = about_y(float(frame.bogie_angle[k]))
+            self._joints[f"rocker_{side}"].wxyz = wxyz_about_y(float(frame.rocker_angle[k]))
+            self._joints[f"bogie_{side}"].wxyz = wxyz_about_y(float(frame.bogie_angle[k]))
         for k, wheel in enumerate(WHEELS):
-            self._joints[wheel].wxyz = about_y(float(frame.spin[k]))
+            self._joints[wheel].wxyz = wxyz_about_y(float(frame.spin[k]))
             self._tyres[k].color = of_use(float(frame.friction_utilisation[k]))
 
     @property
