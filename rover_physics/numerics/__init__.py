@@ -1,1 +1,1 @@
-"""How numbers are computed: kernels, the records they read, threads, linear systems, quaternions."""
+"""How numbers are computed: kernels, their records, threads, linear systems, quaternions."""
