@@ -1,6 +1,7 @@
-"""The page when something on it fails: it says what and why, and goes on."""
+"""Errors on the page: it shows what failed and why, and goes on."""
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 import viser
 
+from rover_planner.viewer.live.listener import LiveListener
+from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.overlays import PathOverlay
 
@@ -20,28 +23,28 @@ pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExce
 
 @pytest.fixture
 def page():
-    """A page that nobody looks at."""
+    """A page without visitors."""
     served = Page(session_on(ramp), port=0)
     yield served
     served.close()
 
 
 def do(page, work) -> None:
-    """Let the thread of the page do some work, and wait until it has done it."""
+    """Let the page's thread do some work, and wait for its end."""
     done = threading.Event()
 
-    def work_and_tell():
+    def work_and_signal():
         try:
             work()
         finally:
             done.set()
 
-    page.wishes.ask(work_and_tell)
-    assert done.wait(20.0), "the thread of the page does nothing"
+    page.requests.add(work_and_signal)
+    assert done.wait(20.0), "the page's thread does nothing"
 
 
 def shown_errors(page) -> str:
-    """Return the notice that a visitor sees, empty if it is hidden."""
+    """Return the notice of errors as HTML, empty if it is hidden."""
     return page.errors._box.content if page.errors._box.visible else ""
 
 
@@ -68,7 +71,7 @@ def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(scene
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
-def test_a_path_that_is_judged_again_stays_the_one_candidate_that_it_is(index):
+def test_a_path_that_is_judged_again_replaces_its_own_candidate(index):
     session = session_on(ramp)
     session.show_candidate(index)
     session.change_rover([("friction",)], 0.4)
@@ -81,38 +84,38 @@ def test_a_path_that_is_judged_again_stays_the_one_candidate_that_it_is(index):
     assert traversable == [k != index for k in range(len(traversable))]
 
 
-def test_a_page_whose_shown_path_is_refused_shows_the_verdict_and_goes_on(page):
+def test_a_page_shows_that_its_path_is_refused_and_goes_on(page):
     do(page, lambda: page.session.change_rover([("friction",)], 0.4))
-    do(page, page._take_judgement)
+    do(page, page._show_path)
     assert "not traversable" in page.drive_tab._verdict.content
     assert shown_errors(page) == ""
 
 
-def test_a_request_that_fails_is_told_until_one_succeeds(page):
+def test_a_failed_request_is_shown_until_a_request_succeeds(page):
     do(page, lambda: fail())
     wait_until(lambda: shown_errors(page), "the notice")
     assert "the last request failed" in shown_errors(page)
     assert "ValueError: a line of &lt;no&gt; points" in shown_errors(page)
-    do(page, lambda: page.playback.jump(1.0))
+    do(page, lambda: page.playback.seek(1.0))
     wait_until(lambda: not shown_errors(page), "the notice to go")
 
 
-def test_paths_that_cannot_be_drawn_leave_the_verdict_right_and_the_rest_drawn(page, monkeypatch):
+def test_the_verdict_is_right_and_the_rover_drives_if_the_paths_cannot_be_drawn(page, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(page.scene.paths, "show", fail)
         do(page, lambda: page.session.change_rover([("friction",)], 0.4))
-        do(page, page._take_judgement)
+        do(page, page._show_path)
         assert "the paths are not drawn" in shown_errors(page)
         assert "not traversable" in page.drive_tab._verdict.content
         do(page, page.playback.play)
-        wait_until(lambda: page.playback.time > 0.0, "the rover to drive all the same")
+        wait_until(lambda: page.playback.time > 0.0, "the rover to drive")
         assert "the paths are not drawn" in shown_errors(page)
-    do(page, page._take_judgement)
+    do(page, page._show_path)
     assert shown_errors(page) == ""
 
 
-def test_a_picture_that_fails_is_not_drawn_again_before_the_next_request(page, monkeypatch):
-    wait_until(lambda: not page.drive_tab.moved, "the first picture")
+def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
+    wait_until(lambda: not page.drive_tab.outdated, "the first picture")
     tried = []
 
     def fail_and_count(_frame):
@@ -124,14 +127,26 @@ def test_a_picture_that_fails_is_not_drawn_again_before_the_next_request(page, m
         do(page, page.playback.play)
         wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
         stopped_at = page.playback.time
-        # Time for a dozen pictures.
-        threading.Event().wait(0.5)
+        time.sleep(0.5)  # a dozen pictures
         assert len(tried) == 1 and page.playback.time == stopped_at
     do(page, page.playback.play)
     wait_until(lambda: page.playback.time > stopped_at, "the rover to drive on")
     wait_until(lambda: not shown_errors(page), "the notice to go")
 
 
-def test_a_path_that_is_not_there_any_more_is_refused_by_its_number(page):
+def test_a_path_that_does_not_exist_is_refused_by_its_number(page):
     do(page, lambda: page._choose_path(7))
     assert "no path 8; there are paths 1 to" in page.drive_tab._verdict.content
+
+
+def test_a_live_page_tries_again_by_itself_after_an_error(ros, monkeypatch):
+    listener = ros.spin(LiveListener(context=ros.context))
+    page = LivePage(session_on(ramp), listener, port=0)
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(page.scene, "show", fail)
+            wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
+        wait_until(lambda: not shown_errors(page), "the notice to go")
+        assert "waiting for odometry" in page.drive_tab._dashboard.content
+    finally:
+        page.close()
