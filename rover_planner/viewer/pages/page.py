@@ -174,10 +174,13 @@ class Page(PageBase):
         """Show the verdict, or why a change was refused, as text."""
         self.rover_tab.show_verdict(self._display.show_verdict())
 
-    def advance(self, seconds: float) -> None:
-        """Play on; request that all candidates are judged REPLAN_DELAY after a change."""
+    def add_due_requests(self) -> None:
+        """Request that all candidates are judged, REPLAN_DELAY after a change of the rover."""
         changed = self._changed_at
         if changed is not None and time.monotonic() - changed > REPLAN_DELAY:
             self._changed_at = None
             self.requests.add(self._plan_again, "plan again")
+
+    def advance(self, seconds: float) -> None:
+        """Play on by a time of the visitor [s]."""
         self._display.advance(seconds)

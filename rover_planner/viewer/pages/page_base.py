@@ -89,6 +89,10 @@ class PageBase(ABC):
     def advance(self, seconds: float) -> None:
         """Draw the next picture, after a time of the visitor [s]."""
 
+    def add_due_requests(self) -> None:
+        """Add requests whose time has come; called in each period, with or without pictures."""
+        return
+
     @abstractmethod
     def show_refusal(self, reason: str) -> None:
         """Show, as text, why a request was refused."""
@@ -121,6 +125,7 @@ class PageBase(ABC):
         last = due = time.monotonic()
         while not self._ended.is_set():
             self.requests.wait(due - time.monotonic())
+            self.add_due_requests()
             for action in self.requests.take_all():
                 self._fulfil(action)
             now = time.monotonic()
