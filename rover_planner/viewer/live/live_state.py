@@ -22,7 +22,7 @@ def _unknown() -> Floats:
 
 @dataclass
 class LiveValues:
-    """The latest values of the topics; NaN for what no topic has told."""
+    """The latest values of the topics; NaN for values that did not come."""
 
     position: Floats | None = None
     """(3,) body origin [m], map frame; None before the first odometry."""
