@@ -6,6 +6,11 @@ import mujoco
 import numpy as np
 
 from rover_physics.names import WHEELS
+from rover_physics.numerics.quaternions import (
+    forward_from_xyzw,
+    wxyz_from_rpy,
+    xyzw_from_wxyz,
+)
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 
@@ -50,7 +55,7 @@ class DroppedRover:
         model, data = self._model, self._data
         mujoco.mj_resetData(model, data)
         data.qpos[:3] = x, y, self._height_of_start(x, y)
-        data.qpos[3:7] = np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)
+        data.qpos[3:7] = wxyz_from_rpy(0.0, 0.0, yaw)
         still = 0
         for step in range(round(LONGEST / TIMESTEP)):
             mujoco.mj_step(model, data)
@@ -71,8 +76,8 @@ class DroppedRover:
         return float(terrain.elevation[np.ix_(rows, columns)].max()) - lowest + DROP
 
     def _describe(self, steps: int) -> Settled:
-        w, x, y, z = self._data.qpos[3:7]
-        yaw = np.arctan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
+        forward_x, forward_y = forward_from_xyzw(xyzw_from_wxyz(self._data.qpos[3:7]))
+        yaw = np.arctan2(forward_y, forward_x)
         pose = np.array([self._data.qpos[0], self._data.qpos[1], yaw])
         return Settled(pose, self._data.xpos[self._wheels].copy(), steps)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import Imu
 
 from msg_adapters.errors import MessageError
+from rover_physics.numerics.quaternions import rpy_from_xyzw
 
 NOT_MEASURED = -1.0
 """First element of a covariance of what the sensor does not measure."""
@@ -43,8 +44,7 @@ def imu_to_attitude(imu: Imu) -> Attitude:
             f"imu has orientation {[x, y, z, w]} of norm {norm:g}; it must be a quaternion of "
             "norm 1"
         )
-    roll = math.atan2(2.0 * (w * x + y * z), norm**2 - 2.0 * (x * x + y * y))
-    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x) / norm**2)))
+    roll, pitch, _ = rpy_from_xyzw((x, y, z, w), squared_norm=norm**2)
     if imu.angular_velocity_covariance[0] == NOT_MEASURED:
         return Attitude(roll, pitch, None)
     rate = imu.angular_velocity

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from msg_adapters.paths import quaternions
+from rover_physics.numerics.quaternions import xyzw_from_yaw
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.traversability import classification
 
@@ -112,7 +112,8 @@ def _failing_pose(position, yaw: float, frame_id: str, stamp) -> Marker:
     """Draw an arrow along the heading where the rover cannot go on."""
     arrow = _marker("failing_pose", Marker.ARROW, frame_id, stamp)
     arrow.pose.position = _points([position])[0]
-    _, _, arrow.pose.orientation.z, arrow.pose.orientation.w = quaternions(0.0, 0.0, yaw).tolist()
+    turn = arrow.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = xyzw_from_yaw(yaw)
     arrow.scale.x, arrow.scale.y, arrow.scale.z = 0.6, 0.1, 0.1
     arrow.color = IMPASSABLE
     return arrow

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
+from rover_physics.numerics.quaternions import rpy_from_xyzw
 
 
 def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.float64], float]:
@@ -24,7 +25,7 @@ def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.flo
             f"odometry has orientation {[q.x, q.y, q.z, q.w]} of norm {norm:g}; it must be a "
             "quaternion of norm 1"
         )
-    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), norm**2 - 2.0 * (q.y**2 + q.z**2))
+    _, _, yaw = rpy_from_xyzw((q.x, q.y, q.z, q.w), squared_norm=norm**2)
     pose = np.array([place.x, place.y, place.z, yaw])
     covariance = odometry.pose.covariance
     variance = max(float(covariance[0]), float(covariance[7]), 0.0)

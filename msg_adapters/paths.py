@@ -11,6 +11,7 @@ from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
+from rover_physics.numerics.quaternions import forward_from_xyzw, xyzw_from_rpy, xyzw_from_yaw
 from rover_physics.prediction.path_prediction import PathPrediction
 
 _NORM_TOLERANCE = 0.01
@@ -36,8 +37,7 @@ def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> fl
             f"{text} has length {math.sqrt(norm):.3g}; it must be a quaternion of length 1, "
             "for no rotation w = 1"
         )
-    forward_x = w * w + x * x - y * y - z * z
-    forward_y = 2.0 * (x * y + w * z)
+    forward_x, forward_y = forward_from_xyzw((x, y, z, w))
     if math.hypot(forward_x, forward_y) < _MIN_LEVEL:
         raise MessageError(f"{text} points forward straight up or down; it has no heading")
     return math.atan2(forward_y, forward_x)
@@ -86,21 +86,6 @@ def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
             check_frame(stamped.header.frame_id, map_frame, f"path pose {i}")
     return np.array(
         [pose_to_array(stamped.pose, f"path pose {i}") for i, stamped in enumerate(path.poses)]
-    )
-
-
-def quaternions(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> NDArray[np.float64]:
-    """Return (n, 4) x, y, z, w of the rotations Rz(yaw) Ry(pitch) Rx(roll), angles (n,) [rad]."""
-    halves = [np.asarray(angle, dtype=np.float64) / 2.0 for angle in (roll, pitch, yaw)]
-    (cr, cp, cy), (sr, sp, sy) = np.cos(halves), np.sin(halves)
-    return np.stack(
-        [
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-            cr * cp * cy + sr * sp * sy,
-        ],
-        axis=-1,
     )
 
 
@@ -172,7 +157,7 @@ def settled_path(
     stock.header.frame_id, stock.header.stamp = frame_id, stamp
     rows = np.asarray(rows, dtype=np.intp)
     positions = prediction.position[rows].tolist()
-    rotations = quaternions(
+    rotations = xyzw_from_rpy(
         prediction.roll[rows], prediction.pitch[rows], prediction.poses[rows, 2]
     ).tolist()
     return Path(header=stock.header, poses=stock.fill(positions, rotations))
@@ -195,8 +180,8 @@ def stamped_pose(pose: ArrayLike, frame_id: str, stamp=None) -> PoseStamped:
     if stamp is not None:
         stamped.header.stamp = stamp
     stamped.pose.position.x, stamped.pose.position.y = x, y
-    stamped.pose.orientation.z = math.sin(yaw / 2.0)
-    stamped.pose.orientation.w = math.cos(yaw / 2.0)
+    turn = stamped.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = xyzw_from_yaw(yaw)
     return stamped
 
 

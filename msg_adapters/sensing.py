@@ -8,6 +8,8 @@ from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from sensor_msgs.msg import Imu, JointState
 
+from rover_physics.numerics.quaternions import matrix_from_xyzw
+
 Floats = NDArray[np.float64]
 BASE_FRAME = "base_link"
 
@@ -78,13 +80,11 @@ def imu_message(
     """
     message = Imu()
     message.header.stamp, message.header.frame_id = stamp, BASE_FRAME
-    x, y, z, w = orientation.tolist()
     turn, rates, pull = message.orientation, message.angular_velocity, message.linear_acceleration
-    turn.x, turn.y, turn.z, turn.w = x, y, z, w
+    turn.x, turn.y, turn.z, turn.w = orientation.tolist()
     rates.x, rates.y, rates.z = body_rates.tolist()
-    pull.x = gravity * 2.0 * (x * z - w * y)
-    pull.y = gravity * 2.0 * (y * z + w * x)
-    pull.z = gravity * (1.0 - 2.0 * (x * x + y * y))
+    upwards = matrix_from_xyzw(orientation)[2]
+    pull.x, pull.y, pull.z = (gravity * upwards).tolist()
     covariance = np.diag(np.full(3, max(deviation, 1e-4) ** 2)).ravel()
     message.orientation_covariance = covariance
     message.angular_velocity_covariance = covariance

@@ -1,4 +1,4 @@
-"""A real browser for tests: which one there is, how it is started, and what a visitor does."""
+"""A real browser for tests: how it is found and started, and a visitor who uses the page."""
 
 import re
 import shutil
@@ -24,10 +24,10 @@ ARGUMENTS = [
     "--disable-component-update",
     "--disable-sync",
 ]
-"""Draws WebGL without a graphics card, and asks nothing of the network."""
+"""For WebGL without a graphics card, and no requests to the network."""
 LAPTOP = {"width": 1280, "height": 720}
 WAIT = 120.0
-"""Longest wait for anything on the page [s]: a busy machine draws a picture in seconds."""
+"""Longest wait for anything on the page [s]; a busy machine takes seconds for a picture."""
 
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
@@ -35,7 +35,7 @@ needs_browser = pytest.mark.skipif(
 
 
 def wait_until(condition: Callable[[], Any], what: str) -> Any:
-    """Return the condition's first true value; fail with what was waited for."""
+    """Return the condition's first true value; fail with `what` after WAIT."""
     end = time.monotonic() + WAIT
     while time.monotonic() < end:
         value = condition()
@@ -46,16 +46,16 @@ def wait_until(condition: Callable[[], Any], what: str) -> Any:
 
 
 class Visitor:
-    """A person before the page: sees texts and pixels, presses, drags and clicks."""
+    """A person who uses the page: reads texts, sees pixels, presses, drags and clicks."""
 
     def __init__(self, browser: Any, url: str):
-        # Few pixels: without a graphics card each one costs time.
+        # Few pixels: without a graphics card each one takes time.
         self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=0.4)
-        self.faults: list[str] = []
-        self.tab.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.page_errors: list[str] = []
+        self.tab.on("pageerror", lambda error: self.page_errors.append(str(error)))
         self.tab.set_default_timeout(1000.0 * WAIT)
         self.tab.goto(url)
-        self.tab.wait_for_selector("#board")
+        self.tab.wait_for_selector("#dashboard")
 
     def open_tab(self, name: str) -> None:
         """Open a tab of the panel."""
@@ -74,8 +74,8 @@ class Visitor:
     def set_slider(self, label: str, value: str) -> None:
         """Type a value into the box beside a slider, key by key.
 
-        Not `fill`, which puts a text there without a key: the box then takes it for a change at
-        the place where the last key was pressed, and may throw it away.
+        `fill` sets a text without keys. The box then takes it for a change at the cursor of the
+        last key, and may discard it.
         """
         box = self._row(label).locator("input").last
         box.click()
@@ -84,11 +84,11 @@ class Visitor:
         box.press("Enter")
 
     def slider_value(self, label: str) -> float:
-        """Return what the box beside a slider shows."""
+        """Return the value in the box beside a slider."""
         return float(self._row(label).locator("input").last.input_value())
 
     def drag_slider(self, label: str, share: float) -> None:
-        """Drag the thumb of a slider to a share of its range, over many values."""
+        """Drag the thumb of a slider to a share of its range, through many values."""
         thumb = self._row(label).get_by_role("slider")
         track = thumb.locator("xpath=..").bounding_box()
         at = thumb.bounding_box()
@@ -108,13 +108,13 @@ class Visitor:
         return self.tab.inner_text(selector)
 
     def wait_for(self, text: str) -> None:
-        """Wait until a text is on the page."""
+        """Wait until the page shows a text."""
         self.tab.wait_for_function("text => document.body.innerText.includes(text)", arg=text)
 
     def number(self, name: str) -> float:
-        """Return a number of the board, such as "Time"."""
-        found = re.search(rf"{name}\s+(-?[\d.]+)", self.text("#board"))
-        assert found, f"no {name} on the board: {self.text('#board')}"
+        """Return a number of the dashboard, such as "Time"."""
+        found = re.search(rf"{name}\s+(-?[\d.]+)", self.text("#dashboard"))
+        assert found, f"no {name} on the dashboard: {self.text('#dashboard')}"
         return float(found.group(1))
 
     def picture(self) -> bytes:
@@ -122,7 +122,7 @@ class Visitor:
         return self.tab.locator("canvas").first.screenshot()
 
     def click_scene(self, x: float, y: float, *, shift: bool = False) -> None:
-        """Click at a place of the screen [px]."""
+        """Click at a point of the screen [px]."""
         if shift:
             self.tab.keyboard.down("Shift")
         self.tab.mouse.click(x, y)

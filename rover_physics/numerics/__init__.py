@@ -1,1 +1,1 @@
-"""How numbers are computed: compiled kernels, the records they read, threads, linear systems."""
+"""How numbers are computed: kernels, their records, threads, linear systems, quaternions."""

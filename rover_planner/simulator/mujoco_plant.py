@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.quaternions import matrix_from_xyzw
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.simulator.mujoco_rover import MujocoRover
@@ -54,16 +55,9 @@ class MujocoPlant:
 
     def _measure(self, duration: float) -> None:
         now = self._plant.pose[:3]
-        x, y, z, w = self._plant.orientation
         moved = (now - self._last) / duration
-        turn = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        self._velocity, self._last = turn.T @ moved, now
+        R = matrix_from_xyzw(self._plant.orientation)
+        self._velocity, self._last = R.T @ moved, now
 
     def state(self) -> PlantState:
         """Return what can be measured now."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import SIDES, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
+from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_wxyz
 from rover_physics.rover.model import Part, Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
@@ -192,21 +193,26 @@ class MujocoRover:
     @property
     def pose(self) -> Floats:
         """Return x, y, z [m] and yaw [rad] (4,) of the body's origin."""
-        w, x, y, z = self._data.qpos[3:7]
-        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        R = self._rotation
+        yaw = np.arctan2(R[1, 0], R[0, 0])
         return np.array([*self._data.qpos[:3], yaw])
 
     @property
     def orientation(self) -> Floats:
         """Quaternion (4,) x, y, z, w of the body in the map frame."""
-        return self._data.qpos[[4, 5, 6, 3]].copy()
+        return xyzw_from_wxyz(self._data.qpos[3:7])
+
+    @property
+    def _rotation(self) -> Floats:
+        """Rotation matrix (3, 3) of the body, to the map frame."""
+        return matrix_from_xyzw(self.orientation)
 
     @property
     def attitude(self) -> tuple[float, float]:
         """Roll and pitch [rad], R = Rz(yaw) Ry(pitch) Rx(roll)."""
-        w, x, y, z = self._data.qpos[3:7]
-        roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        return float(roll), float(np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)))
+        R = self._rotation
+        roll = np.arctan2(R[2, 1], R[2, 2])
+        return float(roll), float(np.arcsin(np.clip(-R[2, 0], -1.0, 1.0)))
 
     @property
     def body_rates(self) -> Floats:
@@ -233,8 +239,7 @@ class MujocoRover:
     @property
     def tilt(self) -> float:
         """Angle between body z and the vertical [rad]."""
-        w, x, y, z = self._data.qpos[3:7]
-        return float(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+        return float(np.arccos(np.clip(self._rotation[2, 2], -1.0, 1.0)))
 
     def measure_contacts(self) -> WheelContacts:
         """Measure forces and slip of all wheels."""

@@ -45,18 +45,3 @@ class Plant(Protocol):
 
     def pose(self) -> Floats:
         """Return x, y [m] and yaw [rad] (3,) of the body origin."""
-
-
-def quaternion(roll: float, pitch: float, yaw: float) -> Floats:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll) as x, y, z, w (4,)."""
-    cr, sr = np.cos(roll / 2), np.sin(roll / 2)
-    cp, sp = np.cos(pitch / 2), np.sin(pitch / 2)
-    cy, sy = np.cos(yaw / 2), np.sin(yaw / 2)
-    return np.array(
-        [
-            cy * cp * sr - sy * sp * cr,
-            cy * sp * cr + sy * cp * sr,
-            sy * cp * cr - cy * sp * sr,
-            cy * cp * cr + sy * sp * sr,
-        ]
-    )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rover_physics.forces.soil import coulomb_slip
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -22,7 +23,7 @@ from rover_physics.traction.balance import BalanceWriter
 from rover_physics.traversability.verdict import find_reasons
 from rover_planner.errors import PlanningError
 from rover_planner.simulator.driving_forces import DrivingForces, find_driving_forces
-from rover_planner.simulator.plant import PlantState, quaternion
+from rover_planner.simulator.plant import PlantState
 
 Floats = NDArray[np.float64]
 DRAG = 0.5
@@ -198,7 +199,7 @@ class QuasiStaticPlant:
         velocities = np.concatenate([rates, self._wheel_rates])
         return PlantState(
             position=here.position[0].copy(),
-            orientation=quaternion(roll, pitch, yaw),
+            orientation=xyzw_from_rpy(roll, pitch, yaw),
             velocity=np.array([np.hypot(self._speed, climb) * np.sign(self._speed), 0.0, 0.0]),
             body_rates=_body_rates(roll, pitch, roll_rate, pitch_rate, self._yaw_rate),
             joint_positions=dict(zip(names, positions.tolist(), strict=True)),

@@ -12,30 +12,11 @@ from msg_adapters.paths import (
     decimate,
     path_to_poses,
     poses_path,
-    quaternions,
     stamped_pose,
     stamped_pose_to_array,
     yaw_from_quaternion,
 )
-
-
-def rotation(roll, pitch, yaw):
-    """Return Rz(yaw) Ry(pitch) Rx(roll)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x
-
-
-def rotation_of_quaternion(x, y, z, w):
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+from rover_physics.numerics.quaternions import xyzw_from_rpy
 
 
 @pytest.mark.parametrize("yaw", [-3.0, -math.pi / 2, 0.0, 0.3, 2.5])
@@ -49,16 +30,9 @@ def test_a_path_survives_a_message():
     np.testing.assert_allclose(path_to_poses(poses_path(poses, "map"), "map"), poses, atol=1e-15)
 
 
-def test_quaternions_are_the_rotations_of_the_conventions():
-    for angles in np.random.default_rng(2).uniform(-1.5, 1.5, (20, 3)):
-        np.testing.assert_allclose(
-            rotation_of_quaternion(*quaternions(*angles)), rotation(*angles), atol=1e-14
-        )
-
-
 def test_the_heading_of_a_tilted_body_is_its_yaw():
     for roll, pitch, yaw in np.random.default_rng(2).uniform(-1.2, 1.2, (20, 3)):
-        x, y, z, w = quaternions(roll, pitch, yaw).tolist()
+        x, y, z, w = xyzw_from_rpy(roll, pitch, yaw).tolist()
         assert yaw_from_quaternion(Quaternion(x=x, y=y, z=z, w=w)) == pytest.approx(yaw)
 
 

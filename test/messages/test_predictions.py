@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
 from msg_adapters.markers import IMPASSABLE, PASSABLE, path_markers
-from msg_adapters.paths import PoseStock, quaternions, settled_path
+from msg_adapters.paths import PoseStock, settled_path
 from msg_adapters.predictions import (
     JOINTS,
     MEASURES,
@@ -21,6 +21,7 @@ from msg_adapters.predictions import (
     waypoint_array,
 )
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -136,7 +137,7 @@ def test_a_settled_path_has_height_and_full_orientation(prediction):
         turn = pose.pose.orientation
         np.testing.assert_array_equal(
             (turn.x, turn.y, turn.z, turn.w),
-            quaternions(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]),
+            xyzw_from_rpy(prediction.roll[i], prediction.pitch[i], prediction.poses[i, 2]),
         )
         assert abs(turn.x) > 1e-3 and abs(turn.y) > 1e-3
         assert pose.header == path.header and path.header.stamp == STAMP

@@ -1,4 +1,4 @@
-"""The page follows a live graph: what a rover publishes is what a visitor sees."""
+"""The page follows a live graph: it shows what a rover, its server and controller publish."""
 
 import threading
 
@@ -22,7 +22,7 @@ from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import result_qos, sensor_qos, topic_qos
 from rover_planner.viewer.live.listener import LiveLink, LiveListener
-from rover_planner.viewer.live.live_frame import LiveFigure, LiveState
+from rover_planner.viewer.live.live_state import LiveValues, StateBuilder
 from support.grounds import make_terrain, wall_at, waves
 from support.ros_fixtures import wait_until
 
@@ -35,7 +35,7 @@ def listener(ros) -> LiveListener:
 
 
 class Talker(Node):
-    """Publishes what a rover, its server and its controller would."""
+    """Publishes the topics of a rover, its server and its controller."""
 
     def __init__(self, ros):
         super().__init__("talker", context=ros.context)
@@ -61,13 +61,13 @@ def talker(ros, listener) -> Talker:
 
 
 def send_until(publish, condition, what):
-    """Publish until it was heard: best effort may lose a message."""
+    """Publish until a condition holds: best effort may lose a message."""
 
-    def heard():
+    def received():
         publish()
         return condition()
 
-    wait_until(heard, what)
+    wait_until(received, what)
 
 
 def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
@@ -78,45 +78,45 @@ def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
     return message
 
 
-def test_nothing_is_shown_before_it_is_known_where_the_rover_is(listener):
-    heard = listener.latest()
-    assert LiveFigure(LSR1).frame(heard.state) is None
-    assert heard.terrain is None and heard.plan is None and heard.verdict is None
+def test_there_is_no_state_before_the_first_odometry(listener):
+    data = listener.latest()
+    assert StateBuilder(LSR1).build(data.values) is None
+    assert data.terrain is None and data.plan is None and data.verdict is None
 
 
-def test_the_figure_has_the_measured_joints(listener, talker):
+def test_the_state_has_the_measured_joints(listener, talker):
     angles = {"rocker_right": 0.1, "rocker_left": -0.1, "bogie_right": 0.2, "bogie_left": -0.05}
     state = JointState(name=[*angles, *WHEEL_JOINTS])
     state.position = [*angles.values(), *np.arange(6.0).tolist()]
     send_until(
         lambda: (talker.joints.publish(state), talker.odometry.publish(odometry())),
-        lambda: len(listener.latest().state.joints) == 10 and listener.latest().state.speed,
+        lambda: len(listener.latest().values.joints) == 10 and listener.latest().values.speed,
         "joints and odometry",
     )
-    frame = LiveFigure(LSR1).frame(listener.latest().state)
-    assert frame is not None
-    np.testing.assert_allclose(frame.position, [1.0, 2.0, 0.3])
-    np.testing.assert_allclose(frame.rocker_angle, [0.1, -0.1])
-    np.testing.assert_allclose(frame.bogie_angle, [0.2, -0.05])
-    np.testing.assert_allclose(frame.spin, np.arange(6.0))
-    assert frame.speed == 0.05
+    state = StateBuilder(LSR1).build(listener.latest().values)
+    assert state is not None
+    np.testing.assert_allclose(state.position, [1.0, 2.0, 0.3])
+    np.testing.assert_allclose(state.rocker_angle, [0.1, -0.1])
+    np.testing.assert_allclose(state.bogie_angle, [0.2, -0.05])
+    np.testing.assert_allclose(state.spin, np.arange(6.0))
+    assert state.speed == 0.05
 
 
-def test_what_nothing_tells_of_is_not_known(listener, talker):
+def test_values_without_a_topic_are_nan(listener, talker):
     send_until(
         lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().state.position is not None,
+        lambda: listener.latest().values.position is not None,
         "odometry",
     )
-    frame = LiveFigure(LSR1).frame(listener.latest().state)
-    assert frame is not None
-    for values in (frame.wheel_loads, frame.friction_utilisation, frame.torque_saturation):
+    state = StateBuilder(LSR1).build(listener.latest().values)
+    assert state is not None
+    for values in (state.wheel_loads, state.friction_utilisation, state.torque_saturation):
         assert np.isnan(values).all()
-    assert np.isnan(frame.tip_over_ratio)
-    assert listener.latest().state.forces_from == ""
+    assert np.isnan(state.tip_over_ratio)
+    assert listener.latest().values.forces_from == ""
 
 
-def test_torques_and_rates_add_up_to_the_energy(listener, talker):
+def test_the_energy_is_torque_times_rate_times_time(listener, talker):
     def state(second: int) -> JointState:
         message = JointState(name=list(WHEEL_JOINTS))
         message.position = [0.0] * 6
@@ -126,68 +126,68 @@ def test_torques_and_rates_add_up_to_the_energy(listener, talker):
 
     send_until(
         lambda: talker.joints.publish(state(10)),
-        lambda: listener.latest().state.efforts,
+        lambda: listener.latest().values.efforts,
         "the first state",
     )
     send_until(
         lambda: talker.joints.publish(state(12)),
-        lambda: listener.latest().state.time == 2.0,
+        lambda: listener.latest().values.time == 2.0,
         "two seconds",
     )
-    assert listener.latest().state.energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
+    assert listener.latest().values.energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
 
 
-def test_what_the_controller_estimates_counts_more_than_what_was_predicted(listener, talker):
+def test_estimates_of_the_controller_take_precedence_over_predictions(listener, talker):
     loads = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
     talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
     talker.odometry.publish(odometry())
     send_until(
         lambda: talker.estimated.publish(wheel_values(loads)),
-        lambda: "controller" in listener.latest().state.forces_from,
+        lambda: "controller" in listener.latest().values.forces_from,
         "the controller",
     )
-    np.testing.assert_allclose(listener.latest().state.wheel_loads, loads)
+    np.testing.assert_allclose(listener.latest().values.wheel_loads, loads)
 
 
-def test_a_refusal_of_the_server_is_told_with_its_reason(listener, talker):
+def test_a_refusal_of_the_server_comes_with_its_reason(listener, talker):
     status = DiagnosticStatus(level=DiagnosticStatus.ERROR, message="a wall")
     talker.verdict.publish(DiagnosticArray(status=[status]))
     verdict = wait_until(lambda: listener.latest().verdict, "the verdict")
     assert not verdict.traversable and verdict.reason == "a wall"
 
 
-def test_messages_that_make_no_sense_are_passed_over(ros, listener, talker):
+def test_invalid_messages_are_skipped(ros, listener, talker):
     broken = JointState(name=["rocker_right"], position=[float("nan")])
     talker.joints.publish(broken)
     talker.odometry.publish(odometry(x=float("inf")))
     talker.estimated.publish(Float64MultiArray(data=[1.0]))
     send_until(
         lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().state.position is not None,
+        lambda: listener.latest().values.position is not None,
         "good odometry",
     )
     assert ros.is_alive(listener)
-    assert "rocker_right" not in listener.latest().state.joints
+    assert "rocker_right" not in listener.latest().values.joints
 
 
-def test_it_cannot_be_asked_for_a_plan_before_there_is_a_server(listener, talker):
-    assert "odometry" in listener.ask_for(np.zeros(2))
+def test_a_plan_needs_odometry_and_a_server(listener, talker):
+    assert "odometry" in listener.request_plan(np.zeros(2))
     send_until(
         lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().state.position is not None,
+        lambda: listener.latest().values.position is not None,
         "odometry",
     )
-    assert "can_traverse" in listener.ask_for(np.zeros(2))
+    assert "can_traverse" in listener.request_plan(np.zeros(2))
 
 
-def test_a_copy_of_the_state_is_not_changed_by_later_messages():
-    state = LiveState(joints={"rocker_right": 0.1})
-    copy = state.copy()
-    state.joints["rocker_right"] = 0.2
+def test_a_copy_of_the_values_is_not_changed_by_later_messages():
+    values = LiveValues(joints={"rocker_right": 0.1})
+    copy = values.copy()
+    values.joints["rocker_right"] = 0.2
     assert copy.joints == {"rocker_right": 0.1}
 
 
-def test_a_link_ends_what_it_started():
+def test_a_closed_link_leaves_no_thread_and_no_context():
     before = set(threading.enumerate())
     link = LiveLink()
     assert link.listener.context.ok()
@@ -209,7 +209,7 @@ def start_graph(ros, tmp_path, terrain: Terrain) -> tuple[RoverSimulator, Traver
     return simulator, server
 
 
-def test_it_shows_the_rover_where_it_is_with_what_was_predicted_there(ros, listener, tmp_path):
+def test_the_state_has_the_rovers_pose_and_the_forces_predicted_there(ros, listener, tmp_path):
     simulator, _ = start_graph(ros, tmp_path, make_terrain(waves))
     planner = ros.spin(MissionPlanner(context=ros.context))
     planner.wait_for_server()
@@ -217,26 +217,26 @@ def test_it_shows_the_rover_where_it_is_with_what_was_predicted_there(ros, liste
     assert answer["traversable"], answer["reason"]
     wait_until(lambda: listener.latest().plan is not None, "the plan")
     wait_until(lambda: listener.latest().verdict is not None, "the verdict")
-    wait_until(lambda: np.isfinite(listener.latest().state.wheel_loads).all(), "the loads")
-    heard = listener.latest()
-    assert heard.terrain is not None and len(heard.plan) > 5 and heard.verdict.traversable
-    assert set(SUSPENSION_JOINTS) <= set(heard.state.joints)
-    frame = LiveFigure(LSR1).frame(heard.state)
-    assert frame is not None
+    wait_until(lambda: np.isfinite(listener.latest().values.wheel_loads).all(), "the loads")
+    data = listener.latest()
+    assert data.terrain is not None and len(data.plan) > 5 and data.verdict.traversable
+    assert set(SUSPENSION_JOINTS) <= set(data.values.joints)
+    state = StateBuilder(LSR1).build(data.values)
+    assert state is not None
     plant = simulator.simulation.plant
-    assert frame.position == pytest.approx(plant.state().position, abs=1e-6)
-    assert frame.wheel_loads.sum() == pytest.approx(LSR1.weight, rel=0.05)
-    x, y, z = frame.contact_points.T
-    assert np.abs(z - heard.terrain.elevation_at(x, y)).max() < 0.02
+    assert state.position == pytest.approx(plant.state().position, abs=1e-6)
+    assert state.wheel_loads.sum() == pytest.approx(LSR1.weight, rel=0.05)
+    x, y, z = state.contact_points.T
+    assert np.abs(z - data.terrain.elevation_at(x, y)).max() < 0.02
 
 
-def test_a_goal_that_is_asked_for_is_planned_by_the_server(ros, listener, tmp_path):
+def test_the_server_plans_to_a_requested_goal(ros, listener, tmp_path):
     start_graph(ros, tmp_path, make_terrain(wall_at(1.5)))
-    wait_until(lambda: listener.latest().state.position is not None, "odometry")
-    wait_until(lambda: listener.ask_for(np.array([0.5, 0.2])) == "", "the server")
+    wait_until(lambda: listener.latest().values.position is not None, "odometry")
+    wait_until(lambda: listener.request_plan(np.array([0.5, 0.2])) == "", "the server")
     wait_until(lambda: listener.latest().plan is not None, "the plan")
     np.testing.assert_allclose(listener.latest().plan[-1, :2], [0.5, 0.2], atol=1e-6)
-    assert listener.ask_for(np.array([3.0, 0.0])) == ""
+    assert listener.request_plan(np.array([3.0, 0.0])) == ""
     wait_until(
         lambda: listener.latest().verdict and not listener.latest().verdict.traversable,
         "the refusal",

@@ -1,4 +1,4 @@
-"""The page of a live rover in a real browser: a graph of nodes behind it, a visitor before it."""
+"""The page of a live rover in a real browser, with simulator and server as nodes."""
 
 import time
 
@@ -21,9 +21,9 @@ pytestmark = needs_browser
 
 LSR1 = load_rover("lsr1")
 AHEAD = (640, 400)
-"""A place on the screen where the ground ahead of the rover is [px]."""
+"""A point of the screen on the ground ahead of the rover [px]."""
 ASK_AGAIN = 5.0
-"""Time after which an unanswered question is asked again [s]."""
+"""Time after which an unanswered request is repeated [s]."""
 
 
 @pytest.fixture
@@ -56,11 +56,11 @@ def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, vis
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
     ros.spin(TraverseServer(context=ros.context))
-    visitor.wait_for("live; nothing tells of the forces")
+    visitor.wait_for("live; forces not known")
     wait_until(lambda: visitor.picture() != empty, "rover and ground in the scene")
 
     def ask() -> bool:
-        """Click anew every few seconds: before the server is found a click is refused."""
+        """Click again every few seconds: before the server is found a click is refused."""
         if time.monotonic() - asked[-1] > ASK_AGAIN:
             asked.append(time.monotonic())
             visitor.click_scene(*AHEAD)
@@ -68,9 +68,9 @@ def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, vis
 
     asked = [-ASK_AGAIN]
     wait_until(ask, "the server's verdict")
-    visitor.wait_for("live; forces as the server predicted them")
-    wait_until(lambda: "? N" not in visitor.text("#board"), "the loads on the board")
-    lines = visitor.text("#board").splitlines()
+    visitor.wait_for("live; forces predicted by the server")
+    wait_until(lambda: "? N" not in visitor.text("#dashboard"), "the loads on the dashboard")
+    lines = visitor.text("#dashboard").splitlines()
     loads = [float(line.removesuffix(" N")) for line in lines if line.endswith(" N")]
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
-    assert visitor.faults == []
+    assert visitor.page_errors == []

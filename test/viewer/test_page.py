@@ -1,4 +1,4 @@
-"""The page in a real browser: what its buttons, sliders and clicks do, as a visitor sees it."""
+"""The page in a real browser: what a visitor sees after pressing, dragging and clicking."""
 
 import time
 from collections.abc import Iterator
@@ -21,16 +21,17 @@ from support.browser import (
     wait_until,
 )
 from support.grounds import make_terrain, waves
+from support.viewer_sessions import ramp
 
 pytestmark = needs_browser
 
 LSR1 = load_rover("lsr1")
 MIDDLE = (600, 420)
-"""A place on the screen where the ground is [px]."""
+"""A point of the screen on the ground [px]."""
 
 
 def walled() -> Terrain:
-    """Return waves with a wall right across that no rover climbs."""
+    """Return waves with a wall along y that no rover climbs."""
     return make_terrain(lambda x, y: waves(x, y) + 0.5 * ((x > 2.2) & (x < 2.6)))
 
 
@@ -59,7 +60,7 @@ def opened(page, browser) -> Visitor:
 def visitor(opened, page) -> Visitor:
     """A visitor at the start of the path from (-2, 0) to (1, 0), with the preset lsr1."""
 
-    def start_anew() -> None:
+    def reset() -> None:
         page.session.start = (-2.0, 0.0, 0.0)
         if page.session.rover != LSR1:
             page.session.rover = LSR1
@@ -69,27 +70,27 @@ def visitor(opened, page) -> Visitor:
         done.append(True)
 
     done: list[bool] = []
-    page.wishes.ask(start_anew)
+    page.requests.add(reset)
     wait_until(lambda: done, "the start")
     opened.open_tab("Drive")
     opened.wait_for("paused")
-    wait_until(lambda: opened.number("Time") == 0.0, "the board to show the start")
+    wait_until(lambda: opened.number("Time") == 0.0, "the dashboard to show the start")
     return opened
 
 
 def test_the_page_shows_the_rover_its_loads_and_the_verdict(visitor):
     assert "traversable" in visitor.text("#verdict")
-    board = visitor.text("#board")
-    assert board.count(" N\n") + board.endswith(" N") >= 6
-    loads = [float(part.split()[-1]) for part in board.split(" N")[:6]]
+    dashboard = visitor.text("#dashboard")
+    assert dashboard.count(" N\n") + dashboard.endswith(" N") >= 6
+    loads = [float(part.split()[-1]) for part in dashboard.split(" N")[:6]]
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.1)
     for name in ("Time", "Distance", "Energy", "Speed", "stability margin", "slip ratio"):
-        assert name in board
-    assert not visitor.faults
+        assert name in dashboard
+    assert not visitor.page_errors
 
 
-def test_all_of_the_drive_panel_is_on_a_laptop_screen(visitor):
-    for selector in ("#verdict", "#board", "#state", "#plots-legend"):
+def test_the_drive_tab_fits_on_the_screen_of_a_laptop(visitor):
+    for selector in ("#verdict", "#dashboard", "#status", "#plots-legend"):
         box = visitor.tab.locator(selector).bounding_box()
         assert box["y"] >= 0.0 and box["y"] + box["height"] <= 720.0, selector
 
@@ -103,7 +104,7 @@ def test_play_moves_the_rover_and_pause_stops_it(visitor, page):
     visitor.wait_for("paused")
     stopped = page.playback.time
     assert 0.0 < stopped < page.playback.duration
-    wait_until(lambda: visitor.number("Time") == pytest.approx(stopped, abs=0.1), "the board")
+    wait_until(lambda: visitor.number("Time") == pytest.approx(stopped, abs=0.1), "the dashboard")
     assert visitor.picture() != before
     assert page.playback.time == stopped
 
@@ -115,33 +116,33 @@ def test_fast_forward_is_faster_than_play_and_rewind_goes_back(visitor, page):
     visitor.press("Rewind")
     visitor.wait_for("rewinding")
     wait_until(lambda: page.playback.time == 0.0, "the start")
-    wait_until(lambda: visitor.number("Time") == 0.0, "the board to show it")
+    wait_until(lambda: visitor.number("Time") == 0.0, "the dashboard to show it")
 
 
-def test_step_goes_to_the_next_waypoint_and_back(visitor, page):
-    times = page.session.shown.journey.times
+def test_step_goes_to_the_next_waypoint_and_step_back_to_the_previous(visitor, page):
+    times = page.session.shown.trajectory.times
     for press, row in (("Step", 1), ("Step", 2), ("Step back", 1)):
         visitor.press(press)
         there = times[row]
         wait_until(lambda there=there: page.playback.time == pytest.approx(there), f"row {row}")
-    wait_until(lambda: visitor.number("Time") == pytest.approx(times[1], abs=0.06), "the board")
+    wait_until(
+        lambda: visitor.number("Time") == pytest.approx(times[1], abs=0.06), "the dashboard"
+    )
 
 
-def test_the_scrubber_goes_to_any_time_and_the_cursor_of_the_plots_with_it(visitor, page):
+def test_the_scrubber_moves_the_drive_and_the_cursor_of_the_plots_to_its_time(visitor, page):
     assert visitor.tab.locator(".uplot canvas").count() == 3
     visitor.set_slider("Time [s]", "50")
     wait_until(lambda: page.playback.time == pytest.approx(50.0), "50 s")
-    wait_until(lambda: visitor.number("Time") == 50.0, "the board to show it")
+    wait_until(lambda: visitor.number("Time") == 50.0, "the dashboard to show it")
     assert visitor.number("Distance") == pytest.approx(150.0, rel=0.05)
-    distance = page.session.shown.journey.frame(50.0).distance
-    data = page.charts.plots["wheel_loads"]
+    distance = page.session.shown.trajectory.state_at(50.0).distance
+    data = page.plots.plots["wheel_loads"]
     wait_until(lambda: np.any(np.isclose(data.data[0], distance)), "the cursor to be there")
     assert all(np.isfinite(column).all() for column in data.data)
 
 
-def test_every_time_that_is_typed_takes_effect_though_the_page_moves_the_scrubber_too(
-    visitor, page
-):
+def test_every_typed_time_takes_effect_although_the_page_moves_the_scrubber_too(visitor, page):
     for typed in ("50", "50", "7.5", "61.2"):
         visitor.set_slider("Time [s]", typed)
         wait_until(lambda typed=typed: page.playback.time == float(typed), f"{typed} s")
@@ -149,21 +150,21 @@ def test_every_time_that_is_typed_takes_effect_though_the_page_moves_the_scrubbe
         wait_until(lambda: visitor.slider_value("Time [s]") == 0.0, "the start")
 
 
-def test_a_time_counts_that_is_typed_just_before_the_page_shows_another(visitor, page):
-    scrubber = page.drive_tab._player._scrubber
+def test_a_time_typed_just_before_the_page_moves_the_scrubber_takes_effect(visitor, page):
+    scrubber = page.drive_tab._controls._scrubber
 
     def show_late(typed: float) -> None:
-        """Keep the page's thread from looking until the visitor's time is there."""
+        """Keep the page's thread busy until the visitor's time has come."""
         ready.append(typed)
         end = time.monotonic() + WAIT
         while scrubber.value != typed and time.monotonic() < end:
             pass
-        page.drive_tab.show_time()
+        page.drive_tab.move_scrubber()
 
     for typed in range(1, 10):
         ready: list[float] = []
-        wait_until(lambda: page.drive_tab._hand_on_until is None, "the last time to be shown")
-        page.wishes.ask(lambda typed=typed: show_late(typed))
+        wait_until(lambda: page.drive_tab._held_until is None, "the last time to be shown")
+        page.requests.add(lambda typed=typed: show_late(typed))
         wait_until(lambda ready=ready: ready, "the page's thread")
         visitor.set_slider("Time [s]", f"{typed}")
         wait_until(lambda typed=typed: page.playback.time == typed, f"{typed} s")
@@ -198,7 +199,7 @@ def test_a_link_length_changes_the_rover_in_the_scene(visitor, page):
     wait_until(lambda: visitor.picture() != before, "another figure")
 
 
-def test_a_value_that_makes_no_rover_is_refused_with_the_reason(visitor, page):
+def test_an_impossible_value_is_refused_with_the_reason(visitor, page):
     good = page.session.rover
     visitor.open_tab("Rover")
     visitor.set_slider("middle wheel x [m]", "0.4")
@@ -224,7 +225,7 @@ def test_a_rover_file_can_be_saved_and_loaded(visitor, page, tmp_path):
     wait_until(lambda: page.session.rover.name == "mine", "the loaded rover")
 
 
-def test_a_click_on_the_ground_sets_the_goal_and_is_judged_at_once(visitor, page):
+def test_a_click_on_the_ground_sets_the_goal_and_plans_at_once(visitor, page):
     goal, start = page.session.goal, page.session.start
     visitor.click_scene(*MIDDLE)
     wait_until(lambda: page.session.goal != goal, "another goal")
@@ -243,14 +244,14 @@ def test_a_click_with_shift_sets_the_start(visitor, page):
 
 def test_a_path_through_a_wall_is_refused_and_its_reason_is_shown(visitor, page):
     before = visitor.picture()
-    page.wishes.ask(lambda: page.plan(np.array([3.4, 0.0])))
+    page.requests.add(lambda: page.plan(np.array([3.4, 0.0])))
     visitor.wait_for("not traversable")
     assert page.session.shown.verdict.reason in visitor.text("#verdict")
     assert not page.session.answer.traversable
     wait_until(lambda: visitor.picture() != before, "ghosts in the scene")
 
 
-def test_the_ground_can_be_coloured_by_what_is_predicted(visitor):
+def test_a_predicted_layer_colours_the_ground(visitor):
     visitor.open_tab("Ground and path")
     before = visitor.picture()
     visitor.choose("Colour by", "tilt")
@@ -259,7 +260,7 @@ def test_the_ground_can_be_coloured_by_what_is_predicted(visitor):
     visitor.choose("Colour by", "height")
 
 
-def test_a_soil_changes_the_verdict_on_slip(visitor, page):
+def test_a_soil_lets_the_wheels_sink(visitor, page):
     visitor.open_tab("Ground and path")
     assert page.session.shown.verdict.max_sinkage == 0.0
     visitor.choose("Soil", "dry_sand")
@@ -268,5 +269,25 @@ def test_a_soil_changes_the_verdict_on_slip(visitor, page):
     wait_until(lambda: page.session.options.soil is None, "hard ground")
 
 
-def test_the_browser_meets_no_fault_in_all_of_this(visitor):
-    assert visitor.faults == []
+def test_a_slider_that_makes_the_shown_path_impassable_is_answered_and_the_page_goes_on(browser):
+    session = ViewSession(LSR1, make_terrain(ramp), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    steep = Page(session, port=0)
+    try:
+        visitor = Visitor(browser, steep.url)
+        visitor.wait_for("paused")
+        assert visitor.text("#verdict").startswith("traversable")
+        visitor.open_tab("Rover")
+        visitor.drag_slider("friction [-]", 0.0)
+        visitor.wait_for("not traversable")
+        friction = visitor.slider_value("friction [-]")
+        wait_until(lambda: session.rover.friction == friction, "the last value")
+        wait_until(lambda: "slips" in visitor.text("#verdict"), "the reason")
+        visitor.set_slider("friction [-]", "0.9")
+        wait_until(lambda: visitor.text("#verdict").startswith("traversable"), "the new verdict")
+        assert visitor.page_errors == []
+    finally:
+        steep.close()
+
+
+def test_the_browser_reports_no_error_after_all_tests(visitor):
+    assert visitor.page_errors == []

@@ -1,4 +1,4 @@
-"""What the page asks the model, without a browser: rovers, sessions, recorded paths, ends."""
+"""The session behind the page, without a browser: rovers, plans, recorded paths, ends."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ from rover_planner.studies.rover_values import (
     with_value,
     write_rover,
 )
-from rover_planner.viewer.state.journey import Journey
 from rover_planner.viewer.state.session import ViewSession
+from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer_sessions import LSR1, session_on, straight
 
@@ -28,13 +28,13 @@ from support.viewer_sessions import LSR1, session_on, straight
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_a_rover_that_is_written_and_read_is_the_same(name):
+def test_a_rover_that_is_written_and_read_again_is_the_same(name):
     rover = load_rover(name)
     assert read_rover(write_rover(rover), "here") == rover
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_every_value_on_offer_is_within_its_range_and_can_be_set(name):
+def test_every_value_is_within_its_range_and_can_be_set(name):
     rover = load_rover(name)
     data = rover_to_dict(rover)
     for values in list_values(rover).values():
@@ -45,7 +45,7 @@ def test_every_value_on_offer_is_within_its_range_and_can_be_set(name):
             assert with_value(rover, value.keys, now) == rover
 
 
-def test_a_value_changes_what_it_names_and_nothing_else():
+def test_a_value_changes_only_the_number_that_it_names():
     changed = with_value(LSR1, [("wheel", "radius")], 0.12)
     assert changed.wheel.radius == 0.12
     assert with_value(changed, [("wheel", "radius")], 0.10) == LSR1
@@ -76,20 +76,20 @@ def test_a_refused_value_says_why_and_the_last_good_rover_stays():
     assert session.refusal == "" and session.rover.friction == 0.5
 
 
-def test_what_is_refused_changes_nothing_and_says_why():
+def test_a_refused_change_alters_nothing_and_says_why():
     session = session_on(waves)
     shown, answer = session.shown, session.answer
     assert not session.change_rover([("wheel", "radius")], -1.0)
     assert "wheel.radius" in session.refusal
     assert not session.plan_to(np.array([np.nan, 0.0]))
     assert not session.change_arm("arm_yaw", float("nan"))
-    assert not session.take_options(policy="best")
+    assert not session.change_options(policy="best")
     assert session.shown is shown and session.answer is answer
     assert session.rover == LSR1 and session.goal == (1.0, 0.0, 0.0)
     assert session.plan_to(np.array([0.5, 0.5])) and not session.refusal
 
 
-def test_less_friction_uses_up_more_of_it_on_the_path_that_is_shown():
+def test_half_the_friction_doubles_the_utilisation_of_the_shown_path():
     session = session_on(waves)
     before = session.shown.verdict.max_friction_utilisation
     session.change_rover([("friction",)], 0.4)
@@ -97,7 +97,7 @@ def test_less_friction_uses_up_more_of_it_on_the_path_that_is_shown():
     assert after == pytest.approx(2.0 * before, rel=1e-6)
 
 
-def test_an_arm_held_out_moves_load_to_its_side():
+def test_an_arm_with_a_payload_loads_the_wheels_below_it():
     session = session_on(lambda x, y: 0.0 * x)
     session.change_rover([("manipulator", "payload")], 2.0)
     session.change_arm("arm_yaw", 0.0)
@@ -108,7 +108,7 @@ def test_an_arm_held_out_moves_load_to_its_side():
     assert ahead[front] > behind[front] and ahead[rear] < behind[rear]
 
 
-def test_a_goal_off_the_map_is_refused_with_a_reason_by_the_verdict():
+def test_the_verdict_refuses_a_goal_off_the_map_with_the_reason():
     session = session_on(waves)
     session.plan_to(np.array([9.0, 0.0]))
     assert not session.answer.traversable
@@ -124,19 +124,19 @@ def recorded(folder, poses):
     return session, prediction, verdict
 
 
-def test_a_recorded_prediction_is_shown_as_it_was_written(tmp_path):
+def test_a_recorded_prediction_is_shown_as_it_was_recorded(tmp_path):
     session, prediction, verdict = recorded(tmp_path, straight())
     shown = session.shown
     assert shown.verdict.reason == verdict.reason != ""
     assert shown.verdict.first_failure == verdict.first_failure
-    frame = shown.journey.frame(10.0)
-    expected = Journey(LSR1, prediction, verdict).frame(10.0)
-    assert frame is not None and expected is not None
-    np.testing.assert_allclose(frame.wheel_loads, expected.wheel_loads)
-    np.testing.assert_allclose(frame.contact_points, expected.contact_points)
+    state = shown.trajectory.state_at(10.0)
+    expected = Trajectory(LSR1, prediction, verdict).state_at(10.0)
+    assert state is not None and expected is not None
+    np.testing.assert_allclose(state.wheel_loads, expected.wheel_loads)
+    np.testing.assert_allclose(state.contact_points, expected.contact_points)
 
 
-def test_a_recorded_reason_counts_whatever_the_model_says_now(tmp_path):
+def test_a_recorded_reason_takes_precedence_over_the_model(tmp_path):
     prediction, verdict = judge_path(LSR1, make_terrain(waves), straight())
     write_prediction(tmp_path / "out.npz", prediction, verdict)
     again, reasons = read_prediction(tmp_path / "out.npz")
@@ -152,7 +152,7 @@ def test_a_file_without_predictions_is_refused_by_name(tmp_path):
         read_prediction(tmp_path / "poses.npz")
 
 
-def test_a_recorded_path_stays_the_one_that_is_judged_when_the_rover_changes(tmp_path):
+def test_a_change_of_the_rover_judges_the_recorded_path_again(tmp_path):
     session, prediction, _ = recorded(tmp_path, straight())
     assert session.change_rover([("friction",)], 0.4)
     assert session.plan_again()
@@ -162,7 +162,7 @@ def test_a_recorded_path_stays_the_one_that_is_judged_when_the_rover_changes(tmp
     assert len(session.answer.candidates) > 1 and not session.recorded
 
 
-def test_a_session_on_a_terrain_with_soil_takes_its_soils():
+def test_a_session_on_a_terrain_with_soil_uses_that_soil():
     flat = make_terrain(lambda x, y: 0.0 * x)
     soil = np.zeros(flat.elevation.shape, np.int32)
     sandy = Terrain(
@@ -172,20 +172,20 @@ def test_a_session_on_a_terrain_with_soil_takes_its_soils():
     assert session.shown.verdict.max_sinkage > 0.0
 
 
-def test_the_ends_of_a_path_that_nobody_told_are_where_the_rover_can_stand():
+def test_default_ends_are_where_the_rover_can_stand():
     ground = make_terrain(lambda x, y: np.where(np.hypot(x + 2.0, y) < 1.0, np.nan, 0.0))
     (x, y, _), goal = choose_ends(LSR1, ground)
     assert goal == pytest.approx((2.0, 0.0, 0.0))
     assert 1.0 < np.hypot(x + 2.0, y) < 2.5 and x < 0.0
-    assert ViewSession(LSR1, ground, (x, y, 0.0), goal).shown.journey.length > 0.0
+    assert ViewSession(LSR1, ground, (x, y, 0.0), goal).shown.trajectory.length > 0.0
 
 
-def test_where_the_rover_can_stand_nowhere_ends_are_chosen_all_the_same():
+def test_default_ends_exist_where_the_rover_can_stand_nowhere():
     steep = make_terrain(lambda x, y: 2.0 * x)
     start, goal = choose_ends(LSR1, steep)
     assert (start, goal) == (pytest.approx((-2.0, 0.0, 0.0)), pytest.approx((2.0, 0.0, 0.0)))
 
 
-def test_ends_on_a_large_map_are_no_farther_apart_than_can_be_watched():
+def test_default_ends_on_a_large_map_are_10_m_apart():
     start, goal = choose_ends(LSR1, Terrain(np.zeros((1200, 1200)), 0.1, (0.0, 0.0)))
     assert np.hypot(goal[0] - start[0], goal[1] - start[1]) == pytest.approx(10.0)

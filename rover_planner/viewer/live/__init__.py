@@ -1,1 +1,1 @@
-"""A live rover: its topics, kept for the page."""
+"""A live rover: the data of its topics, kept for the page."""

@@ -1,52 +1,69 @@
-"""What every page has: a viser server, its panels, and the one thread that changes them."""
+"""The base of every page: a viser server, its panels, and the one thread that changes them."""
 
+import math
 import threading
 import time
-import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from rover_planner.viewer.panel.charts import Charts
-from rover_planner.viewer.scene.ground_mesh import hit_ground
+from rover_planner.viewer.panel.error_notice import ErrorNotice
+from rover_planner.viewer.panel.plots import Plots
+from rover_planner.viewer.scene.ground_mesh import intersect_ground
 from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.state.session import REFUSALS, ViewSession
-from rover_planner.viewer.state.visitor_requests import VisitorRequests
+from rover_planner.viewer.state.visitor_requests import Action, VisitorRequests
 
-FRAME = 0.04
+PERIOD = 0.04
 """Time between two pictures [s]."""
 PANEL_WIDTH, PLOTS_WIDTH = 380, 300
-"""Widths of what is docked right and left [px]; a laptop's screen leaves the middle free."""
+"""Widths of the panels on the right and on the left [px]; a laptop's screen shows the scene."""
 
 
 class PageBase(ABC):
-    """A served page. Callbacks of the browser only leave wishes for the page's own thread."""
+    """A served page. Callbacks of the browser only add requests for the page's own thread.
+
+    No error ends that thread. The page shows an error in a request and takes the next request. An
+    error in a picture stops the pictures until the next request, or for `retry_after` [s].
+    """
+
+    retry_after = math.inf
+    """Time from an error in a picture to the next picture without a request [s]."""
 
     def __init__(self, session: ViewSession, host: str, port: int):
-        """Start to serve; `port` 0 takes a free one. `run` starts the thread."""
+        """Start the server; `start` starts the thread.
+
+        Args:
+            session: The state to show.
+            host: Address to serve on.
+            port: Port to serve on; 0 takes a free one.
+        """
         import viser
 
         self.session = session
-        self.wishes = VisitorRequests()
+        self.requests = VisitorRequests()
         self._ended = threading.Event()
+        self._stopped_at: float | None = None
+        """When an error stopped the pictures [s]; None while they go on."""
         self.server = viser.ViserServer(host, port, label="rover_planner", verbose=False)
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.scene = Scene(self.server)
-        self._dock_panels()
-        self.server.on_client_connect(self._welcome)
-        self.server.scene.on_click()(lambda event: self._ask_click(event, False))
-        self.server.scene.on_click(modifier="shift")(lambda event: self._ask_click(event, True))
+        self._add_panels()
+        self.server.on_client_connect(self._aim_camera)
+        self.server.scene.on_click()(lambda event: self._request_click(event, False))
+        self.server.scene.on_click(modifier="shift")(
+            lambda event: self._request_click(event, True)
+        )
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Address of the page."""
         return f"http://{self.server.get_host()}:{self.server.get_port()}"
 
     def start(self) -> None:
-        """Let the page move."""
+        """Start the thread that changes the page."""
         self._thread.start()
 
     def close(self) -> None:
@@ -65,54 +82,69 @@ class PageBase(ABC):
         """Add tabs to the main panel."""
 
     @abstractmethod
-    def click(self, place: np.ndarray | None, shift: bool) -> None:
-        """Do what a click on the ground asks for: its place (2,) [m], None beside the ground."""
+    def click(self, point: np.ndarray | None, shift: bool) -> None:
+        """Act on a click at a point of the ground (2,) [m]; None beside known ground."""
 
     @abstractmethod
     def advance(self, seconds: float) -> None:
-        """Move on by the time that passed for the visitor [s]; called for every picture."""
+        """Draw the next picture, after a time of the visitor [s]."""
+
+    def add_due_requests(self) -> None:
+        """Add requests whose time has come; called in each period, with or without pictures."""
+        return
 
     @abstractmethod
-    def tell_refusal(self, reason: str) -> None:
-        """Say why something was refused."""
+    def show_refusal(self, reason: str) -> None:
+        """Show, as text, why a request was refused."""
 
-    def _dock_panels(self) -> None:
+    def _add_panels(self) -> None:
         gui = self.server.gui
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
+        self.errors = ErrorNotice(gui)
         self.fill_panel(gui.add_tab_group())
-        plots = gui.add_panel()
-        with plots.add_tab("Plots over distance [m]"):
-            self.charts = Charts(gui)
-        plots.dock_left()
-        plots.set_width(PLOTS_WIDTH)
+        left = gui.add_panel()
+        with left.add_tab("Plots over distance [m]"):
+            self.plots = Plots(gui)
+        left.dock_left()
+        left.set_width(PLOTS_WIDTH)
 
-    def _welcome(self, client: Any) -> None:
+    def _aim_camera(self, client: Any) -> None:
         session = self.session
-        self.scene.look_along(client, session.rover, session.terrain, session.start, session.goal)
+        self.scene.aim_camera(client, session.rover, session.terrain, session.start, session.goal)
 
-    def _ask_click(self, event: Any, shift: bool) -> None:
+    def _request_click(self, event: Any, shift: bool) -> None:
         origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-        self.wishes.ask(
-            lambda: self.click(hit_ground(self.session.terrain, origin, direction), shift), "click"
-        )
+
+        def click() -> None:
+            self.click(intersect_ground(self.session.terrain, origin, direction), shift)
+
+        self.requests.add(click, "click")
 
     def _run(self) -> None:
         last = due = time.monotonic()
         while not self._ended.is_set():
-            self.wishes.wait(due - time.monotonic())
-            for act in self.wishes.take():
-                self._try(act)
+            self.requests.wait(due - time.monotonic())
+            self.add_due_requests()
+            for action in self.requests.take_all():
+                self._fulfil(action)
             now = time.monotonic()
-            passed, last, due = now - last, now, now + FRAME
-            self._try(lambda passed=passed: self.advance(passed))  # type: ignore[misc]
+            passed, last, due = now - last, now, now + PERIOD
+            if self._stopped_at is None or now - self._stopped_at > self.retry_after:
+                self._draw_picture(passed)
 
-    def _try(self, act: Callable[[], None]) -> None:
-        """Do something; whatever is wrong with it is told, and the page lives on."""
+    def _fulfil(self, request: Action) -> None:
+        """Act on a request; the pictures go on if an error had stopped them."""
+        self.errors.run("the last request failed", lambda: self._act_or_refuse(request))
+        self._stopped_at = None
+
+    def _act_or_refuse(self, request: Action) -> None:
         try:
-            act()
+            request()
         except REFUSALS as error:
-            self.tell_refusal(str(error))
-        except Exception as error:
-            traceback.print_exc()
-            self.tell_refusal(f"a fault of this program: {type(error).__name__}: {error}")
+            self.show_refusal(str(error))
+
+    def _draw_picture(self, passed: float) -> None:
+        """Draw the next picture; after an error no more, for the same would fail again."""
+        drawn = self.errors.run("drawing stopped", lambda: self.advance(passed))
+        self._stopped_at = None if drawn else time.monotonic()

@@ -1,1 +1,1 @@
-"""The panel beside the scene: tabs, buttons, board and plots."""
+"""The panels beside the scene: tabs, buttons, dashboard and plots."""

@@ -1,4 +1,4 @@
-"""The buttons and sliders of the page; each calls back, none decides."""
+"""The buttons and sliders of the page; they only pass on what a visitor does."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,15 +7,15 @@ from typing import Any
 from rover_physics.rover.model import Rover
 from rover_planner.studies.rover_values import RoverValue, get_value, list_values, rover_to_dict
 from rover_planner.viewer.state.playback import SPEEDS
-from rover_planner.viewer.state.visitor_requests import Act
+from rover_planner.viewer.state.visitor_requests import Action
 
 
 @dataclass(frozen=True)
-class PlayerActions:
-    """What the player's controls do."""
+class PlaybackActions:
+    """What the controls of the playback do."""
 
-    buttons: dict[str, Act]
-    """What is done by the name of the button: PLAY_BUTTONS and STEP_BUTTONS."""
+    buttons: dict[str, Action]
+    """By the name of the button, of PLAY_BUTTONS and STEP_BUTTONS."""
     seek: Callable[[float], None]
     """Goes to a time [s]."""
     set_speed: Callable[[float], None]
@@ -26,53 +26,59 @@ PLAY_BUTTONS = ("Rewind", "Play", "Pause", "Fast forward")
 STEP_BUTTONS = ("Step back", "Step", "To the start")
 
 
-def on_visit(control: Any, act: Callable[[Any], None]) -> None:
-    """Call `act` with each value that a visitor gives a control; it has to be quick.
+def on_visitor_input(control: Any, action: Callable[[Any], None]) -> None:
+    """Call a quick action with each value that a visitor gives a control.
 
-    The value is read at once, on the loop that received it: in a thread of its own, as callbacks
-    otherwise are called, the page may have put another value there before.
+    The value is read at once, on the loop that received it. Callbacks are otherwise called in a
+    thread of their own, before which the page may have set another value.
     """
 
-    async def take(event: Any) -> None:
+    async def read(event: Any) -> None:
         if event.client is not None:
-            act(event.target.value)
+            action(event.target.value)
 
-    control.on_update(take)
+    control.on_update(read)
 
 
-class Player:
+class PlaybackControls:
     """Play, pause, step, rewind, fast forward, speed and a scrubber."""
 
-    def __init__(self, gui: Any, actions: PlayerActions, speed: float):
+    def __init__(self, gui: Any, actions: PlaybackActions, speed: float):
         """Add the controls to the container that is open."""
         for label, names in (("Playback", PLAY_BUTTONS), ("Waypoint", STEP_BUTTONS)):
             group = gui.add_button_group(label, names)
             group.on_click(lambda event: actions.buttons[event.target.value]())
         self._scrubber = gui.add_slider("Time [s]", 0.0, 1.0, 0.1, 0.0)
-        on_visit(self._scrubber, actions.seek)
+        on_visitor_input(self._scrubber, actions.seek)
         speeds = [f"{s} x" for s in SPEEDS]
         self._speed = gui.add_dropdown("Speed", speeds, initial_value=f"{speed:g} x")
         self._speed.on_update(
             lambda event: actions.set_speed(float(event.target.value.removesuffix(" x")))
         )
 
-    def show(self, time: float, duration: float, *, anew: bool = False) -> None:
-        """Move the scrubber to a time of a journey [s]; `anew` even if it was put there."""
-        if anew:
+    def move_scrubber(self, time: float, duration: float, *, resend: bool = False) -> None:
+        """Move the scrubber to a time of a drive [s].
+
+        Args:
+            time: The time.
+            duration: Duration of the drive.
+            resend: Whether to send the time even if the scrubber has it already.
+        """
+        if resend:
             # Another time may have been on its way to the browser when the visitor chose this one,
             # and a value is sent only where it changes.
             self._scrubber.value = self._scrubber.min
-        longest = max(round(duration, 1), 0.1)
-        if longest < self._scrubber.max:
-            self._scrubber.value = min(round(time, 1), longest)
-            self._scrubber.max = longest
+        end = max(round(duration, 1), 0.1)
+        if end < self._scrubber.max:
+            self._scrubber.value = min(round(time, 1), end)
+            self._scrubber.max = end
         else:
-            self._scrubber.max = longest
-            self._scrubber.value = min(round(time, 1), longest)
+            self._scrubber.max = end
+            self._scrubber.value = min(round(time, 1), end)
 
 
 class RoverSliders:
-    """A slider with its unit for each value of the rover that can be changed."""
+    """A slider for each number of the rover that can be changed."""
 
     def __init__(self, gui: Any, rover: Rover, change: Callable[[RoverValue, float], None]):
         """Add a folder for each part of the rover to the container that is open."""
@@ -87,11 +93,11 @@ class RoverSliders:
         self, gui: Any, value: RoverValue, now: float, change: Callable[[RoverValue, float], None]
     ) -> None:
         slider = gui.add_slider(value.label, value.low, value.high, value.step, now)
-        on_visit(slider, lambda number: change(value, float(number)))
+        on_visitor_input(slider, lambda number: change(value, float(number)))
         self._sliders[value] = slider
 
     def show(self, rover: Rover) -> None:
-        """Show the values of a rover, after one was refused."""
+        """Move the sliders to the values of a rover."""
         data = rover_to_dict(rover)
         for value, slider in self._sliders.items():
             now = get_value(data, value.keys[0])

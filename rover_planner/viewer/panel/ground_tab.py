@@ -1,4 +1,4 @@
-"""The tab about ground and path: what clicks set, which path is shown, what the ground shows."""
+"""The tab of ground and path: what a click sets, the path that is shown, the ground's colours."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,9 +6,9 @@ from typing import Any
 
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.planning.path_query import Candidate
-from rover_planner.viewer.scene.ground_mesh import Ground
+from rover_planner.viewer.state.colours import ColourScale
 from rover_planner.viewer.state.layers import HEIGHT, LAYERS
-from rover_planner.viewer.state.visitor_requests import Act
+from rover_planner.viewer.state.visitor_requests import Action
 
 NO_SOIL = "none (Coulomb)"
 BEST = "best"
@@ -17,16 +17,16 @@ POLICIES = {"equal on all wheels": "equal", "traction control": "optimal"}
 
 @dataclass(frozen=True)
 class GroundActions:
-    """What is done with ground and path."""
+    """What the controls of the tab do."""
 
-    recolour: Act
-    """Colours the ground anew."""
+    recolour: Action
+    """Colours the ground again."""
     show_forces: Callable[[bool], None]
     """Shows or hides the arrows."""
     follow: Callable[[bool], None]
-    """Lets the cameras go along with the rover."""
+    """Whether the cameras move with the rover."""
     choose_path: Callable[[int | None], None] = lambda _index: None
-    """Shows a candidate by its index; None for the best."""
+    """Shows a candidate by its index; for None the best."""
     set_options: Callable[..., None] = lambda **_changes: None
     """Changes fields of PathQueryOptions."""
 
@@ -34,11 +34,17 @@ class GroundActions:
 class GroundTab:
     """Drop-downs and boxes, and the scale of the colours."""
 
-    def __init__(self, gui: Any, actions: GroundActions, *, plans: bool = True):
-        """Add them to the container that is open; what is about paths only where it `plans`."""
+    def __init__(self, gui: Any, actions: GroundActions, *, has_paths: bool = True):
+        """Add the tab's contents to the container that is open.
+
+        Args:
+            gui: The GUI of viser.
+            actions: What the controls do.
+            has_paths: Whether the page plans paths, so that there are controls for them.
+        """
         self._gui = gui
-        if plans:
-            self._add_path(actions)
+        if has_paths:
+            self._add_path_controls(actions)
         self._layer = gui.add_dropdown("Colour by", tuple(LAYERS), initial_value=HEIGHT)
         self._heading = gui.add_slider("Heading [deg]", -180, 180, 5, 0)
         for control in (self._layer, self._heading):
@@ -49,7 +55,7 @@ class GroundTab:
         follow = gui.add_checkbox("Follow rover", False)
         follow.on_update(lambda event: actions.follow(event.target.value))
 
-    def _add_path(self, actions: GroundActions) -> None:
+    def _add_path_controls(self, actions: GroundActions) -> None:
         gui = self._gui
         self._clicks = gui.add_dropdown("A click sets", ("goal", "start"), initial_value="goal")
         self._choice = gui.add_dropdown("Path shown", (BEST,))
@@ -76,21 +82,21 @@ class GroundTab:
 
     @property
     def layer(self) -> str:
-        """Name of the layer that the ground is coloured by."""
+        """Name of the layer that colours the ground."""
         return str(self._layer.value)
 
     @property
     def is_predicted(self) -> bool:
-        """Whether that layer depends on the rover."""
+        """Whether the layer is predicted for the rover."""
         return LAYERS[self.layer].score is not None
 
     @property
     def heading(self) -> float:
-        """Heading at which layers are predicted [deg]."""
+        """Heading of the rover for predicted layers [deg]."""
         return float(self._heading.value)
 
     def list_paths(self, candidates: Sequence[Candidate]) -> None:
-        """List the paths to choose from."""
+        """List the paths to choose from, and choose the best."""
         names = [BEST]
         for k, candidate in enumerate(candidates):
             word = "passable" if candidate.verdict.traversable else "refused"
@@ -98,8 +104,8 @@ class GroundTab:
         self._choice.options = tuple(names)
         self._choice.value = BEST
 
-    def show_scale(self, ground: Ground) -> None:
-        """Show what the colours of the ground stand for."""
+    def show_scale(self, scale: ColourScale) -> None:
+        """Show what the colours of the ground mean."""
         name = f"{self.layer}" + (f" at heading {self.heading:g} deg" if self.is_predicted else "")
         self._scale.content = (
             '<div id="scale" style="font-size:12px;padding:4px 8px">'
@@ -107,8 +113,8 @@ class GroundTab:
             '<div style="height:10px;background:linear-gradient(90deg,#00224e,#434e6c,#7d7c78,'
             '#bcae6c,#fee838)"></div>'
             '<div style="display:flex;justify-content:space-between">'
-            f"<span>{ground.low:.2f} {ground.unit}</span>"
-            f"<span>{ground.high:.2f} {ground.unit}</span></div>"
-            '<div style="opacity:.7">grey: the rover cannot stand, or not known; lines every '
+            f"<span>{scale.low:.2f} {scale.unit}</span>"
+            f"<span>{scale.high:.2f} {scale.unit}</span></div>"
+            '<div style="opacity:.7">grey: unknown, or the rover cannot stand; a line every '
             "metre</div></div>"
         )

@@ -1,16 +1,16 @@
-"""What a live rover has gone through since it is followed, for the plots."""
+"""The values of a live rover since it is followed, for the plots."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.viewer.panel.charts import CHARTS
-from rover_planner.viewer.state.journey import Frame
+from rover_planner.viewer.panel.plots import PLOTS
+from rover_planner.viewer.state.trajectory import RoverState
 
 Floats = NDArray[np.float64]
 SPACING = 0.01
-"""Way between two entries [m]."""
-LONGEST = 20_000
-"""Entries that are kept, the latest ones: 200 m."""
+"""Distance between two entries [m]."""
+MAX_ENTRIES = 20_000
+"""Most entries, of which the oldest go first: the last 200 m."""
 
 
 class History:
@@ -18,24 +18,28 @@ class History:
 
     def __init__(self) -> None:
         self._distance: list[float] = []
-        self._values: dict[str, list[Floats]] = {name: [] for name in CHARTS}
+        self._values: dict[str, list[Floats]] = {name: [] for name in PLOTS}
 
-    def add(self, frame: Frame) -> bool:
-        """Keep a frame if the rover has moved on and its forces are known; return whether."""
-        known = all(np.isfinite(getattr(frame, name)).all() for name in CHARTS)
-        if not known or (self._distance and frame.distance < self._distance[-1] + SPACING):
+    def add(self, state: RoverState) -> bool:
+        """Add a state if all its plotted values are known and it is SPACING beyond the last one.
+
+        Returns:
+            Whether it was added.
+        """
+        known = all(np.isfinite(getattr(state, name)).all() for name in PLOTS)
+        if not known or (self._distance and state.distance < self._distance[-1] + SPACING):
             return False
-        self._distance = [*self._distance[-LONGEST:], frame.distance]
+        self._distance = [*self._distance[-MAX_ENTRIES:], state.distance]
         for name, rows in self._values.items():
-            self._values[name] = [*rows[-LONGEST:], np.asarray(getattr(frame, name))]
+            self._values[name] = [*rows[-MAX_ENTRIES:], np.asarray(getattr(state, name))]
         return True
 
     @property
     def distance(self) -> Floats:
-        """(n,) way of the entries [m]."""
+        """(n,) distances driven at the entries [m]."""
         return np.array(self._distance)
 
     @property
     def values(self) -> dict[str, Floats]:
-        """(n, ...) for each name of CHARTS."""
+        """(n, ...) for each name of PLOTS."""
         return {name: np.array(rows) for name, rows in self._values.items()}

@@ -1,1 +1,1 @@
-"""The 3-D scene: ground, rover, forces, and what is drawn over the ground."""
+"""The 3-D scene: ground, rover, forces, and the paths over the ground."""

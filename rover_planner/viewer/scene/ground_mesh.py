@@ -1,4 +1,4 @@
-"""The terrain as a mesh with a picture of a layer on it, and where a click on it is."""
+"""The terrain as a mesh with a layer as its texture, and where a ray meets the ground."""
 
 import json
 import struct
@@ -13,76 +13,78 @@ from scipy import ndimage
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.scene.colours import ramp
-from rover_planner.viewer.state.layers import LAYERS, SLOPE, predict_layer, slope_of, span_of
+from rover_planner.viewer.state.colours import ColourScale, map_colours
+from rover_planner.viewer.state.layers import (
+    LAYERS,
+    SLOPE,
+    colour_span,
+    compute_slope,
+    predict_layer,
+)
 
 Floats = NDArray[np.float64]
 MAX_CELLS = 250
-"""Cells along a side beyond which only every second, third, ... is drawn."""
-MAX_SCORED = 100
-"""The same for places where the model is asked."""
+"""Most cells along a side of the mesh; of more, every second, third, ... is drawn."""
+MAX_PREDICTED = 100
+"""The same for the points at which the model predicts a layer."""
 MAX_PIXELS = 1200
-"""Pixels along a side of the picture."""
+"""Most pixels along a side of the texture."""
 LIGHT = (-0.6, 0.5, 1.0)
-"""Where light comes from on the picture."""
+"""Direction to the light of the hillshade."""
 RELIEF = 1.3
-"""How strong light and shadow are; 1 is that of a matt surface."""
+"""Contrast of the hillshade; 1 is that of a matt surface."""
 LINE_SHADE = 0.82
-"""How dark the lines are that are drawn every metre."""
+"""Brightness of the grid lines, one every metre, relative to the ground."""
 
 
 @dataclass(frozen=True)
-class Ground:
-    """The ground as it is drawn, and what its colours stand for."""
+class GroundMesh:
+    """The ground as it is drawn."""
 
     mesh: trimesh.Trimesh
-    """The surface with its picture."""
-    low: float
-    """Value of the first colour."""
-    high: float
-    """Value of the last colour."""
-    unit: str
-    """Unit of both."""
+    """The surface with its texture."""
+    scale: ColourScale
+    """What its colours mean."""
 
 
-def draw_ground(
+def build_ground_mesh(
     rover: Rover,
     terrain: Terrain,
     layer_name: str,
     heading: float = 0.0,
     options: SweepOptions = DEFAULT_OPTIONS,
-) -> Ground:
-    """Return the ground in the colours of a layer; unknown cells are left out.
+) -> GroundMesh:
+    """Return the ground in the colours of a layer, without unknown cells.
 
     Args:
         rover: The rover, for layers that are predicted.
         terrain: The ground.
         layer_name: One of LAYERS.
-        heading: Of the rover, where layers are predicted [rad].
-        options: What the model is asked with for those.
+        heading: Yaw of the rover, where layers are predicted [rad].
+        options: Options of the model for those.
 
     Raises:
         RoverError: The model refuses an option.
     """
     layer = LAYERS[layer_name]
-    x, y, heights = _thin_out(terrain, MAX_CELLS)
+    x, y, heights = _subsample(terrain, MAX_CELLS)
     if layer.score is not None:
-        coarse_x, coarse_y, _ = _thin_out(terrain, MAX_SCORED)
+        coarse_x, coarse_y, _ = _subsample(terrain, MAX_PREDICTED)
         at = (coarse_x, coarse_y)
         values = predict_layer(layer, rover, terrain, heading, at, options)
-        low, high = span_of(layer, rover, values)
-        colours = _stretch(ramp(values, low, high), at, (x, y))
+        low, high = colour_span(layer, rover, values)
+        colours = _resample_nearest(map_colours(values, low, high), at, (x, y))
     else:
-        values = slope_of(x, y, heights) if layer_name == SLOPE else heights
-        low, high = span_of(layer, rover, values)
-        colours = ramp(values, low, high)
-    shaded = _shade(colours, x, y, heights)
-    return Ground(_mesh(x, y, heights, _picture(shaded, x, y)), low, high, layer.unit)
+        values = compute_slope(x, y, heights) if layer_name == SLOPE else heights
+        low, high = colour_span(layer, rover, values)
+        colours = map_colours(values, low, high)
+    texture = _texture(_hillshade(colours, x, y, heights), x, y)
+    return GroundMesh(_mesh(x, y, heights, texture), ColourScale(low, high, layer.unit))
 
 
-def _thin_out(terrain: Terrain, most: int) -> tuple[Floats, Floats, Floats]:
-    """Return x (nx,), y (ny,) and heights (ny, nx) [m] of at most so many cells a side."""
-    stride = -(-max(terrain.elevation.shape) // most)
+def _subsample(terrain: Terrain, max_cells: int) -> tuple[Floats, Floats, Floats]:
+    """Return x (nx,), y (ny,) and heights (ny, nx) [m] of at most `max_cells` cells a side."""
+    stride = -(-max(terrain.elevation.shape) // max_cells)
     heights = terrain.elevation[::stride, ::stride]
     ny, nx = heights.shape
     step = stride * terrain.resolution
@@ -90,10 +92,10 @@ def _thin_out(terrain: Terrain, most: int) -> tuple[Floats, Floats, Floats]:
     return x + step * np.arange(nx), y + step * np.arange(ny), heights
 
 
-def _stretch(
+def _resample_nearest(
     colours: NDArray[np.uint8], given: tuple[Floats, Floats], wanted: tuple[Floats, Floats]
 ) -> NDArray[np.uint8]:
-    """Return colours (ny, nx, 3) at other places, those of the nearest place given."""
+    """Return colours (ny, nx, 3) at wanted x and y, each that of the nearest given point."""
     columns, rows = (
         np.clip(np.rint((at - was[0]) / (was[1] - was[0])).astype(int), 0, len(was) - 1)
         for at, was in zip(wanted, given, strict=True)
@@ -101,8 +103,13 @@ def _stretch(
     return colours[rows][:, columns]
 
 
-def _shade(colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats) -> NDArray[np.uint8]:
-    """Return colours as if lit from LIGHT: drawn into the picture, it costs the page nothing."""
+def _hillshade(
+    colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats
+) -> NDArray[np.uint8]:
+    """Return colours (ny, nx, 3) as if lit from LIGHT.
+
+    Light that is part of the texture costs the page nothing.
+    """
     if min(heights.shape) < 2:
         return colours
     along_y, along_x = np.gradient(np.nan_to_num(heights), y, x)
@@ -114,8 +121,8 @@ def _shade(colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats) ->
     return np.clip(colours * factor[..., None], 0, 255).astype(np.uint8)
 
 
-def _picture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
-    """Return a finer picture with thin lines every metre, for the sense of scale."""
+def _texture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
+    """Return a finer picture of the colours with thin lines every metre."""
     factor = max(1, min(8, MAX_PIXELS // max(colours.shape[:2])))
     fine = ndimage.zoom(colours, (factor, factor, 1), order=1, mode="nearest", grid_mode=True)
     for axis, places in enumerate((y, x)):
@@ -127,7 +134,7 @@ def _picture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uin
     return np.asarray(fine, np.uint8)
 
 
-def _mesh(x: Floats, y: Floats, heights: Floats, picture: NDArray[np.uint8]) -> trimesh.Trimesh:
+def _mesh(x: Floats, y: Floats, heights: Floats, texture: NDArray[np.uint8]) -> trimesh.Trimesh:
     from PIL import Image
 
     gx, gy = np.meshgrid(x, y)
@@ -135,7 +142,7 @@ def _mesh(x: Floats, y: Floats, heights: Floats, picture: NDArray[np.uint8]) -> 
     ny, nx = heights.shape
     u, v = np.meshgrid((np.arange(nx) + 0.5) / nx, (np.arange(ny) + 0.5) / ny)
     material = trimesh.visual.material.PBRMaterial(
-        baseColorTexture=Image.fromarray(picture[::-1]), metallicFactor=0.0, roughnessFactor=1.0
+        baseColorTexture=Image.fromarray(texture[::-1]), metallicFactor=0.0, roughnessFactor=1.0
     )
     visual = trimesh.visual.TextureVisuals(
         uv=np.column_stack([u.ravel(), v.ravel()]), material=material
@@ -143,11 +150,20 @@ def _mesh(x: Floats, y: Floats, heights: Floats, picture: NDArray[np.uint8]) -> 
     return trimesh.Trimesh(vertices, _faces(np.isfinite(heights)), visual=visual, process=False)
 
 
-def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
-    """Return a mesh as a binary glTF file whose picture is shown as it is, without lights.
+def _faces(known: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the triangles (m, 3) between cells that are known (ny, nx)."""
+    index = np.arange(known.size).reshape(known.shape)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+    whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, 1:] & known[1:, :-1]
+    lower = np.column_stack([a[whole], b[whole], c[whole]])
+    return np.concatenate([lower, np.column_stack([a[whole], c[whole], d[whole]])])
 
-    A matt surface over the whole screen takes most of the time of a page that is drawn without a
-    graphics card. glTF has the extension KHR_materials_unlit for it, which trimesh does not write.
+
+def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
+    """Return a mesh as a binary glTF file whose texture is shown without lights.
+
+    Without a graphics card, a matt surface that fills the screen takes most of the time of a
+    picture. The glTF extension KHR_materials_unlit avoids that; trimesh does not write it.
     """
     glb: Any = mesh.export(file_type="glb")
     length = struct.unpack_from("<I", glb, 12)[0]
@@ -161,22 +177,13 @@ def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
 
 
-def _faces(known: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return the triangles (m, 3) between cells that are known."""
-    index = np.arange(known.size).reshape(known.shape)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-    whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, 1:] & known[1:, :-1]
-    lower = np.column_stack([a[whole], b[whole], c[whole]])
-    return np.concatenate([lower, np.column_stack([a[whole], c[whole], d[whole]])])
-
-
-def hit_ground(terrain: Terrain, origin: Floats, direction: Floats) -> Floats | None:
+def intersect_ground(terrain: Terrain, origin: Floats, direction: Floats) -> Floats | None:
     """Return where a ray first meets known ground, x and y (2,) [m]; None if it does not.
 
     Args:
         terrain: The ground.
         origin: (3,) start of the ray [m].
-        direction: (3,) its direction.
+        direction: (3,) its direction, of any length.
     """
     direction = direction / np.linalg.norm(direction)
     ny, nx = terrain.elevation.shape

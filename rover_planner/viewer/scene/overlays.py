@@ -1,88 +1,113 @@
-"""What is drawn over the ground: candidate paths, where they are refused, start and goal."""
+"""Drawings over the ground: candidate paths, ghosts where they are refused, start and goal."""
 
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.quaternions import wxyz_from_rpy
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.path_query import Candidate, PathAnswer
-from rover_planner.viewer.scene.colours import PASSABLE, REFUSED, UNKNOWN, Colour, mix
-from rover_planner.viewer.scene.quaternions import of_attitude
-from rover_planner.viewer.scene.rover_figure import outline_mesh
+from rover_planner.planning.path_query import Candidate
+from rover_planner.viewer.scene.rover_visual import make_ghost
+from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
 
 Floats = NDArray[np.float64]
 MAX_GHOSTS = 4
-"""Ghosts at a time; more hide what they point at."""
+"""Most ghosts at a time; more of them hide the ground."""
 MAX_POINTS = 250
-"""Points of a path that are drawn."""
+"""Most points of a path that are drawn."""
 LABEL_WIDTH = 30
-"""Letters in a line of a label."""
-FADED = 0.6
-"""How much of the colour of a path is taken away behind the place where it is refused."""
+"""Most letters in a line of a label."""
+FADE = 0.6
+"""Share of white in the colour of a path behind the waypoint that is refused."""
+WHITE = (255, 255, 255)
+CLEARANCE = 0.15
+"""Height of a path above the ground [wheel radii]."""
 
 
 class PathOverlay:
-    """Candidate paths by verdict, and ghosts of the rover where they are refused."""
+    """Candidate paths in the colours of their verdicts, and ghosts of the rover on them."""
 
     def __init__(self, scene: Any):
+        """Draw nothing yet."""
         self._scene = scene
         self._nodes: list[Any] = []
 
-    def show(self, rover: Rover, terrain: Terrain, answer: PathAnswer, shown: Candidate) -> None:
-        """Draw an answer anew; `shown` is the path that is played, and drawn thicker."""
+    def show(
+        self, rover: Rover, terrain: Terrain, candidates: Sequence[Candidate], shown: int
+    ) -> None:
+        """Draw candidate paths instead of what was drawn before.
+
+        The label of a ghost gives the whole reason on the shown path, else the path's number and
+        the code of the reason.
+
+        Args:
+            rover: The rover.
+            terrain: The ground.
+            candidates: The paths.
+            shown: Index of the path that is played; it is drawn wider than the others.
+        """
         self.clear()
-        lift = 0.15 * rover.wheel.radius
-        others = [one for one in answer.candidates if one.poses is not shown.poses]
-        for k, candidate in enumerate([*others, shown]):
-            self._draw_candidate(f"/paths/{k}", terrain, candidate, lift, candidate is shown)
-        for k, (candidate, row) in enumerate(choose_ghosts(rover, [shown, *others])):
-            verdict = candidate.verdict
-            same = (one.poses is candidate.poses for one in answer.candidates)
-            text = f"path {list(same).index(True) + 1}: {verdict.codes[row].replace('_', ' ')}"
-            if candidate is shown:
+        height = CLEARANCE * rover.wheel.radius
+        for index in sorted(range(len(candidates)), key=lambda index: index == shown):
+            name = f"/paths/{index}"
+            self._draw_candidate(name, terrain, candidates[index], height, index == shown)
+        for k, (index, row) in enumerate(choose_ghosts(rover, candidates, shown)):
+            verdict = candidates[index].verdict
+            if index == shown:
                 text = "\n".join(textwrap.wrap(verdict.reasons[row], LABEL_WIDTH))
-            self._draw_ghost(f"/ghosts/{k}", rover, terrain, candidate, row, text)
-        for name, pose in (("start", shown.poses[0]), ("goal", shown.poses[-1])):
+            else:
+                text = f"path {index + 1}: {verdict.codes[row].replace('_', ' ')}"
+            self._draw_ghost(f"/ghosts/{k}", rover, terrain, candidates[index], row, text)
+        poses = candidates[shown].poses
+        for name, pose in (("start", poses[0]), ("goal", poses[-1])):
             self._draw_flag(name, terrain, pose, rover.wheel.radius)
 
     def show_plan(self, rover: Rover, terrain: Terrain, plan: Floats | None) -> None:
-        """Draw one path (n, 3) that somebody else planned, or nothing."""
+        """Draw a path (n, 3) without a verdict of ours, or none, instead of what was drawn."""
         self.clear()
         if plan is not None:
-            lift = 0.15 * rover.wheel.radius
-            self._draw_line("/paths/plan", terrain, plan[:, :2], PASSABLE, lift, True)
+            height = CLEARANCE * rover.wheel.radius
+            self._draw_line("/paths/plan", terrain, plan[:, :2], PASSABLE, height, True)
             self._draw_flag("goal", terrain, plan[-1], rover.wheel.radius)
 
     def clear(self) -> None:
-        """Take away all that was drawn."""
+        """Remove all that was drawn."""
         for node in self._nodes:
             node.remove()
         self._nodes.clear()
 
     def _draw_candidate(
-        self, name: str, terrain: Terrain, candidate: Candidate, lift: float, wide: bool
+        self, name: str, terrain: Terrain, candidate: Candidate, height: float, wide: bool
     ) -> None:
         """Draw a path in the colour of its verdict, faded from where it is refused."""
-        places, verdict = candidate.poses[:, :2], candidate.verdict
+        points, verdict = candidate.poses[:, :2], candidate.verdict
         if verdict.traversable:
-            self._draw_line(name, terrain, places, PASSABLE, lift, wide)
+            self._draw_line(name, terrain, points, PASSABLE, height, wide)
             return
         end = verdict.first_failure
-        beyond = mix(REFUSED, (255, 255, 255), FADED)
-        self._draw_line(name, terrain, places[: end + 1], REFUSED, lift, wide)
-        self._draw_line(f"{name}-beyond", terrain, places[end:], beyond, lift, wide)
+        faded = blend(REFUSED, WHITE, FADE)
+        self._draw_line(name, terrain, points[: end + 1], REFUSED, height, wide)
+        self._draw_line(f"{name}-beyond", terrain, points[end:], faded, height, wide)
 
     def _draw_line(
-        self, name: str, terrain: Terrain, places: Floats, colour: Colour, lift: float, wide: bool
+        self,
+        name: str,
+        terrain: Terrain,
+        points: Floats,
+        colour: Colour,
+        height: float,
+        wide: bool,
     ) -> None:
-        places = places[_thin(len(places))]
-        heights = terrain.elevation_at(places[:, 0], places[:, 1])
-        points = np.column_stack([places, heights + lift])[np.isfinite(heights)]
-        if len(points) > 1:
-            segments = np.stack([points[:-1], points[1:]], axis=1)
+        """Draw a line through points (n, 2) at a height above the ground [m]."""
+        points = points[_thin(len(points))]
+        ground = terrain.elevation_at(points[:, 0], points[:, 1])
+        line = np.column_stack([points, ground + height])[np.isfinite(ground)]
+        if len(line) > 1:
+            segments = np.stack([line[:-1], line[1:]], axis=1)
             width = 6.0 if wide else 2.5
             self._nodes.append(
                 self._scene.add_line_segments(
@@ -99,29 +124,30 @@ class PathOverlay:
         row: int,
         text: str,
     ) -> None:
-        """Show the rover at a waypoint that is refused, or over it where it does not settle."""
+        """Draw the rover at a waypoint; level above the ground where it does not settle."""
         prediction = candidate.prediction
         x, y, yaw = prediction.poses[row]
         if prediction.settled[row]:
-            place = prediction.position[row]
-            attitude = of_attitude(prediction.roll[row], prediction.pitch[row], yaw)
+            position = prediction.position[row]
+            attitude = wxyz_from_rpy(prediction.roll[row], prediction.pitch[row], yaw)
         else:
             standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
-            place = np.array([x, y, _height(terrain, x, y) + standing])
-            attitude = of_attitude(0.0, 0.0, yaw)
-        mesh = outline_mesh(rover)
+            position = np.array([x, y, _ground_height(terrain, x, y) + standing])
+            attitude = wxyz_from_rpy(0.0, 0.0, yaw)
+        mesh = make_ghost(rover)
         ghost = self._scene.add_mesh_simple(
             name, mesh.vertices, mesh.faces, color=REFUSED, opacity=0.3, cast_shadow=False,
-            position=place, wxyz=attitude,
+            position=position, wxyz=attitude,
         )  # fmt: skip
         above = np.array([0.0, 0.0, 3.0 * rover.wheel.radius])
         self._scene.add_label(
             f"{name}/reason", text, position=above, anchor="bottom-center", font_screen_scale=0.8
         )
-        self._nodes.append(ghost)  # what is below it goes with it
+        self._nodes.append(ghost)  # its label is removed with it
 
     def _draw_flag(self, name: str, terrain: Terrain, pose: Floats, radius: float) -> None:
-        foot = np.array([pose[0], pose[1], _height(terrain, pose[0], pose[1])])
+        """Draw a pole of six wheel radii [m] with a name at a pose."""
+        foot = np.array([pose[0], pose[1], _ground_height(terrain, pose[0], pose[1])])
         top = foot + np.array([0.0, 0.0, 6.0 * radius])
         pole = self._scene.add_line_segments(
             f"/flags/{name}", np.array([[foot, top]]), UNKNOWN, thickness=0.1 * radius
@@ -131,32 +157,38 @@ class PathOverlay:
 
 
 def _thin(count: int) -> NDArray[np.intp]:
-    """Return rows of a path to draw, the first and the last among them."""
+    """Return at most MAX_POINTS rows of `count`, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, MAX_POINTS)).round().astype(np.intp))
 
 
-def choose_ghosts(rover: Rover, candidates: list[Candidate]) -> list[tuple[Candidate, int]]:
-    """Choose waypoints to show as ghosts: at most MAX_GHOSTS, one and a half wheelbases apart.
+def choose_ghosts(
+    rover: Rover, candidates: Sequence[Candidate], shown: int
+) -> list[tuple[int, int]]:
+    """Choose waypoints to show as ghosts: at most MAX_GHOSTS, 1.5 wheelbases apart.
 
-    Of each path the places come in order where a stretch of refused waypoints begins; the first
-    failures of all paths come before what lies further along them.
+    A ghost stands where a stretch of refused waypoints begins. The first failures of all paths
+    come before later ones, and those of the shown path before those of the others.
+
+    Args:
+        rover: The rover.
+        candidates: The paths.
+        shown: Index of the path that is played.
 
     Returns:
-        Paths and the index of a refused waypoint on each.
+        Indices of candidates, and of a refused waypoint on each.
     """
-    stretches = [_refused_stretches(candidate.verdict.reasons) for candidate in candidates]
-    first = [(one, rows[0]) for one, rows in zip(candidates, stretches, strict=True) if rows]
-    later = [
-        (one, row) for one, rows in zip(candidates, stretches, strict=True) for row in rows[1:]
-    ]
+    order = [shown, *(k for k in range(len(candidates)) if k != shown)]
+    stretches = {index: _refused_stretches(candidates[index].verdict.reasons) for index in order}
+    first = [(index, rows[0]) for index, rows in stretches.items() if rows]
+    later = [(index, row) for index, rows in stretches.items() for row in rows[1:]]
     wheels = rover.suspension.wheels
-    apart = 1.5 * (wheels["front"][0] - wheels["rear"][0])
-    chosen: list[tuple[Candidate, int]] = []
-    for candidate, row in [*first, *later]:
-        here = candidate.poses[row, :2]
-        taken = [np.hypot(*(one.poses[other, :2] - here)) for one, other in chosen]
-        if len(chosen) < MAX_GHOSTS and all(away >= apart for away in taken):
-            chosen.append((candidate, row))
+    min_distance = 1.5 * (wheels["front"][0] - wheels["rear"][0])
+    chosen: list[tuple[int, int]] = []
+    for index, row in [*first, *later]:
+        here = candidates[index].poses[row, :2]
+        distances = [np.hypot(*(candidates[k].poses[other, :2] - here)) for k, other in chosen]
+        if len(chosen) < MAX_GHOSTS and all(distance >= min_distance for distance in distances):
+            chosen.append((index, row))
     return chosen
 
 
@@ -166,7 +198,7 @@ def _refused_stretches(reasons: tuple[str, ...]) -> list[int]:
     return np.flatnonzero(refused & ~np.concatenate([[False], refused[:-1]])).tolist()
 
 
-def _height(terrain: Terrain, x: float, y: float) -> float:
-    """Return the height of the ground at a place [m], 0 where it is not known."""
+def _ground_height(terrain: Terrain, x: float, y: float) -> float:
+    """Return the height of the ground at a point [m], 0 where it is not known."""
     height = float(terrain.elevation_at(x, y))
     return height if np.isfinite(height) else 0.0

@@ -1,1 +1,1 @@
-"""What the page shows, as data: session, journey, clock, layers, requests of visitors."""
+"""The data of the page: session, trajectory, playback, layers, colours, requests of visitors."""

@@ -1,4 +1,4 @@
-"""What the ground can be coloured by: its shape, and what the model predicts over each cell."""
+"""Layers that colour the ground: its shape, and what the model predicts at each cell."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,22 +13,24 @@ from rover_physics.rover.model import Rover
 
 Floats = NDArray[np.float64]
 STEEP = 35.0
-"""Slope from which on the ground has the last colour [deg]."""
+"""Slope of the last colour [deg]."""
 
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer: its unit, where its numbers come from and the range of its colours."""
+    """One layer: its unit, its values and the range of its colours."""
 
     unit: str
     """Unit for the scale, empty for none."""
     score: Callable[[Rover, PoseScores], Floats] | None = None
-    """Values from scores of the rover over the cells; None for layers of the ground alone."""
+    """Values from scores of the rover at the cells; None for layers of the ground alone."""
     span: Callable[[Rover], tuple[float, float]] | None = None
-    """Values of the first and last colour; None: the smallest and largest there are."""
+    """Values of the first and last colour; None: the smallest and largest value."""
 
 
 def _share(field: str) -> Layer:
+    """Return the layer of a field of `PoseScores` whose colours go from 0 to 1."""
+
     def values(_rover: Rover, scores: PoseScores) -> Floats:
         return np.asarray(getattr(scores, field), dtype=float)
 
@@ -60,19 +62,19 @@ LAYERS: Mapping[str, Layer] = {
     "belly clearance": Layer(
         "cm",
         lambda _rover, scores: 100.0 * np.asarray(scores.belly_clearance, dtype=float),
-        lambda rover: (0.0, 100.0 * (rover.belly.z - _foot(rover))),
+        lambda rover: (0.0, 100.0 * (rover.belly.z - _flat_ground(rover))),
     ),
 }
 """The layers by name."""
 
 
-def _foot(rover: Rover) -> float:
-    """Return the height of the ground under the wheels on flat ground, body frame [m]."""
+def _flat_ground(rover: Rover) -> float:
+    """Return the height of flat ground under the wheels, body frame [m]."""
     return rover.suspension.wheels["rear"][2] - rover.wheel.radius
 
 
-def slope_of(x: Floats, y: Floats, heights: Floats) -> Floats:
-    """Return the slope angle at each cell [deg]."""
+def compute_slope(x: Floats, y: Floats, heights: Floats) -> Floats:
+    """Return the slope (ny, nx) [deg] of heights (ny, nx) [m] at x (nx,) and y (ny,) [m]."""
     along_y, along_x = np.gradient(heights, y, x)
     return np.asarray(np.degrees(np.arctan(np.hypot(along_x, along_y))))
 
@@ -85,15 +87,15 @@ def predict_layer(
     at: tuple[Floats, Floats],
     options: SweepOptions,
 ) -> Floats:
-    """Return a predicted layer (ny, nx) with the rover over each place at a heading [rad].
+    """Return the values (ny, nx) of a predicted layer with the rover at each point.
 
     Args:
         layer: A layer with a score.
         rover: The rover.
         terrain: The ground.
-        heading: Of the body [rad].
-        at: x (nx,) and y (ny,) of the places [m].
-        options: What the model is asked with.
+        heading: Yaw of the body [rad].
+        at: x (nx,) and y (ny,) of the points [m].
+        options: Options of the model.
 
     Raises:
         RoverError: The model refuses an option.
@@ -104,8 +106,8 @@ def predict_layer(
     return np.asarray(layer.score(rover, score_poses(rover, terrain, poses, options)))
 
 
-def span_of(layer: Layer, rover: Rover, values: Floats) -> tuple[float, float]:
-    """Return the values that the first and the last colour stand for."""
+def colour_span(layer: Layer, rover: Rover, values: Floats) -> tuple[float, float]:
+    """Return the values of the first and the last colour of a layer with these values."""
     known = values[np.isfinite(values)]
     if layer.span is not None:
         return layer.span(rover)

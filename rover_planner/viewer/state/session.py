@@ -1,4 +1,4 @@
-"""What is looked at: a rover, a terrain, where from and where to, and what the model says."""
+"""The state behind the page: rover, terrain, start, goal, and the model's answer for them."""
 
 import dataclasses
 import time
@@ -25,22 +25,25 @@ from rover_planner.planning.path_query import (
     choose,
 )
 from rover_planner.studies.rover_values import with_value
-from rover_planner.viewer.state.journey import Journey
+from rover_planner.viewer.state.trajectory import Trajectory
 
 REFUSALS = (RoverError, PlanningError)
+"""Errors that say what is wrong with a request."""
 Pose = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Shown:
-    """The path that is shown, and how it was judged."""
+class ShownPath:
+    """The path that is shown, and its verdict."""
 
+    index: int
+    """Its index among the candidates of the last answer."""
     candidate: Candidate
-    """The path."""
-    journey: Journey
-    """What is played of it."""
-    judged: str
-    """What was judged for it and how long that took; empty where nothing was."""
+    """The path as it was judged last."""
+    trajectory: Trajectory
+    """The drive along it."""
+    summary: str
+    """What was judged and how long that took; empty for a recorded path."""
 
     @property
     def verdict(self) -> Verdict:
@@ -49,7 +52,7 @@ class Shown:
 
 
 class ViewSession:
-    """Keeps the last good state: what is refused changes nothing, and says why."""
+    """Keeps the last good state: a refused change alters nothing but `refusal`."""
 
     def __init__(
         self,
@@ -59,25 +62,33 @@ class ViewSession:
         goal: Pose,
         options: PathQueryOptions | None = None,
     ):
-        """Plan from start to goal, x, y [m] and yaw [rad] each.
+        """Plan from start to goal.
+
+        Args:
+            rover: The rover.
+            terrain: The ground.
+            start: x, y [m] and yaw [rad], map frame.
+            goal: The same.
+            options: How candidates are made and judged (default: 5 candidates, 0.5 m apart).
 
         Raises:
-            RoverError, PlanningError: The rover, the poses or the options make no sense.
+            RoverError, PlanningError: The rover, the poses or the options are invalid.
         """
         self.rover, self.terrain = rover, terrain
         self.start, self.goal = start, goal
         self.options = options or PathQueryOptions(count=5, spacing=0.5)
         self.arm_angles: dict[str, float] = {}
+        """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
         self.refusal = ""
-        """Why the last change was refused, empty where it was not."""
+        """Why the last change was refused, empty if it was not."""
         self.recorded = False
-        """Whether the path is a recorded one, so that no other is planned for it."""
+        """Whether the path is a recorded one, so that no other is planned."""
         self.answer: PathAnswer
-        self.shown: Shown
+        self.shown: ShownPath
         self._plan()
 
     def _plan(self) -> None:
-        """Judge the candidate paths, or the one path where a recorded one is looked at."""
+        """Judge all candidate paths, or the recorded path, and show the one that is chosen."""
         began = time.perf_counter()
         if self.recorded:
             poses = self.shown.candidate.poses
@@ -87,49 +98,72 @@ class ViewSession:
             self.answer = answer_path_query(
                 self.rover, self.terrain, self.start, self.goal, self.options, self.arm_angles
             )
-        passable = sum(one.verdict.traversable for one in self.answer.candidates)
+        passable = sum(candidate.verdict.traversable for candidate in self.answer.candidates)
         total = len(self.answer.candidates)
         words = f"{passable} of {total} candidate paths passable, judged in"
         if self.recorded:
             words = "recorded path judged again in"
-        self._show(self.answer.chosen, f"{words} {_milliseconds(began)}")
+        self._show(self.answer.nearest, self.answer.chosen, f"{words} {_milliseconds(began)}")
 
-    def _show(self, candidate: Candidate, judged: str) -> None:
-        journey = Journey(self.rover, candidate.prediction, candidate.verdict)
-        self.shown = Shown(candidate, journey, judged)
+    def _show(self, index: int, candidate: Candidate, summary: str) -> None:
+        trajectory = Trajectory(self.rover, candidate.prediction, candidate.verdict)
+        self.shown = ShownPath(index, candidate, trajectory, summary)
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The candidates of the last answer, with the shown one as it was judged last."""
+        candidates = list(self.answer.candidates)
+        candidates[self.shown.index] = self.shown.candidate
+        return tuple(candidates)
 
     def sweep_options(self) -> SweepOptions:
-        """Return what the model is asked with now."""
+        """Return the options of the model that hold now."""
         return self.options.sweep_options(self.arm_angles)
 
     def show_candidate(self, index: int) -> None:
-        """Show another candidate of the last answer, by its index."""
-        self._show(self.answer.candidates[index], self.shown.judged)
+        """Show another candidate of the last answer.
+
+        Raises:
+            PlanningError: The last answer has no candidate of this index.
+        """
+        candidates = self.answer.candidates
+        if not 0 <= index < len(candidates):
+            raise PlanningError(f"no path {index + 1}; there are paths 1 to {len(candidates)}")
+        self._show(index, candidates[index], self.shown.summary)
 
     def plan_to(self, goal: NDArray[np.float64]) -> bool:
-        """Plan to a place (2,) [m], arriving on the straight way; return whether it was taken."""
-        return self._take_places(self.start, _facing(self.start, goal))
+        """Plan to a goal (2,) [m] with the yaw of the straight line there.
+
+        Returns:
+            Whether the goal was accepted, as of all changes: if not, `refusal` says why.
+        """
+        return self._take_ends(self.start, _facing(self.start, goal))
 
     def plan_from(self, start: NDArray[np.float64]) -> bool:
-        """Plan from a place (2,) [m], heading for the goal; return whether it was taken."""
-        towards = np.asarray(self.goal[:2]) - np.asarray(start)
-        yaw = float(np.arctan2(towards[1], towards[0]))
-        placed = (float(start[0]), float(start[1]), yaw)
-        return self._take_places(placed, (self.goal[0], self.goal[1], yaw))
+        """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
+        ahead = np.asarray(self.goal[:2]) - np.asarray(start)
+        yaw = float(np.arctan2(ahead[1], ahead[0]))
+        pose = (float(start[0]), float(start[1]), yaw)
+        return self._take_ends(pose, (self.goal[0], self.goal[1], yaw))
 
-    def _take_places(self, start: Pose, goal: Pose) -> bool:
-        return self._try(start=start, goal=goal, recorded=False)
+    def _take_ends(self, start: Pose, goal: Pose) -> bool:
+        return self._plan_with(start=start, goal=goal, recorded=False)
 
-    def take_options(self, **changes: object) -> bool:
-        """Change fields of PathQueryOptions and plan anew; return whether it was taken."""
-        return self._try(options=dataclasses.replace(self.options, **changes))  # type: ignore[arg-type]
+    def change_options(self, **changes: object) -> bool:
+        """Change fields of PathQueryOptions and plan again."""
+        options = dataclasses.replace(self.options, **changes)  # type: ignore[arg-type]
+        return self._plan_with(options=options)
 
     def take_rover(self, rover: Rover) -> bool:
-        """Take another rover and plan anew; return whether it was taken."""
-        return self._try(rover=rover, arm_angles={})
+        """Take another rover and plan again."""
+        return self._plan_with(rover=rover, arm_angles={})
 
-    def _try(self, **changes: object) -> bool:
-        """Plan with other attributes; put the old ones back where that is refused."""
+    def plan_again(self) -> bool:
+        """Judge all candidates again, after a change of the rover."""
+        return self._plan_with()
+
+    def _plan_with(self, **changes: object) -> bool:
+        """Plan with other attributes; restore the old ones if that is refused."""
         before = {name: getattr(self, name) for name in changes}
         for name, value in changes.items():
             setattr(self, name, value)
@@ -144,16 +178,16 @@ class ViewSession:
         return True
 
     def change_rover(self, keys: Sequence[Key], value: float) -> bool:
-        """Change a number of the rover and judge the path that is shown again, at once.
+        """Change a number of the rover and judge the shown path again.
 
         The other candidates keep their verdicts until `plan_again`.
 
         Args:
-            keys: Where the number is in the rover file.
-            value: What it is to be.
+            keys: Keys of the number in the rover file; several get the same value.
+            value: The new value.
 
         Returns:
-            Whether it was taken; if not, `refusal` says why and the last good rover stays.
+            Whether it was accepted; if not, `refusal` says why and the last good rover stays.
         """
         try:
             rover = with_value(self.rover, keys, value)
@@ -163,10 +197,11 @@ class ViewSession:
         return self._judge_shown(rover, self.arm_angles)
 
     def change_arm(self, joint: str, angle: float) -> bool:
-        """Turn a joint of the arm to an angle [rad], as `change_rover`."""
+        """Turn a joint of the arm to an angle [rad]; otherwise like `change_rover`."""
         return self._judge_shown(self.rover, {**self.arm_angles, joint: angle})
 
     def _judge_shown(self, rover: Rover, arm_angles: dict[str, float]) -> bool:
+        """Judge the shown path with another rover or arm; keep both if they are accepted."""
         began = time.perf_counter()
         try:
             poses = self.shown.candidate.poses
@@ -176,11 +211,11 @@ class ViewSession:
             return False
         self.rover, self.arm_angles, self.refusal = rover, arm_angles, ""
         words = f"path of {candidate.length:.1f} m judged again in {_milliseconds(began)}"
-        self._show(candidate, words)
+        self._show(self.shown.index, candidate, words)
         return True
 
     def replay(self, prediction: PathPrediction, reasons: Sequence[str]) -> None:
-        """Show a recorded prediction as it is, with the reasons (n,) that were given for it."""
+        """Show a recorded prediction with the recorded reasons (n,) of its waypoints."""
         first = next((k for k, reason in enumerate(reasons) if reason), -1)
         verdict = dataclasses.replace(
             judge(self.rover, prediction),
@@ -193,11 +228,7 @@ class ViewSession:
         self.answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
         self.start, self.goal = (_as_pose(prediction.poses[row]) for row in (0, -1))
         self.recorded = True
-        self._show(candidate, "recorded")
-
-    def plan_again(self) -> bool:
-        """Judge all candidates anew, after the rover was changed; return whether that worked."""
-        return self._try()
+        self._show(0, candidate, "recorded")
 
 
 def _milliseconds(began: float) -> str:
@@ -211,6 +242,6 @@ def _as_pose(pose: NDArray[np.float64]) -> Pose:
 
 
 def _facing(start: Pose, goal: NDArray[np.float64]) -> Pose:
-    """Return the goal (2,) with the heading of the straight way there."""
-    way = np.asarray(goal, dtype=float) - np.asarray(start[:2])
-    return float(goal[0]), float(goal[1]), float(np.arctan2(way[1], way[0]))
+    """Return the pose at a goal (2,) with the yaw of the straight line from start to goal."""
+    ahead = np.asarray(goal, dtype=float) - np.asarray(start[:2])
+    return float(goal[0]), float(goal[1]), float(np.arctan2(ahead[1], ahead[0]))

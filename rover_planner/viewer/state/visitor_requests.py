@@ -1,38 +1,38 @@
-"""What visitors ask for, kept until the one thread that changes the page gets to it."""
+"""What visitors ask for, queued for the one thread that changes the page."""
 
 import threading
 from collections.abc import Callable
 
-Act = Callable[[], None]
+Action = Callable[[], None]
 
 
 class VisitorRequests:
-    """A queue in which a later wish of the same kind replaces an earlier one.
+    """A queue in which a later request replaces an earlier one of the same kind.
 
-    While a slider is dragged the page is told dozens of values a second; only the last one that
-    came while it was busy is worth judging.
+    A slider that is dragged sends dozens of values a second. Only the last one that came while the
+    page was busy is worth judging.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._asked: list[tuple[str, Act]] = []
-        self._some = threading.Event()
+        self._pending: list[tuple[str, Action]] = []
+        self._available = threading.Event()
 
-    def ask(self, act: Act, kind: str = "") -> None:
-        """Ask for an act; it takes the place of one of the same kind, unless that is empty."""
+    def add(self, action: Action, kind: str = "") -> None:
+        """Add a request; it replaces those of the same kind, if `kind` is not empty."""
         with self._lock:
             if kind:
-                self._asked = [wish for wish in self._asked if wish[0] != kind]
-            self._asked.append((kind, act))
-        self._some.set()
+                self._pending = [request for request in self._pending if request[0] != kind]
+            self._pending.append((kind, action))
+        self._available.set()
 
     def wait(self, seconds: float) -> None:
-        """Wait until there is a wish, at most for a time [s]."""
-        self._some.wait(max(seconds, 0.0))
+        """Wait until there is a request, at most for a time [s]."""
+        self._available.wait(max(seconds, 0.0))
 
-    def take(self) -> list[Act]:
-        """Return what is asked for, in that order, and forget it."""
+    def take_all(self) -> list[Action]:
+        """Return all requests in their order, and empty the queue."""
         with self._lock:
-            asked, self._asked = self._asked, []
-            self._some.clear()
-        return [act for _, act in asked]
+            pending, self._pending = self._pending, []
+            self._available.clear()
+        return [action for _, action in pending]

@@ -1,4 +1,4 @@
-"""Plots of loads, utilisation and margin against distance, with a cursor that moves along."""
+"""Plots of loads, friction utilisation and stability margin over distance, with a cursor."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,54 +9,53 @@ from numpy.typing import NDArray
 
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
-from rover_planner.viewer.scene.colours import REFUSED, SIDE_DASHES, css
-from rover_planner.viewer.scene.colours import WHEELS as WHEEL_COLOURS
+from rover_planner.viewer.state.colours import REFUSED, SIDE_DASHES, WHEEL_COLOURS, to_css
 
 Floats = NDArray[np.float64]
 MAX_POINTS = 160
-"""Points of a curve that are sent to the page."""
+"""Most points of a curve that are sent to the page."""
 HEIGHT = 146
 """Height of a plot [px]; three of them fit on a laptop's screen."""
 
 
 @dataclass(frozen=True)
-class Chart:
+class Plot:
     """What one plot shows."""
 
     title: str
     """Its title, with the unit."""
     per_wheel: bool
     """Whether it has a curve for each wheel."""
-    highest: float = np.inf
-    """Where curves are cut off: a wheel that lifts needs infinite friction."""
+    max_value: float = np.inf
+    """Larger values are cut off: a wheel that lifts off has infinite friction utilisation."""
 
 
-CHARTS = {
-    "wheel_loads": Chart("Wheel loads [N]", True),
-    "friction_utilisation": Chart("Friction utilisation, 1 = slips", True, 1.5),
-    "tip_over_ratio": Chart("Stability margin, 0 = tips over", False),
+PLOTS = {
+    "wheel_loads": Plot("Wheel loads [N]", True),
+    "friction_utilisation": Plot("Friction utilisation, 1 = slips", True, 1.5),
+    "tip_over_ratio": Plot("Stability margin, 0 = tips over", False),
 }
-"""The plots by the field of `Frame` that they show."""
+"""The plots by the field of `RoverState` that they show."""
 
 
-class Charts:
+class Plots:
     """Three plots in a panel of the page."""
 
     def __init__(self, gui: Any):
         """Add empty plots to the container that is open."""
-        self.plots = {name: _add_plot(gui, chart) for name, chart in CHARTS.items()}
+        self.plots = {name: _add_plot(gui, plot) for name, plot in PLOTS.items()}
         gui.add_html(_legend())
         self.curves: dict[str, tuple[Floats, Floats]] = {}
-        """Distances and values of the curves that are shown, by the names of CHARTS."""
+        """Distances and values of the curves by the names of PLOTS."""
         self._limits: dict[str, float] = {}
 
-    def take(self, rover: Rover, distance: Floats, values: Mapping[str, Floats]) -> None:
-        """Take other curves.
+    def set_curves(self, rover: Rover, distance: Floats, values: Mapping[str, Floats]) -> None:
+        """Set the curves; `move_cursor` shows them.
 
         Args:
             rover: The rover, for its limits.
-            distance: (n,) way since the start [m], ascending.
-            values: (n, 6) or (n,) for each name of CHARTS.
+            distance: (n,) distance driven since the start [m], ascending.
+            values: (n, 6) or (n,) for each name of PLOTS.
         """
         limits = rover.limits
         self._limits = {
@@ -67,34 +66,34 @@ class Charts:
         if len(distance) < 2:
             return
         rows = np.unique(np.linspace(0, len(distance) - 1, MAX_POINTS).astype(int))
-        for name, chart in CHARTS.items():
+        for name, plot in PLOTS.items():
             curves = values[name][rows].reshape(len(rows), -1)
-            self.curves[name] = distance[rows], np.minimum(curves, chart.highest)
+            self.curves[name] = distance[rows], np.minimum(curves, plot.max_value)
 
-    def show(self, distance: float) -> None:
-        """Move the cursor to a distance [m]."""
+    def move_cursor(self, distance: float) -> None:
+        """Show the curves with the cursor at a distance [m]."""
         for name, (x, values) in self.curves.items():
-            self.plots[name].data = with_cursor(x, values, distance, self._limits.get(name))
+            self.plots[name].data = add_cursor(x, values, distance, self._limits.get(name))
 
 
-def _add_plot(gui: Any, chart: Chart) -> Any:
+def _add_plot(gui: Any, plot: Plot) -> Any:
     from viser import uplot
 
     series = [uplot.Series(label="distance [m]")]
-    if chart.per_wheel:
+    if plot.per_wheel:
         series += [
             _line(name.replace("_", " "), colour, 1.5, SIDE_DASHES[name.endswith("left")])
             for name, colour in zip(WHEELS, WHEEL_COLOURS, strict=True)
         ]
     else:
         series.append(_line("margin", WHEEL_COLOURS[0], 2.0))
-    if chart is not CHARTS["wheel_loads"]:
-        series.append(_line("limit", css(REFUSED), 1.0, (2.0, 4.0)))
+    if plot is not PLOTS["wheel_loads"]:
+        series.append(_line("limit", to_css(REFUSED), 1.0, (2.0, 4.0)))
     series.append(_line("now", "#555555", 2.0))
     return gui.add_uplot(
         tuple(np.zeros(2) for _ in series),
         tuple(series),
-        title=chart.title,
+        title=plot.title,
         height=HEIGHT,
         legend=uplot.Legend(show=False),
         scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
@@ -118,23 +117,23 @@ def _legend() -> str:
     )
     return (
         f'<div id="plots-legend" style="font-size:11px;padding:0 8px">{keys}'
-        "solid: right, dashed: left; across: distance [m]</div>"
+        "solid: right, dashed: left; x axis: distance [m]</div>"
     )
 
 
-def with_cursor(
+def add_cursor(
     x: Floats, values: Floats, distance: float, limit: float | None
 ) -> tuple[Floats, ...]:
-    """Return columns for a plot: x, curves, limit and an upright line at a distance.
+    """Return the columns of a plot: x, curves, limit, and a vertical line at a distance.
 
     The line is a curve of its own: along the lower edge, and at the distance up and down again.
-    The page cannot plot what is not a number, so there is no gap in it.
+    It has no gaps, for the page cannot plot NaN.
 
     Args:
         x: (n,) distances [m], ascending.
         values: (n, k) curves.
         distance: Where the line is [m].
-        limit: A level line, None for none.
+        limit: Value of a horizontal line; None for none.
     """
     at = int(np.searchsorted(x, distance))
     columns = [np.insert(x, at, [distance] * 3)]

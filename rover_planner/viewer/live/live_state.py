@@ -1,4 +1,4 @@
-"""A rover as its topics tell of it: the latest of everything, as a frame of the page."""
+"""A live rover: the latest values of its topics, and the state of the page made of them."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
-from rover_planner.viewer.state.journey import Frame
+from rover_planner.viewer.state.trajectory import RoverState
 
 Floats = NDArray[np.float64]
 
@@ -21,11 +21,11 @@ def _unknown() -> Floats:
 
 
 @dataclass
-class LiveState:
-    """The latest values; NaN for what nothing tells of."""
+class LiveValues:
+    """The latest values of the topics; NaN for values that did not come."""
 
     position: Floats | None = None
-    """(3,) body origin [m], map frame; None before odometry came."""
+    """(3,) body origin [m], map frame; None before the first odometry."""
     attitude: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,) roll, pitch, yaw [rad]."""
     speed: float = 0.0
@@ -41,25 +41,25 @@ class LiveState:
     slip_ratio: Floats = field(default_factory=_unknown)
     """(6,)"""
     contact_angles: Floats = field(default_factory=lambda: np.zeros(6))
-    """(6,) where the wheels touch, from their lowest points [rad]; 0 until something tells."""
+    """(6,) angles of the contacts from the wheels' lowest points [rad]; 0 where not known."""
     tip_over_ratio: float = math.nan
-    """Stability margin."""
+    """Stability margin: tip-over angle now / on flat ground."""
     forces_from: str = ""
-    """Where the forces come from, empty where nothing tells of them."""
+    """Source of the forces, empty if there is none."""
     time: float = 0.0
-    """Since the first message [s]."""
+    """Time since the first message [s]."""
     distance: float = 0.0
-    """Way since then [m]."""
+    """Distance driven since then [m]."""
     energy: float = 0.0
-    """Work of the wheels since then [J]."""
+    """Work of the wheel motors since then [J]."""
 
-    def copy(self) -> "LiveState":
-        """Return a copy that no message changes any more."""
+    def copy(self) -> "LiveValues":
+        """Return a copy that later messages do not change."""
         return replace(self, joints=dict(self.joints), efforts=dict(self.efforts))
 
 
-class LiveFigure:
-    """Turns the latest values into a frame, by the rover's own linkage."""
+class StateBuilder:
+    """Builds the state of the page from live values, with the linkage of the rover."""
 
     def __init__(self, rover: Rover):
         """Prepare for a rover."""
@@ -67,38 +67,38 @@ class LiveFigure:
         self._linkage = pack_linkage(rover, *body_mass_and_com(rover))
         self._placement = new_record(PLACEMENT)
 
-    def frame(self, state: LiveState) -> Frame | None:
-        """Return the frame of a state; None before it is known where the rover is."""
-        if state.position is None:
+    def build(self, values: LiveValues) -> RoverState | None:
+        """Return the state; None before the first odometry."""
+        if values.position is None:
             return None
-        angles = [state.joints.get(name, 0.0) for name in SUSPENSION_JOINTS]
-        roll, pitch, yaw = state.attitude
-        x, y, z = state.position
+        angles = [values.joints.get(name, 0.0) for name in SUSPENSION_JOINTS]
+        roll, pitch, yaw = values.attitude
+        x, y, z = values.position
         q = np.array([z, roll, pitch, 0.5 * (angles[0] - angles[1]), *angles[2:]])
         place(self._linkage, np.array([x, y, yaw]), q, self._placement)
         centres = self._placement.centres.copy()
         radius = self._rover.wheel.radius
-        s, c = np.sin(state.contact_angles)[:, None], np.cos(state.contact_angles)[:, None]
+        s, c = np.sin(values.contact_angles)[:, None], np.cos(values.contact_angles)[:, None]
         contacts = centres + radius * (s * self._placement.forward - c * self._placement.up)
-        torques = np.array([state.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
-        return Frame(
-            time=state.time,
-            distance=state.distance,
-            energy=state.energy,
-            speed=state.speed,
-            position=np.array(state.position),
-            attitude=np.array(state.attitude),
+        torques = np.array([values.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
+        return RoverState(
+            time=values.time,
+            distance=values.distance,
+            energy=values.energy,
+            speed=values.speed,
+            position=np.array(values.position),
+            attitude=np.array(values.attitude),
             rocker_angle=np.array(angles[:2]),
             bogie_angle=np.array(angles[2:]),
-            spin=np.array([state.joints.get(name, 0.0) for name in WHEEL_JOINTS]),
+            spin=np.array([values.joints.get(name, 0.0) for name in WHEEL_JOINTS]),
             wheel_centres=centres,
             contact_points=contacts,
-            wheel_loads=state.wheel_loads,
+            wheel_loads=values.wheel_loads,
             tangential=torques / radius,
             lateral=np.zeros(6),
-            friction_utilisation=state.friction_utilisation,
+            friction_utilisation=values.friction_utilisation,
             torque_saturation=np.abs(torques) / self._rover.wheel.max_torque,
-            slip_ratio=state.slip_ratio,
-            tip_over_ratio=state.tip_over_ratio,
+            slip_ratio=values.slip_ratio,
+            tip_over_ratio=values.tip_over_ratio,
             belly_clearance=float("nan"),
         )

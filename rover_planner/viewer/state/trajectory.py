@@ -1,4 +1,4 @@
-"""A predicted path as a journey: what the rover looks like and feels at any time of it."""
+"""A predicted path over time: the state of the rover at any time of the drive."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -12,17 +12,19 @@ from rover_physics.traversability.verdict import Verdict
 
 Floats = NDArray[np.float64]
 MAX_SLIP = 0.95
-"""Slip at which a turning wheel is shown as turning no faster."""
+"""Slip ratio at which the shown rate of a wheel is limited."""
+MAX_VALUE = 1e6
+"""Largest magnitude that is shown: a wheel that lifts off has infinite friction utilisation."""
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class RoverState:
     """The rover at one time; wheels in wheel order, sides right and left."""
 
     time: float
     """Time since the start [s]."""
     distance: float
-    """Way since the start [m]."""
+    """Distance driven since the start [m]."""
     energy: float
     """Energy spent since the start [J]."""
     speed: float
@@ -36,17 +38,17 @@ class Frame:
     bogie_angle: Floats
     """(2,) [rad]."""
     spin: Floats
-    """(6,) how far the wheels have turned [rad]."""
+    """(6,) angles by which the wheels have turned [rad]."""
     wheel_centres: Floats
-    """(6, 3) [m]."""
+    """(6, 3) [m], map frame."""
     contact_points: Floats
-    """(6, 3) [m]."""
+    """(6, 3) [m], map frame."""
     wheel_loads: Floats
-    """(6,) [N]."""
+    """(6,) normal forces N [N]."""
     tangential: Floats
-    """(6,) [N]."""
+    """(6,) tractions T [N]."""
     lateral: Floats
-    """(6,) [N]."""
+    """(6,) lateral forces S [N]."""
     friction_utilisation: Floats
     """(6,)"""
     torque_saturation: Floats
@@ -54,31 +56,32 @@ class Frame:
     slip_ratio: Floats
     """(6,)"""
     tip_over_ratio: float
-    """Stability margin."""
+    """Stability margin: tip-over angle now / on flat ground."""
     belly_clearance: float
     """[m]"""
 
 
-class Journey:
-    """A prediction up to where the rover gets, that tells the frame at any time."""
+class Trajectory:
+    """The states along a prediction, up to the first failure."""
 
     def __init__(self, rover: Rover, prediction: PathPrediction, verdict: Verdict):
-        """Take the waypoints that settle before the first failure, that one included."""
+        """Take the waypoints that settle, up to and including the first failure."""
         self.verdict = verdict
         self.prediction = prediction
-        stuck = np.flatnonzero(~prediction.settled)
-        end = int(stuck[0]) if stuck.size else len(prediction.poses)
+        unsettled = np.flatnonzero(~prediction.settled)
+        end = int(unsettled[0]) if unsettled.size else len(prediction.poses)
         if verdict.first_failure >= 0:
             end = min(end, verdict.first_failure + 1)
         self.length = end
-        """Number of waypoints that the journey has; 0 where the start itself fails."""
+        """Number of waypoints; 0 where the rover does not settle at the start."""
         self._series = self._collect(rover, prediction, end) if end else {}
 
     def _collect(self, rover: Rover, prediction: PathPrediction, n: int) -> dict[str, Floats]:
+        """Return the values (n, ...) of each field of `RoverState`."""
         yaw = np.unwrap(prediction.poses[:n, 2])
         series = {
             field.name: getattr(prediction, field.name)[:n]
-            for field in fields(Frame)
+            for field in fields(RoverState)
             if hasattr(prediction, field.name)
         }
         series["attitude"] = np.column_stack([prediction.roll[:n], prediction.pitch[:n], yaw])
@@ -88,12 +91,14 @@ class Journey:
         )
         series["spin"] = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
         series["speed"] = np.full(n, rover.nominal_speed)
-        # A wheel that lifts off needs infinite friction; no picture can show more than this.
-        return {name: np.clip(np.nan_to_num(values), -1e6, 1e6) for name, values in series.items()}
+        return {
+            name: np.clip(np.nan_to_num(values), -MAX_VALUE, MAX_VALUE)
+            for name, values in series.items()
+        }
 
     @staticmethod
     def empty_times() -> Floats:
-        """Return the times of a journey that has not begun."""
+        """Return the times of a trajectory without waypoints: the start alone."""
         return np.zeros(1)
 
     @property
@@ -103,15 +108,15 @@ class Journey:
 
     @property
     def duration(self) -> float:
-        """Length of the journey [s]."""
+        """Time from the first waypoint to the last [s]."""
         return float(self.times[-1])
 
     def series(self, name: str) -> Floats:
-        """Return the values of a field of `Frame` at all waypoints, (length, ...)."""
+        """Return the values of a field of `RoverState` at all waypoints, (length, ...)."""
         return self._series[name]
 
-    def frame(self, time: float) -> Frame | None:
-        """Return the frame at a time [s], in proportion between waypoints; None if none."""
+    def state_at(self, time: float) -> RoverState | None:
+        """Return the state at a time [s], linear between waypoints; None without waypoints."""
         if not self.length:
             return None
         times = self.times
@@ -124,4 +129,4 @@ class Journey:
         for name, rows in self._series.items():
             value = (1.0 - share) * rows[before] + share * rows[after]
             values[name] = float(value) if np.ndim(value) == 0 else value
-        return Frame(**values)
+        return RoverState(**values)

@@ -1,0 +1,168 @@
+"""The articulated rover in the scene, built from the numbers of its rover file."""
+
+import itertools
+from collections.abc import Mapping
+from typing import Any, cast
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
+from rover_physics.rover.manipulator import link_points
+from rover_physics.rover.model import Manipulator, Rover
+from rover_planner.viewer.state.colours import BODY, DARK, METAL, colour_utilisation
+from rover_planner.viewer.state.trajectory import RoverState
+
+Floats = NDArray[np.float64]
+GROUSERS = 16
+"""Grousers of a wheel as it is drawn."""
+
+
+class RoverVisual:
+    """The rover's nodes of the scene: body, rockers, bogies, wheels and arm, with their joints."""
+
+    def __init__(self, scene: Any, rover: Rover, name: str = "/rover", arm_angles: Any = None):
+        """Add the nodes below a node `name`; they replace nodes of the same name."""
+        self._scene, self._name = scene, name
+        self._root = scene.add_frame(name, show_axes=False)
+        self._joints: dict[str, Any] = {}
+        self._tyres: list[Any] = []
+        self._add("body", make_body(rover), BODY)
+        for side in SIDES:
+            self._add_side(rover, side)
+        self.turn_arm(rover, arm_angles or {})
+
+    def _add(self, name: str, mesh: trimesh.Trimesh, colour: tuple[int, int, int]) -> Any:
+        return self._scene.add_mesh_simple(
+            f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, flat_shading=True
+        )
+
+    def _add_joint(self, key: str, path: str, position: Floats) -> None:
+        self._joints[key] = self._scene.add_frame(
+            f"{self._name}/{path}", show_axes=False, position=position
+        )
+
+    def _add_side(self, rover: Rover, side: str) -> None:
+        """Add rocker, bogie and wheels of a side."""
+        suspension = rover.suspension
+        rocker = on_side(suspension.rocker_pivot, side)
+        bogie = on_side(suspension.bogie_pivot, side)
+        wheels = {name: on_side(suspension.wheels[name], side) for name in WHEEL_POSITIONS}
+        rocker_path, bogie_path = f"rocker_{side}", f"rocker_{side}/bogie"
+        self._add_joint(rocker_path, rocker_path, rocker)
+        self._add_joint(f"bogie_{side}", bogie_path, bogie - rocker)
+        radius = 0.16 * rover.wheel.radius
+        ends = [bogie - rocker, wheels[suspension.rocker_wheel] - rocker]
+        self._add(f"{rocker_path}/beams", make_beams(ends, radius), METAL)
+        ends = [wheels[name] - bogie for name in suspension.bogie_wheels]
+        self._add(f"{bogie_path}/beams", make_beams(ends, radius), METAL)
+        for name, centre in wheels.items():
+            on_bogie = name in suspension.bogie_wheels
+            path = f"{bogie_path if on_bogie else rocker_path}/{name}"
+            self._add_joint(f"{name}_{side}", path, centre - (bogie if on_bogie else rocker))
+            tyre, grousers = make_wheel(rover)
+            self._tyres.append(self._add(f"{path}/tyre", tyre, METAL))
+            self._add(f"{path}/grousers", grousers, DARK)
+
+    def turn_arm(self, rover: Rover, angles: Mapping[str, float]) -> None:
+        """Show the arm at angles [rad] by joint name; joints without an angle are stowed."""
+        if rover.manipulator is not None:
+            self._add("arm", make_arm(rover.manipulator, angles, rover.wheel.radius), DARK)
+
+    def show(self, state: RoverState) -> None:
+        """Bring the joints and the colours of the wheels to a state."""
+        self._root.position = state.position
+        self._root.wxyz = wxyz_from_rpy(*state.attitude)
+        for k, side in enumerate(SIDES):
+            self._joints[f"rocker_{side}"].wxyz = wxyz_about_y(float(state.rocker_angle[k]))
+            self._joints[f"bogie_{side}"].wxyz = wxyz_about_y(float(state.bogie_angle[k]))
+        for k, wheel in enumerate(WHEELS):
+            self._joints[wheel].wxyz = wxyz_about_y(float(state.spin[k]))
+            self._tyres[k].color = colour_utilisation(float(state.friction_utilisation[k]))
+
+    @property
+    def visible(self) -> bool:
+        """Whether the rover is shown."""
+        return bool(self._root.visible)
+
+    @visible.setter
+    def visible(self, value: bool) -> None:
+        self._root.visible = value
+
+
+def on_side(point: tuple[float, float, float], side: str) -> Floats:
+    """Return a point (3,) [m] of the left side as it is on a side, "left" or "right"."""
+    x, y, z = point
+    return np.array([x, y if side == "left" else -y, z])
+
+
+def join_meshes(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return one mesh of several."""
+    return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
+
+
+def make_bar(start: Floats, end: Floats, radius: float) -> trimesh.Trimesh:
+    """Return a round bar of a radius between two points (3,) [m]; a ball if they coincide."""
+    if np.linalg.norm(end - start) < 1e-6:
+        return trimesh.creation.icosphere(1, radius)
+    return trimesh.creation.cylinder(radius=radius, segment=[start, end], sections=10)
+
+
+def make_beams(ends: list[Floats], radius: float) -> trimesh.Trimesh:
+    """Return bars of a radius from the origin to ends (3,) [m]."""
+    return join_meshes([make_bar(np.zeros(3), end, radius) for end in ends])
+
+
+def make_body(rover: Rover) -> trimesh.Trimesh:
+    """Return a box on the belly rectangle, 1.4 wheel radii high, and the axle of the rockers."""
+    belly = rover.belly
+    low = np.array([belly.x[0], belly.y[0], belly.z])
+    high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * rover.wheel.radius])
+    box = trimesh.creation.box(high - low)
+    box.apply_translation(0.5 * (low + high))
+    pivot = rover.suspension.rocker_pivot
+    axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * rover.wheel.radius)
+    return join_meshes([box, axle])
+
+
+def make_wheel(rover: Rover) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
+    """Return tyre and grousers of a wheel about its centre, with its axis along y."""
+    radius, width = rover.wheel.radius, rover.wheel.width
+    across = [[0.0, -0.5 * width, 0.0], [0.0, 0.5 * width, 0.0]]
+    tyre = trimesh.creation.cylinder(radius=0.96 * radius, segment=across, sections=32)
+    grousers = []
+    for k in range(GROUSERS):
+        grouser = trimesh.creation.box([0.06 * radius, 1.01 * width, 0.5 * radius])
+        grouser.apply_translation([0.0, 0.0, 0.75 * radius])
+        turn = trimesh.transformations.rotation_matrix(2 * np.pi * k / GROUSERS, [0, 1, 0])
+        grouser.apply_transform(turn)
+        grousers.append(grouser)
+    return tyre, join_meshes(grousers)
+
+
+def make_arm(
+    arm: Manipulator, angles: Mapping[str, float], wheel_radius: float
+) -> trimesh.Trimesh:
+    """Return the arm at angles [rad] by joint name, body frame; the wheel radius sets its width.
+
+    Joints without an angle are stowed.
+    """
+    joint_angles = [angles.get(name, at) for name, at in zip(arm.joints, arm.stowed, strict=True)]
+    points = link_points(arm, np.array(joint_angles))
+    links = [make_bar(a, b, 0.12 * wheel_radius) for a, b in itertools.pairwise(points)]
+    tip = trimesh.creation.icosphere(1, 0.25 * wheel_radius)
+    tip.apply_translation(points[-1])
+    return join_meshes([*links, tip])
+
+
+def make_ghost(rover: Rover) -> trimesh.Trimesh:
+    """Return body and wheels, in their places on flat ground, as one mesh."""
+    parts = [make_body(rover)]
+    for centre in rover.suspension.wheels.values():
+        for side in SIDES:
+            tyre, _ = make_wheel(rover)
+            tyre.apply_translation(on_side(centre, side))
+            parts.append(tyre)
+    return join_meshes(parts)

@@ -1,0 +1,80 @@
+"""Colours that people with any kind of colour vision tell apart (Okabe and Ito, 2008; cividis)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Colour = tuple[int, int, int]
+"""Red, green and blue, 0 to 255 each."""
+
+PASSABLE = (0, 114, 178)
+"""Blue: a path that can be driven, as in the pictures of the demo."""
+REFUSED = (213, 94, 0)
+"""Vermillion: a path that is refused, and the pose where it is."""
+LOAD = (86, 180, 233)
+"""Sky blue: normal forces, torque saturation."""
+TRACTION = (230, 159, 0)
+"""Orange: tangential forces, slip."""
+NOTICE = (204, 121, 167)
+"""Reddish purple: a change that was refused."""
+MIDDLE = (240, 228, 66)
+"""Yellow: half-way from blue to vermillion."""
+METAL, DARK, BODY = (150, 155, 160), (50, 52, 56), (225, 220, 205)
+UNKNOWN = (110, 110, 110)
+WHEEL_COLOURS = ("#0072b2", "#e69f00", "#cc79a7", "#0072b2", "#e69f00", "#cc79a7")
+"""Curves of rear, middle and front wheels in the plots, in wheel order."""
+SIDE_DASHES = ((), (5.0, 3.0))
+"""Dashes of the curves of the right and the left side; none is a solid line."""
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """What the colours of a layer mean."""
+
+    low: float
+    """Value of the first colour."""
+    high: float
+    """Value of the last colour."""
+    unit: str
+    """Unit of both, empty for none."""
+
+
+def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
+    """Return colours (..., 3) of values on the map cividis, grey where a value is not finite.
+
+    Args:
+        values: (...) values.
+        low: Value of the first colour; smaller ones have it, too.
+        high: Value of the last colour; larger ones have it, too.
+    """
+    from matplotlib import colormaps
+
+    span = high - low if high > low else 1.0
+    share = np.clip((np.nan_to_num(values) - low) / span, 0.0, 1.0)
+    colours = (255 * colormaps["cividis"](share)[..., :3]).astype(np.uint8)
+    colours[~np.isfinite(values)] = UNKNOWN
+    return colours
+
+
+def colour_utilisation(utilisation: float) -> Colour:
+    """Return the colour of a friction utilisation: blue at 0, yellow at 0.5, vermillion from 1.
+
+    NaN is grey.
+    """
+    if np.isnan(utilisation):
+        return UNKNOWN
+    t = float(np.clip(utilisation, 0.0, 1.0))
+    return blend(PASSABLE, MIDDLE, 2 * t) if t < 0.5 else blend(MIDDLE, REFUSED, 2 * t - 1)
+
+
+def blend(first: Colour, second: Colour, share: float) -> Colour:
+    """Return the blend of two colours with a share of the second, 0 to 1."""
+    start, end = np.array(first), np.array(second)
+    red, green, blue = np.round(start + share * (end - start)).astype(int).tolist()
+    return red, green, blue
+
+
+def to_css(colour: Colour) -> str:
+    """Return a colour as CSS writes it, such as #0072b2."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)

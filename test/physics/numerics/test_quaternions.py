@@ -1,0 +1,98 @@
+"""Quaternions: of length 1, in the order that the name says, and the turns that scipy makes."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from rover_physics.numerics.quaternions import (
+    forward_from_xyzw,
+    matrix_from_xyzw,
+    rpy_from_xyzw,
+    wxyz_about_y,
+    wxyz_from_rpy,
+    wxyz_from_xyzw,
+    xyzw_from_rpy,
+    xyzw_from_wxyz,
+    xyzw_from_yaw,
+)
+
+ANGLES = st.floats(-math.pi, math.pi)
+PITCHES = st.floats(-1.5, 1.5)
+"""Pitches [rad] at which roll and yaw are two angles, not one."""
+ROUNDING = 4e-16
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
+    return Rotation.from_euler("ZYX", [yaw, pitch, roll])
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_a_quaternion_of_angles_has_length_1(roll, pitch, yaw):
+    assert np.linalg.norm(xyzw_from_rpy(roll, pitch, yaw)) == pytest.approx(1.0, abs=ROUNDING)
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_a_quaternion_of_angles_turns_as_scipy_does(roll, pitch, yaw):
+    ours = Rotation.from_quat(xyzw_from_rpy(roll, pitch, yaw))
+    np.testing.assert_allclose(
+        ours.as_matrix(), rotation(roll, pitch, yaw).as_matrix(), atol=2e-15
+    )
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_the_matrix_of_a_quaternion_is_that_of_scipy(roll, pitch, yaw):
+    xyzw = xyzw_from_rpy(roll, pitch, yaw)
+    expected = Rotation.from_quat(xyzw).as_matrix()
+    np.testing.assert_allclose(matrix_from_xyzw(xyzw), expected, atol=2e-15)
+
+
+@given(ANGLES, PITCHES, ANGLES)
+def test_angles_come_back_from_their_quaternion(roll, pitch, yaw):
+    back = rpy_from_xyzw(xyzw_from_rpy(roll, pitch, yaw))
+    np.testing.assert_allclose(np.sin(back), np.sin([roll, pitch, yaw]), atol=1e-12)
+    np.testing.assert_allclose(np.cos(back), np.cos([roll, pitch, yaw]), atol=1e-12)
+
+
+@given(ANGLES, PITCHES, ANGLES, st.floats(0.9, 1.1))
+def test_the_length_of_a_quaternion_does_not_change_its_angles(roll, pitch, yaw, length):
+    xyzw = length * xyzw_from_rpy(roll, pitch, yaw)
+    back = rpy_from_xyzw(xyzw, squared_norm=float(xyzw @ xyzw))
+    np.testing.assert_allclose(np.sin(back), np.sin([roll, pitch, yaw]), atol=1e-12)
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_the_forward_axis_is_the_first_column_of_the_matrix(roll, pitch, yaw):
+    xyzw = xyzw_from_rpy(roll, pitch, yaw)
+    expected = Rotation.from_quat(xyzw).as_matrix()[:2, 0]
+    np.testing.assert_allclose(forward_from_xyzw(xyzw), expected, atol=2e-15)
+
+
+@given(ANGLES)
+def test_a_turn_about_y_is_a_pitch_and_a_yaw_a_turn_about_z(angle):
+    np.testing.assert_allclose(wxyz_about_y(angle), wxyz_from_rpy(0.0, angle, 0.0), atol=ROUNDING)
+    np.testing.assert_allclose(xyzw_from_yaw(angle), xyzw_from_rpy(0.0, 0.0, angle), atol=ROUNDING)
+
+
+def test_no_turn_is_1_at_w():
+    assert xyzw_from_rpy(0.0, 0.0, 0.0).tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert xyzw_from_yaw(0.0) == (0.0, 0.0, 0.0, 1.0)
+    assert wxyz_from_rpy(0.0, 0.0, 0.0).tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_both_orders_hold_the_same_numbers():
+    xyzw = np.array([[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]])
+    wxyz = wxyz_from_xyzw(xyzw)
+    assert wxyz.tolist() == [[4.0, 1.0, 2.0, 3.0], [8.0, 5.0, 6.0, 7.0]]
+    assert xyzw_from_wxyz(wxyz).tolist() == xyzw.tolist()
+
+
+def test_many_angles_at_once_give_what_they_give_one_by_one():
+    angles = np.random.default_rng(4).uniform(-math.pi, math.pi, (100, 3))
+    many = xyzw_from_rpy(*angles.T)
+    assert many.shape == (100, 4)
+    one_by_one = [xyzw_from_rpy(*row) for row in angles]
+    np.testing.assert_allclose(many, one_by_one, atol=ROUNDING)

@@ -1,0 +1,160 @@
+"""Errors on the page: it shows what failed and why, and goes on."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from support.ros_fixtures import wait_until
+from support.viewer_sessions import ramp, session_on
+
+pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
+
+import viser
+
+from rover_planner.viewer.live.listener import LiveListener
+from rover_planner.viewer.pages.live_page import LivePage
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.scene.overlays import PathOverlay
+
+pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+
+
+@pytest.fixture
+def page():
+    """A page without visitors."""
+    served = Page(session_on(ramp), port=0)
+    yield served
+    served.close()
+
+
+def do(page, work) -> None:
+    """Let the page's thread do some work, and wait for its end."""
+    done = threading.Event()
+
+    def work_and_signal():
+        try:
+            work()
+        finally:
+            done.set()
+
+    page.requests.add(work_and_signal)
+    assert done.wait(20.0), "the page's thread does nothing"
+
+
+def shown_errors(page) -> str:
+    """Return the notice of errors as HTML, empty if it is hidden."""
+    return page.errors._box.content if page.errors._box.visible else ""
+
+
+def fail(*_arguments) -> None:
+    raise ValueError("a line of <no> points")
+
+
+@pytest.fixture
+def scene():
+    server = viser.ViserServer(port=0, verbose=False)
+    yield server.scene
+    server.stop()
+
+
+def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(scene):
+    session = session_on(ramp)
+    assert session.shown.verdict.traversable
+    assert session.change_rover([("friction",)], 0.4)
+    assert not session.shown.verdict.traversable
+    overlay = PathOverlay(scene)
+    overlay.show(session.rover, session.terrain, session.candidates, session.shown.index)
+    names = {node.name for node in overlay._nodes}
+    assert {"/ghosts/0", f"/paths/{session.shown.index}-beyond"} <= names
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_path_that_is_judged_again_replaces_its_own_candidate(index):
+    session = session_on(ramp)
+    session.show_candidate(index)
+    session.change_rover([("friction",)], 0.4)
+    assert len(session.candidates) == len(session.answer.candidates)
+    assert session.candidates[index] is session.shown.candidate
+    np.testing.assert_array_equal(
+        session.candidates[index].poses, session.answer.candidates[index].poses
+    )
+    traversable = [candidate.verdict.traversable for candidate in session.candidates]
+    assert traversable == [k != index for k in range(len(traversable))]
+
+
+def test_a_page_shows_that_its_path_is_refused_and_goes_on(page):
+    do(page, lambda: page.session.change_rover([("friction",)], 0.4))
+    do(page, page._show_path)
+    assert "not traversable" in page.drive_tab._verdict.content
+    assert shown_errors(page) == ""
+
+
+def test_a_failed_request_is_shown_until_a_request_succeeds(page):
+    do(page, lambda: fail())
+    wait_until(lambda: shown_errors(page), "the notice")
+    assert "the last request failed" in shown_errors(page)
+    assert "ValueError: a line of &lt;no&gt; points" in shown_errors(page)
+    do(page, lambda: page.playback.seek(1.0))
+    wait_until(lambda: not shown_errors(page), "the notice to go")
+
+
+def test_the_verdict_is_right_and_the_rover_drives_if_the_paths_cannot_be_drawn(page, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(page.scene.paths, "show", fail)
+        do(page, lambda: page.session.change_rover([("friction",)], 0.4))
+        do(page, page._show_path)
+        assert "the paths are not drawn" in shown_errors(page)
+        assert "not traversable" in page.drive_tab._verdict.content
+        do(page, page.playback.play)
+        wait_until(lambda: page.playback.time > 0.0, "the rover to drive")
+        assert "the paths are not drawn" in shown_errors(page)
+    do(page, page._show_path)
+    assert shown_errors(page) == ""
+
+
+def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
+    wait_until(lambda: not page.drive_tab.outdated, "the first picture")
+    tried = []
+
+    def fail_and_count(_frame):
+        tried.append(True)
+        fail()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(page.scene, "show", fail_and_count)
+        do(page, page.playback.play)
+        wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
+        stopped_at = page.playback.time
+        time.sleep(0.5)  # a dozen pictures
+        assert len(tried) == 1 and page.playback.time == stopped_at
+    do(page, page.playback.play)
+    wait_until(lambda: page.playback.time > stopped_at, "the rover to drive on")
+    wait_until(lambda: not shown_errors(page), "the notice to go")
+
+
+def test_all_candidates_are_judged_after_a_change_though_drawing_has_stopped(page, monkeypatch):
+    monkeypatch.setattr(page.scene, "show", fail)
+    friction = next(v for v in page.rover_tab._sliders._sliders if v.label == "friction [-]")
+    do(page, lambda: page._change_value(friction, 0.4))
+    wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
+    wait_until(lambda: "0 of 3 candidate paths" in page.drive_tab._verdict.content, "the answer")
+
+
+def test_a_path_that_does_not_exist_is_refused_by_its_number(page):
+    do(page, lambda: page._choose_path(7))
+    assert "no path 8; there are paths 1 to" in page.drive_tab._verdict.content
+
+
+def test_a_live_page_tries_again_by_itself_after_an_error(ros, monkeypatch):
+    listener = ros.spin(LiveListener(context=ros.context))
+    page = LivePage(session_on(ramp), listener, port=0)
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(page.scene, "show", fail)
+            wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
+        wait_until(lambda: not shown_errors(page), "the notice to go")
+        assert "waiting for odometry" in page.drive_tab._dashboard.content
+    finally:
+        page.close()
