@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_planner.command.extras import need
+from rover_planner.command.options import RoverName, Vector
 from rover_planner.errors import PlanningError
 
 if TYPE_CHECKING:
@@ -19,26 +20,27 @@ TERRAIN_SIZE = 12.0
 """Width of the terrain that is made where none is given [m]."""
 SEED = 7
 MAX_DEMO_LENGTH = 10.0
-"""Largest distance of the ends that are chosen where none are told [m]."""
+"""Largest distance of the ends that are chosen where none are given [m]."""
 PLACES_TRIED = 41
 """Places along each side of the map that are tried for an end."""
 Pose = tuple[float, float, float]
 
 
 def view(
-    rover: Annotated[
-        str, typer.Argument(metavar="ROVER", help="Preset name or rover file.")
-    ] = "lsr1",
+    rover: RoverName = "lsr1",
     terrain: Annotated[
-        Path | None,
-        typer.Argument(metavar="TERRAIN", help="Elevation map, .npz; made if not given."),
+        str | None,
+        typer.Argument(
+            metavar="TERRAIN",
+            help="Preset name (spirit) or elevation map, .npz; made if not given.",
+        ),
     ] = None,
     start: Annotated[
-        tuple[float, float, float] | None,
+        Vector | None,
         typer.Option(metavar="X Y YAW", help="Start in m and rad, map frame."),
     ] = None,
     goal: Annotated[
-        tuple[float, float, float] | None,
+        Vector | None,
         typer.Option(metavar="X Y YAW", help="Goal in m and rad, map frame."),
     ] = None,
     prediction: Annotated[
@@ -114,15 +116,15 @@ def _follow(
     return LivePage(session, link.listener, host, port, has_ground=has_ground)
 
 
-def _load_or_make(path: Path | None, follow: bool) -> "Terrain":
+def _load_or_make(name: str | None, follow: bool) -> "Terrain":
     """Load the terrain, or make one; to follow a rover before its map comes, a level one."""
     import numpy as np
 
     from rover_physics.terrain.grid import Terrain, load_terrain
     from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-    if path is not None:
-        return load_terrain(path)
+    if name is not None:
+        return load_terrain(name)
     if follow:
         return Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
     return make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)

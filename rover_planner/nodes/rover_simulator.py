@@ -31,7 +31,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
-from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import ENGINES, Simulation, settings_from_parameters
 
@@ -222,7 +222,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()
-    except BAD_INPUT as error:
+    except INPUT_ERRORS as error:
         rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
         return 2
     except (KeyboardInterrupt, ExternalShutdownException):

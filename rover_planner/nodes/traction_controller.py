@@ -42,7 +42,7 @@ from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
 from rover_planner.ros.map_intake import MapIntake, PreparedMap, prepare_map
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
-from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.traction_service import (
     TractionService,
@@ -275,7 +275,7 @@ def main(arguments: list[str] | None = None) -> int:
         sys.setswitchinterval(SWITCH_INTERVAL)
         while not stop.wanted:
             executor.spin_once(timeout_sec=0.1)
-    except BAD_INPUT as error:
+    except INPUT_ERRORS as error:
         rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
         return 2
     except ExternalShutdownException:

@@ -39,7 +39,7 @@ from rover_planner.planning.judgement import Judgement, refusal
 from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
-from rover_planner.ros.refusals import BAD_INPUT, answer_or_refuse
+from rover_planner.ros.refusals import INPUT_ERRORS, answer_or_refuse
 
 NODE_NAME = "traverse_server"
 
@@ -94,7 +94,7 @@ class TraverseServer(Node):
             return
         try:
             self._take_terrain(load_terrain(file), file)
-        except BAD_INPUT as error:
+        except INPUT_ERRORS as error:
             self.get_logger().error(f"terrain_file not loaded: {error}")
 
     def _apply_parameters(self, parameters) -> None:
@@ -116,7 +116,7 @@ class TraverseServer(Node):
                 cloud, self._values["map_resolution"], self._values["cell_height"]
             )
             self._take_terrain(terrain, "elevation_cloud")
-        except BAD_INPUT as error:
+        except INPUT_ERRORS as error:
             there = self._service.terrain is not None
             kept = "the last good map stays" if there else "there is no map yet"
             self.get_logger().error(f"elevation_cloud refused, {kept}: {error}")
@@ -200,7 +200,7 @@ class TraverseServer(Node):
         try:
             terrain = load_terrain(file)
             self._take_terrain(terrain, str(file))
-        except BAD_INPUT as error:
+        except INPUT_ERRORS as error:
             self.get_logger().error(f"load_map: {error}")
             response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
             return response
@@ -246,7 +246,7 @@ def main(arguments: list[str] | None = None) -> int:
         _run(TraverseServer)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
-    except BAD_INPUT as error:
+    except INPUT_ERRORS as error:
         logger.fatal(str(error))
         return 2
     finally:

@@ -10,7 +10,7 @@ from sensor_msgs.msg import PointCloud2
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.map_contacts import MapContactFinder
-from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.ros.refusals import INPUT_ERRORS
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class MapIntake:
         """Start the thread.
 
         Args:
-            prepare: Makes a map of a cloud; BAD_INPUT is what it may raise.
+            prepare: Makes a map of a cloud; INPUT_ERRORS is what it may raise.
             refuse: Told why a cloud cannot be used. Both are called in the thread.
         """
         self._prepare, self._refuse = prepare, refuse
@@ -81,7 +81,7 @@ class MapIntake:
                 return
             try:
                 self._ready = self._prepare(deserialize_message(cloud, PointCloud2))
-            except BAD_INPUT as error:
+            except INPUT_ERRORS as error:
                 self._refuse(str(error))
             except Exception as error:
                 # A fault of this program must not end the thread: the next map may be better.

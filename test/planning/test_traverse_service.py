@@ -270,19 +270,19 @@ PHYSICAL = {
     ids=["plain", "another plain", "crater rim", "hill", "off the map"],
 )
 def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
-    terrain_dir,
+    real_map,
     start,
     goal,
     codes,
 ):
-    service = make_service(load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz"))
+    service = make_service(real_map("erc_marsyard2021_9cm"))
     verdict = service.answer(start, goal).verdict
     assert verdict["code"] in codes, verdict["reason"]
     assert verdict["traversable"] == (not verdict["reason"]) == (codes == {""})
 
 
-def test_the_real_martian_ground_is_passed_where_it_is_known(terrain_dir):
-    terrain = load_terrain(terrain_dir / "mer_spirit_sol1352_hazcam_3cm.npz")
+def test_the_real_martian_ground_is_passed_where_it_is_known():
+    terrain = load_terrain("spirit")
     north = math.pi / 2
     start, goal = (-48.5, -20.5, north), (-48.5, -18.0, north)
     strict = make_service(terrain).answer(start, goal).verdict
