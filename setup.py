@@ -84,10 +84,10 @@ setup(
     entry_points={
         "console_scripts": [
             "rover_planner = rover_planner.cli:main",
-            "traverse_server = rover_planner.nodes.traverse_server:main",
-            "traction_controller = rover_planner.nodes.traction_controller:main",
-            "mission_planner = rover_planner.nodes.mission_planner:main",
-            "rover_simulator = rover_planner.nodes.rover_simulator:main",
+            "traverse_server = rover_planner.nodes.start:start_traverse_server",
+            "traction_controller = rover_planner.nodes.start:start_traction_controller",
+            "mission_planner = rover_planner.nodes.start:start_mission_planner",
+            "rover_simulator = rover_planner.nodes.start:start_rover_simulator",
         ],
     },
 )

@@ -1,6 +1,5 @@
 """The command `rover_planner predict`: loads, slip and margins along a path, into a file."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -104,12 +103,14 @@ def predict(
         ranges = find_torque_ranges(model, ground, path, options) if torque_ranges else None
     on_soil = soil is not None or bool(ground.soil_names)
     write_prediction(out, *judged, on_soil=on_soil, classes=found, ranges=ranges)
-    typer.echo(f"wrote {out}: {_summarise(path, judged[1])}")
+    typer.echo(f"wrote {out}: {_summarise(len(path), judged[1])}")
 
 
-def _summarise(path: Sequence[Any], verdict: "Verdict") -> str:
+def _summarise(count: int, verdict: "Verdict") -> str:
     """Return the number of waypoints and the verdict in words."""
-    count = f"{len(path)} waypoint{'s' if len(path) > 1 else ''}"
+    waypoints = f"{count} waypoint{'s' if count > 1 else ''}"
     if verdict.traversable:
-        return f"{count}, traversable"
-    return f"{count}, not traversable from waypoint {verdict.first_failure} on: {verdict.reason}"
+        return f"{waypoints}, traversable"
+    return (
+        f"{waypoints}, not traversable from waypoint {verdict.first_failure} on: {verdict.reason}"
+    )

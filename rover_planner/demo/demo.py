@@ -34,7 +34,7 @@ TERRAIN_SIZE = 24.0
 
 
 def run_demo(
-    map_file: Path | None,
+    map_name: str | None,
     picture: Path,
     rover_name: str = "lsr1",
     seed: int = 1,
@@ -43,8 +43,8 @@ def run_demo(
     """Run the demo; print a table of the answers and write a picture of them.
 
     Args:
-        map_file: Elevation map, .npz; None makes a Mars-like terrain and saves it beside the
-            picture.
+        map_name: Preset or elevation map, .npz; None makes a Mars-like terrain and saves it
+            beside the picture.
         picture: Picture to write; logs go beside it.
         rover_name: Preset's name or rover file.
         seed: Seed of the terrain and the goals.
@@ -61,13 +61,13 @@ def run_demo(
     _check_environment()
     _prepare_folder(picture)
     rover = load_rover(rover_name)
-    map_path, terrain = _prepare_map(steps, map_file, picture.parent, seed, size)
+    map_name, terrain = _prepare_map(steps, map_name, picture.parent, seed, size)
     mission = choose_mission(terrain, rover, seed)
     environment = _environment()
     with stopping_children() as children:
         _compile(steps, children, environment, picture.parent)
         answers = _ask_server(
-            steps, children, environment, picture.parent, rover_name, map_path, mission
+            steps, children, environment, picture.parent, rover_name, map_name, mission
         )
         with steps.step("stop the server and the mission planner"):
             for child in reversed(children):
@@ -76,7 +76,7 @@ def run_demo(
     steps.console.print(answer_table(rover, mission, answers))
     steps.console.print(
         f"{agreeing} of {len(answers)} verdicts found again by the same model in this process.\n"
-        f"Picture: {picture}   map: {map_path}   log: {picture.parent / 'traverse_server.log'}",
+        f"Picture: {picture}   map: {map_name}   log: {picture.parent / 'traverse_server.log'}",
         soft_wrap=True,
     )
     return answers
@@ -108,20 +108,20 @@ def _prepare_folder(picture: Path) -> None:
 
 
 def _prepare_map(
-    steps: Steps, map_file: Path | None, folder: Path, seed: int, size: float
-) -> tuple[Path, Terrain]:
-    """Load the map, or make one and save it."""
-    if map_file is not None:
-        with steps.step(f"load the map {escape(str(map_file))}") as status:
-            terrain = load_terrain(map_file)
+    steps: Steps, map_name: str | None, folder: Path, seed: int, size: float
+) -> tuple[str, Terrain]:
+    """Load the map, or make one and save it; return its name too."""
+    if map_name is not None:
+        with steps.step(f"load the map {escape(map_name)}") as status:
+            terrain = load_terrain(map_name)
             status.update(f"{status.status}: {_describe(terrain)}")
-        return map_file, terrain
+        return map_name, terrain
     with steps.step(f"make a Mars-like terrain, seed {seed}") as status:
         path = folder / "terrain.npz"
         save_terrain(path, make_mars_terrain(seed, size))
         terrain = load_terrain(path)
         status.update(f"{status.status}: {_describe(terrain)}")
-    return path, terrain
+    return str(path), terrain
 
 
 def _describe(terrain: Terrain) -> str:
@@ -181,7 +181,7 @@ def _ask_server(
     environment: dict[str, str],
     folder: Path,
     rover_name: str,
-    map_path: Path,
+    map_name: str,
     mission: Mission,
 ) -> list[dict[str, Any]]:
     """Start the server and the mission planner; return the verdict on each goal."""
@@ -196,7 +196,7 @@ def _ask_server(
         children.append(server)
         planner = ChildProcess(
             "rover_planner.nodes.mission_planner",
-            ["--json", f"--map={map_path}", f"--start={_join(mission.start)}"]
+            ["--json", f"--map={map_name}", f"--start={_join(mission.start)}"]
             + [f"--goal={_join(goal.pose)}" for goal in mission.goals],
             environment,
             folder / "mission_planner.log",
@@ -212,7 +212,7 @@ def _ask_server(
             if event["event"] == "answer":
                 answers.append(event["answer"])
             else:
-                goal = mission.goals[event["goal"]]
+                goal = mission.goals[event["goal"] - 1]
                 status.update(f"ask for goal {goal.name} ({goal.intent})")
         status.update(f"asked for {len(answers)} goals over DDS")
     _expect_success(planner)
