@@ -154,9 +154,14 @@ def _epilog(program: Program) -> list[str]:
     as_they_are = "\b"  # click keeps the lines of such a paragraph
     lines = [as_they_are, "Parameters, each set by --ros-args -p NAME:=VALUE:"]
     for spec in program.parameters:
-        lines.append(f"  {spec.name}: {_describe(spec)}")
-        lines += textwrap.wrap(spec.doc, 88, initial_indent=6 * " ", subsequent_indent=6 * " ")
+        lines += _indent(f"{spec.name}: {_describe(spec)}", 2, 10)
+        lines += _indent(spec.doc, 6, 6)
     return [topics, "\n".join(lines)]
+
+
+def _indent(text: str, first: int, others: int) -> list[str]:
+    """Return the lines of a text, indented by a number of blanks."""
+    return textwrap.wrap(text, 88, initial_indent=first * " ", subsequent_indent=others * " ")
 
 
 def _describe(spec: ParameterSpec) -> str:

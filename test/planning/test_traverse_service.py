@@ -1,6 +1,7 @@
 """The service knows a map, a path and joint angles, and answers from them without ROS."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -209,6 +210,15 @@ def test_terrain_and_request_turned_together_give_the_same_answer():
         straight.candidate.prediction.wheel_loads,
         atol=1e-5,
     )
+
+
+@pytest.mark.parametrize(("ground", "opening"), [(rocky, "chose"), (wall_at(0.5), "number")])
+def test_candidates_are_counted_from_one_in_words_and_numbers(ground, opening):
+    verdict = make_service(make_terrain(ground)).answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)).verdict
+    assert 1 <= verdict["chosen_candidate"] <= verdict["candidates"]
+    found = re.search(rf"\b{opening} (\d+)", verdict["explanation"])
+    assert found is not None, verdict["explanation"]
+    assert int(found[1]) == verdict["chosen_candidate"]
 
 
 def test_mirrored_terrain_and_request_swap_right_and_left():
