@@ -1,7 +1,7 @@
 """The command `rover_planner predict`: loads, slip and margins along a path, into a file."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
