@@ -22,6 +22,12 @@ def demo(
     ),
     rover: RoverOption = "lsr1",
     seed: Annotated[int, typer.Option(help="Seed of the terrain and the goals.")] = 1,
+    max_gap: Annotated[
+        float,
+        typer.Option(
+            metavar="M", help="Widest unknown region of the map to interpolate in m; 0: none."
+        ),
+    ] = 0.2,
 ) -> None:
     """Ask a running traverse_server over ROS 2 for several goals, and picture its answers.
 
@@ -29,4 +35,4 @@ def demo(
     """
     from rover_planner.demo.demo import run_demo
 
-    run_demo(map_name, out, rover, seed)
+    run_demo(map_name, out, rover, seed, max_gap)
