@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import RoverOption
+from rover_planner.command.options import MaxGap, RoverOption
 
 
 def demo(
@@ -22,12 +22,7 @@ def demo(
     ),
     rover: RoverOption = "lsr1",
     seed: Annotated[int, typer.Option(help="Seed of the terrain and the goals.")] = 1,
-    max_gap: Annotated[
-        float,
-        typer.Option(
-            metavar="M", help="Widest unknown region of the map to interpolate in m; 0: none."
-        ),
-    ] = 0.2,
+    max_gap: MaxGap = 0.2,
 ) -> None:
     """Ask a running traverse_server over ROS 2 for several goals, and picture its answers.
 

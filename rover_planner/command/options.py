@@ -25,4 +25,10 @@ SoilName = Annotated[
     str | None,
     typer.Option(metavar="NAME", help="Preset soil where the terrain names none (docs/soil.md)."),
 ]
+MaxGap = Annotated[
+    float,
+    typer.Option(
+        metavar="M", help="Widest unknown region of the map to interpolate in m; 0: none."
+    ),
+]
 Payload = Annotated[float | None, typer.Option(metavar="KG", help="Mass at the arm's tip in kg.")]
