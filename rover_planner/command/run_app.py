@@ -25,7 +25,7 @@ def run_app(app: typer.Typer, name: str, words: Sequence[str] | None) -> Any:
             args=None if words is None else list(words), prog_name=name, standalone_mode=False
         )
     except Exception as error:
-        # typer has its own copy of click since 0.17, so there is no class of errors to name.
+        # typer has its own copy of click since 0.26, so there is no class of errors to name.
         if hasattr(error, "format_message"):
             raise PlanningError(error.format_message()) from error
         if type(error).__name__ == "Abort":

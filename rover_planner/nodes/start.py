@@ -34,7 +34,7 @@ def _start(name: str) -> int:
         print_help(name)
         return EXIT_OK
     try:
-        need("rclpy", name)
+        need("rclpy", "the node")
     except PlanningError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return EXIT_BAD_INPUT
