@@ -10,7 +10,9 @@ IMPORT_PACKAGES = ("rover_physics", "msg_adapters", "rover_planner")
 HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link to this file
 
 # Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba, osqp and clarabel are not in
-# it, and its pydantic is version 1.
+# it, its pydantic is version 1, and its typer is 0.9, which knows no `float | None`. 0.18 is the
+# first typer that works with every click it allows. constraints-lowest.txt holds the lowest
+# versions; a test installs them.
 # Upper bounds: the next version that may break. constraints.txt holds the versions tested.
 REQUIRES = [
     "numpy>=1.26,<3",
@@ -20,7 +22,7 @@ REQUIRES = [
     "clarabel>=0.10,<1",
     "pydantic>=2.12,<3",
     "PyYAML>=6.0,<7",
-    "typer>=0.9,<1",
+    "typer>=0.18,<1",
     "rich>=13.7,<16",
 ]
 EXTRAS = {
@@ -87,10 +89,10 @@ setup(
     entry_points={
         "console_scripts": [
             "rover_planner = rover_planner.cli:main",
-            "traverse_server = rover_planner.nodes.traverse_server:main",
-            "traction_controller = rover_planner.nodes.traction_controller:main",
-            "mission_planner = rover_planner.nodes.mission_planner:main",
-            "rover_simulator = rover_planner.nodes.rover_simulator:main",
+            "traverse_server = rover_planner.nodes.start:start_traverse_server",
+            "traction_controller = rover_planner.nodes.start:start_traction_controller",
+            "mission_planner = rover_planner.nodes.start:start_mission_planner",
+            "rover_simulator = rover_planner.nodes.start:start_rover_simulator",
         ],
     },
 )

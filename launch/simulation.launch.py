@@ -1,8 +1,8 @@
 """The whole system on one machine: simulator, traverse server and traction controller.
 
-ros2 launch rover_planner simulation.launch.py terrain_file:=mars.npz start_x:=-3.0
+ros2 launch rover_planner simulation.launch.py terrain_file:=mars.npz
 
-Then: ros2 run rover_planner mission_planner --start -3,0,0 --goal 3,0,0 --drive
+Then: ros2 run rover_planner mission_planner --start 0,0,0 --goal 3,0,0 --drive
 """
 
 from launch import LaunchDescription

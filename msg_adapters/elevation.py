@@ -17,6 +17,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.errors import MessageError
 from msg_adapters.gridding import (
+    CELL_HEIGHTS,
     CellGrid,
     Raster,
     combine,
@@ -29,7 +30,6 @@ from msg_adapters.gridding import (
 from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 
-CELL_HEIGHTS = ("max", "mean")
 LAYERS = ("friction", "elevation_std")
 """Fields of a cloud besides x, y and z that become layers of the terrain."""
 

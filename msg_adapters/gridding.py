@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 
+CELL_HEIGHTS = ("max", "mean")
+"""Names of what becomes of several points in one cell."""
+
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud; one stray point far away must not take the memory."""
 

@@ -20,9 +20,18 @@ PER_WAYPOINT = (
 """Entries of a verdict with a value for each waypoint; only in JSON."""
 
 
+FIRST = ("traversable", "code", "reason")
+"""Entries that open the JSON."""
+
+
 def verdict_to_json(verdict: Mapping[str, Any]) -> str:
-    """Write a verdict as one line of strict JSON; what is not a finite number becomes null."""
-    return json.dumps(to_plain(verdict), allow_nan=False)
+    """Write a verdict as one line of strict JSON; what is not a finite number becomes null.
+
+    The FIRST entries come first and the PER_WAYPOINT ones, which are long, last.
+    """
+    short = [key for key in verdict if key not in FIRST + PER_WAYPOINT]
+    order = [key for key in (*FIRST, *short, *PER_WAYPOINT) if key in verdict]
+    return json.dumps(to_plain({key: verdict[key] for key in order}), allow_nan=False)
 
 
 def verdict_to_diagnostics(

@@ -9,13 +9,23 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 
 @pytest.fixture(scope="session")
-def terrain_dir() -> Path:
-    """Return the folder of real elevation maps, which are not part of the package."""
+def real_map():
+    """Return a function that loads a preset, or a real map that is not part of the package."""
+    from rover_physics.terrain.grid import load_terrain
+    from rover_physics.terrain.presets import terrain_presets
+
     beside = Path(__file__).resolve().parents[2] / "shared" / "terrain"
     folder = Path(os.environ.get("ROVER_TERRAIN_DIR", beside))
-    if not folder.is_dir():
-        pytest.skip(f"no real maps in {folder}; set ROVER_TERRAIN_DIR to their folder")
-    return folder
+
+    def load(name: str):
+        if name in terrain_presets():
+            return load_terrain(name)
+        path = folder / f"{name}.npz"
+        if not path.is_file():
+            pytest.skip(f"no real map {path}; set ROVER_TERRAIN_DIR to its folder")
+        return load_terrain(path)
+
+    return load
 
 
 @pytest.fixture

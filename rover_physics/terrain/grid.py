@@ -20,6 +20,7 @@ from rover_physics.terrain.checks import (
     as_soil,
     as_soil_names,
 )
+from rover_physics.terrain.presets import find_terrain_file
 
 _EDGE_TOLERANCE = 1e-9  # cells; rounding of (x - origin) / resolution at the map's edge
 
@@ -161,18 +162,21 @@ class Terrain:
         return column, row
 
 
-def load_terrain(path: str | Path) -> Terrain:
-    """Load a terrain from an ``.npz`` file.
+def load_terrain(name_or_path: str | Path) -> Terrain:
+    """Load a terrain by the name of a preset or from an ``.npz`` file.
 
     Args:
-        path: File with ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
+        name_or_path: A preset's name such as ``"spirit"``, or the path of a file with
+            ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
             optionally layers (ny, nx): ``friction``, ``soil`` with ``soil_names``, and
             ``elevation_std`` [m]. Other entries, such as ``source``, are left alone.
 
     Raises:
-        TerrainError: Unreadable file, or a missing or impossible entry; names file and entry.
+        TerrainError: Neither a preset nor a file, an unreadable file, or a missing or impossible
+            entry; names file and entry.
     """
-    entries = _read_npz(Path(path))
+    path = find_terrain_file(name_or_path)
+    entries = _read_npz(path)
     for key in ("elevation", "resolution", "origin"):
         if key not in entries:
             raise TerrainError(

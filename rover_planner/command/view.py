@@ -1,12 +1,15 @@
 """The command `rover_planner view`: the page that shows the rover on a terrain."""
 
 import contextlib
+import math
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rover_planner.command.extras import need
+from rover_planner.command.options import MaxGap, RoverName, Vector
 from rover_planner.errors import PlanningError
 
 if TYPE_CHECKING:
@@ -19,28 +22,30 @@ TERRAIN_SIZE = 12.0
 """Width of the terrain that is made where none is given [m]."""
 SEED = 7
 MAX_DEMO_LENGTH = 10.0
-"""Largest distance of the ends that are chosen where none are told [m]."""
+"""Largest distance of the ends that are chosen where none are given [m]."""
 PLACES_TRIED = 41
 """Places along each side of the map that are tried for an end."""
 Pose = tuple[float, float, float]
 
 
 def view(
-    rover: Annotated[
-        str, typer.Argument(metavar="ROVER", help="Preset name or rover file.")
-    ] = "lsr1",
+    rover: RoverName = "lsr1",
     terrain: Annotated[
-        Path | None,
-        typer.Argument(metavar="TERRAIN", help="Elevation map, .npz; made if not given."),
+        str | None,
+        typer.Argument(
+            metavar="TERRAIN",
+            help="Preset name (spirit) or elevation map, .npz; made if not given.",
+        ),
     ] = None,
     start: Annotated[
-        tuple[float, float, float] | None,
+        Vector | None,
         typer.Option(metavar="X Y YAW", help="Start in m and rad, map frame."),
     ] = None,
     goal: Annotated[
-        tuple[float, float, float] | None,
+        Vector | None,
         typer.Option(metavar="X Y YAW", help="Goal in m and rad, map frame."),
     ] = None,
+    max_gap: MaxGap = 0.2,
     prediction: Annotated[
         Path | None,
         typer.Option(metavar="OUT", help="Replay what `predict` wrote, instead of planning."),
@@ -67,6 +72,8 @@ def view(
 
     model = load_rover(rover)
     ground = _load_or_make(terrain, follow)
+    if prediction is None:  # what was predicted was predicted on the map as it is
+        ground = ground.fill_gaps(max_gap)
     _compile()
     low, high = choose_ends(model, ground)
     session = ViewSession(model, ground, start or low, goal or high)
@@ -114,25 +121,53 @@ def _follow(
     return LivePage(session, link.listener, host, port, has_ground=has_ground)
 
 
-def _load_or_make(path: Path | None, follow: bool) -> "Terrain":
+def _load_or_make(name: str | None, follow: bool) -> "Terrain":
     """Load the terrain, or make one; to follow a rover before its map comes, a level one."""
     import numpy as np
 
     from rover_physics.terrain.grid import Terrain, load_terrain
     from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-    if path is not None:
-        return load_terrain(path)
+    if name is not None:
+        return load_terrain(name)
     if follow:
         return Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
     return make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)
 
 
 def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
+    """Return two places where the rover can stand, with known ground between them.
+
+    They are on both sides of the middle of the map if that is so there, else where the map has
+    known ground: a start and the farthest of the goals that a demo asks for on the plain. Where
+    there is no such place they are on both sides all the same, and the page says why not.
+    """
+    import numpy as np
+
+    low, high = _ends_about_the_middle(rover, ground)
+    way = np.linspace(low[:2], high[:2], PLACES_TRIED)
+    if np.isfinite(ground.elevation_at(way[:, 0], way[:, 1])).all():
+        return low, high
+    return _ends_on_known_ground(rover, ground) or (low, high)
+
+
+def _ends_on_known_ground(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose] | None:
+    """Return a start and the farthest goal on the plain, None where the map has none."""
+    from rover_planner.planning.goals import choose_mission
+
+    try:
+        mission = choose_mission(ground, rover)
+    except PlanningError:
+        return None
+    plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
+    return (mission.start, max(plain, key=partial(math.dist, mission.start))) if plain else None
+
+
+def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
     """Return two places where the rover can stand, on both sides of the middle of a map.
 
     Each is the nearest to a quarter and three quarters of the way along x, at most MAX_DEMO_LENGTH
-    apart; where the rover can stand nowhere they are just there, and the page says why not.
+    apart; where the rover can stand nowhere they are just there.
     """
     import numpy as np
 

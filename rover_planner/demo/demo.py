@@ -22,6 +22,7 @@ from rich.markup import escape
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_planner.command.exit_codes import EXIT_NOT_TRAVERSABLE, EXIT_OK
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.demo.mission_report import answer_table
 from rover_planner.errors import DemoError, PlanningError
@@ -31,23 +32,27 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 TERRAIN_SIZE = 24.0
 """Width of the terrain that is made where no map is given [m]."""
+MAX_GAP = 0.2
+"""Widest unknown region of the map that is interpolated by default [m]."""
 
 
 def run_demo(
-    map_file: Path | None,
+    map_name: str | None,
     picture: Path,
     rover_name: str = "lsr1",
     seed: int = 1,
+    max_gap: float = MAX_GAP,
     size: float = TERRAIN_SIZE,
 ) -> list[dict[str, Any]]:
     """Run the demo; print a table of the answers and write a picture of them.
 
     Args:
-        map_file: Elevation map, .npz; None makes a Mars-like terrain and saves it beside the
-            picture.
+        map_name: Preset or elevation map, .npz; None makes a Mars-like terrain and saves it
+            beside the picture.
         picture: Picture to write; logs go beside it.
         rover_name: Preset's name or rover file.
         seed: Seed of the terrain and the goals.
+        max_gap: Widest unknown region of the map that is interpolated [m]; 0 refuses all.
         size: Width of the terrain that is made [m].
 
     Returns:
@@ -61,22 +66,26 @@ def run_demo(
     _check_environment()
     _prepare_folder(picture)
     rover = load_rover(rover_name)
-    map_path, terrain = _prepare_map(steps, map_file, picture.parent, seed, size)
-    mission = choose_mission(terrain, rover, seed)
+    map_name, terrain = _prepare_map(steps, map_name, picture.parent, seed, size)
+    with steps.step(f"interpolate gaps of the map up to {max_gap:g} m wide") as status:
+        ground = _as_the_server_knows_it(terrain, max_gap)
+        status.update(f"{status.status}: {np.isfinite(ground.elevation).mean():.0%} known")
+    mission = choose_mission(ground, rover, seed)
     environment = _environment()
+    parameters = _server_parameters(rover_name, max_gap)
     with stopping_children() as children:
         _compile(steps, children, environment, picture.parent)
         answers = _ask_server(
-            steps, children, environment, picture.parent, rover_name, map_path, mission
+            steps, children, environment, picture.parent, parameters, map_name, mission
         )
         with steps.step("stop the server and the mission planner"):
             for child in reversed(children):
                 child.stop()
-    agreeing = _draw(steps, picture, rover, terrain, mission, answers)
+    agreeing = _draw(steps, picture, rover, ground, mission, answers)
     steps.console.print(answer_table(rover, mission, answers))
     steps.console.print(
         f"{agreeing} of {len(answers)} verdicts found again by the same model in this process.\n"
-        f"Picture: {picture}   map: {map_path}   log: {picture.parent / 'traverse_server.log'}",
+        f"Picture: {picture}   map: {map_name}   log: {picture.parent / 'traverse_server.log'}",
         soft_wrap=True,
     )
     return answers
@@ -108,20 +117,20 @@ def _prepare_folder(picture: Path) -> None:
 
 
 def _prepare_map(
-    steps: Steps, map_file: Path | None, folder: Path, seed: int, size: float
-) -> tuple[Path, Terrain]:
-    """Load the map, or make one and save it."""
-    if map_file is not None:
-        with steps.step(f"load the map {escape(str(map_file))}") as status:
-            terrain = load_terrain(map_file)
+    steps: Steps, map_name: str | None, folder: Path, seed: int, size: float
+) -> tuple[str, Terrain]:
+    """Load the map, or make one and save it; return its name too."""
+    if map_name is not None:
+        with steps.step(f"load the map {escape(map_name)}") as status:
+            terrain = load_terrain(map_name)
             status.update(f"{status.status}: {_describe(terrain)}")
-        return map_file, terrain
+        return map_name, terrain
     with steps.step(f"make a Mars-like terrain, seed {seed}") as status:
         path = folder / "terrain.npz"
         save_terrain(path, make_mars_terrain(seed, size))
         terrain = load_terrain(path)
         status.update(f"{status.status}: {_describe(terrain)}")
-    return path, terrain
+    return str(path), terrain
 
 
 def _describe(terrain: Terrain) -> str:
@@ -132,6 +141,18 @@ def _describe(terrain: Terrain) -> str:
         f"{xmax - xmin:.1f} x {ymax - ymin:.1f} m, cells of {100 * terrain.resolution:.1f} cm, "
         f"{known:.0%} known"
     )
+
+
+def _as_the_server_knows_it(terrain: Terrain, max_gap: float) -> Terrain:
+    """Return the map as it arrives over DDS, its heights 32-bit numbers, and with gaps filled."""
+    heights = terrain.elevation.astype(np.float32).astype(np.float64)
+    return dataclasses.replace(terrain, elevation=heights).fill_gaps(max_gap)
+
+
+def _server_parameters(rover_name: str, max_gap: float) -> tuple[str, ...]:
+    """Return the words that give the server its parameters."""
+    values = {"rover": rover_name, "unknown_cells": "interpolate", "max_gap": float(max_gap)}
+    return ("--ros-args", *(word for key in values for word in ("-p", f"{key}:={values[key]}")))
 
 
 def _environment() -> dict[str, str]:
@@ -180,23 +201,22 @@ def _ask_server(
     children: list,
     environment: dict[str, str],
     folder: Path,
-    rover_name: str,
-    map_path: Path,
+    parameters: tuple[str, ...],
+    map_name: str,
     mission: Mission,
 ) -> list[dict[str, Any]]:
     """Start the server and the mission planner; return the verdict on each goal."""
     with steps.step("start traverse_server and find it over DDS") as status:
-        arguments = ("--ros-args", "-p", f"rover:={rover_name}")
         server = ChildProcess(
             "rover_planner.nodes.traverse_server",
-            arguments,
+            parameters,
             environment,
             folder / "traverse_server.log",
         )
         children.append(server)
         planner = ChildProcess(
             "rover_planner.nodes.mission_planner",
-            ["--json", f"--map={map_path}", f"--start={_join(mission.start)}"]
+            ["--json", f"--map={map_name}", f"--start={_join(mission.start)}"]
             + [f"--goal={_join(goal.pose)}" for goal in mission.goals],
             environment,
             folder / "mission_planner.log",
@@ -212,10 +232,10 @@ def _ask_server(
             if event["event"] == "answer":
                 answers.append(event["answer"])
             else:
-                goal = mission.goals[event["goal"]]
+                goal = mission.goals[event["goal"] - 1]
                 status.update(f"ask for goal {goal.name} ({goal.intent})")
         status.update(f"asked for {len(answers)} goals over DDS")
-    _expect_success(planner)
+    _expect_success(planner, (EXIT_OK, EXIT_NOT_TRAVERSABLE))
     if len(answers) != len(mission.goals):
         raise DemoError(f"{len(answers)} of {len(mission.goals)} goals were answered")
     return answers
@@ -246,11 +266,11 @@ def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess)
         raise DemoError(f"{planner.name} ended before {name}")
 
 
-def _expect_success(child: ChildProcess) -> None:
-    """Wait until a child has ended, and refuse to go on if it failed."""
+def _expect_success(child: ChildProcess, codes: tuple[int, ...] = (EXIT_OK,)) -> None:
+    """Wait until a child has ended, and refuse to go on if its exit code is another."""
     while child.running:
         time.sleep(0.02)
-    if child.exit_code != 0:
+    if child.exit_code not in codes:
         raise DemoError(
             f"{child.name} ended with code {child.exit_code}: {child.last_words()} "
             f"(see {child.log})"
@@ -261,7 +281,7 @@ def _draw(
     steps: Steps,
     picture: Path,
     rover: Rover,
-    terrain: Terrain,
+    ground: Terrain,
     mission: Mission,
     answers: list[dict[str, Any]],
 ) -> int:
@@ -270,10 +290,6 @@ def _draw(
         from rover_planner.figures.plots import LabelledAnswer, draw_answers
         from rover_planner.planning.path_query import answer_path_query
 
-        # heights travel as 32-bit numbers, so the server knows them no better
-        ground = dataclasses.replace(
-            terrain, elevation=terrain.elevation.astype(np.float32).astype(np.float64)
-        )
         labelled = []
         for goal in mission.goals:
             status.update(f"sweep the candidate paths to goal {goal.name} for the picture")
@@ -282,7 +298,7 @@ def _draw(
         status.update("draw the picture")
         passable = sum(one.answer.traversable for one in labelled)
         title = f"{rover.name}: {passable} of {len(labelled)} goals can be reached"
-        draw_answers(picture, rover, terrain, labelled, title)
+        draw_answers(picture, rover, ground, labelled, title)
     return sum(
         one.answer.traversable == answer["traversable"]
         and one.answer.chosen.verdict.code == answer["code"]

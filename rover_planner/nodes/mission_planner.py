@@ -1,12 +1,11 @@
 """The node /mission_planner: asks a traverse_server over ROS 2 for one goal after another.
 
-    mission_planner [--map MAP.npz] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--drive] [--json]
+    mission_planner [--map TERRAIN] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--drive] [--json]
 
 It is what an operator's planner would do, small enough to copy from: publish a map, call
 `~/can_traverse`, and read the verdict, wheel loads and slip that the server publishes with it.
 """
 
-import argparse
 import json
 import sys
 import threading
@@ -21,23 +20,37 @@ from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64MultiArray
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
 from msg_adapters.predictions import array_values
-from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.command.exit_codes import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    EXIT_NO_ANSWER,
+    EXIT_NOT_TRAVERSABLE,
+    EXIT_OK,
+)
+from rover_planner.nodes.mission_options import MissionOptions
+from rover_planner.nodes.programs import read_words
 from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.ros.refusals import INPUT_ERRORS
 
+NODE_NAME = "mission_planner"
 SERVER = "/traverse_server"
 """Name of the server's node; remap its services and topics for another."""
 
 
 class NoAnswerError(Exception):
     """The server did not answer in time; the text says what was waited for."""
+
+
+class DriveFailedError(Exception):
+    """The rover did not get there; the text says what was waited for."""
 
 
 class MissionPlanner(Node):
@@ -48,7 +61,7 @@ class MissionPlanner(Node):
 
     def __init__(self, map_frame: str = "map", timeout: float = 60.0, **node_arguments: Any):
         """Create the client, the map's publisher and the subscriptions to the server's results."""
-        super().__init__("mission_planner", **node_arguments)
+        super().__init__(NODE_NAME, **node_arguments)
         self._frame = map_frame
         self._timeout = timeout
         self._changed = threading.Condition()
@@ -139,23 +152,28 @@ class MissionPlanner(Node):
             timeout: Longest wait [s].
 
         Raises:
-            NoAnswerError: There is no plan, nobody follows it, or the rover is not there in time.
+            DriveFailedError: There is no plan, nobody follows it, or the rover is not there in
+                time.
         """
         if not self._plan.poses:
-            raise NoAnswerError("there is no plan to drive")
-        self._wait(
-            lambda: self._path_publisher.get_subscription_count() > 0, "a rover on the topic path"
-        )
-        self._path_publisher.publish(self._plan)
+            raise DriveFailedError("there is no plan to drive")
         end = self._plan.poses[-1].pose.position
-        self._wait(
-            lambda: (
-                self._place is not None
-                and np.hypot(self._place[0] - end.x, self._place[1] - end.y) < within
-            ),
-            "the rover to get there",
-            timeout,
-        )
+        try:
+            self._wait(
+                lambda: self._path_publisher.get_subscription_count() > 0,
+                "a rover on the topic path",
+            )
+            self._path_publisher.publish(self._plan)
+            self._wait(
+                lambda: (
+                    self._place is not None
+                    and np.hypot(self._place[0] - end.x, self._place[1] - end.y) < within
+                ),
+                "the rover to get there",
+                timeout,
+            )
+        except NoAnswerError as error:
+            raise DriveFailedError(str(error)) from error
 
     def _take_odometry(self, odometry: Odometry) -> None:
         place = odometry.pose.pose.position
@@ -211,16 +229,16 @@ class MissionPlanner(Node):
                 self._changed.wait(0.1)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the node; return 0 when every goal got an answer, 1 if not, 2 for bad input."""
-    given = remove_ros_args(sys.argv if arguments is None else ["", *arguments])[1:]
-    options = _parser().parse_args(given)
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the node and return its exit code; see `rover_planner.nodes.programs`."""
     try:
-        terrain = load_terrain(options.map) if options.map else None
-    except RoverError as error:
-        print("mission_planner:", error, file=sys.stderr)
-        return 2
-    rclpy.init(args=arguments)
+        options = read_words(NODE_NAME, words)
+        if options == EXIT_OK:  # help was printed
+            return EXIT_OK
+        terrain = load_terrain(options.map_name) if options.map_name else None
+    except INPUT_ERRORS as error:
+        return _end_with(EXIT_BAD_INPUT, error)
+    rclpy.init(args=words)
     node = MissionPlanner(options.map_frame, options.timeout)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
@@ -229,35 +247,56 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _carry_out(node, terrain, options)
     except NoAnswerError as error:
-        print("mission_planner:", error, file=sys.stderr)
-        return 1
+        return _end_with(EXIT_NO_ANSWER, error)
+    except DriveFailedError as error:
+        return _end_with(EXIT_FAILED, error)
     except (KeyboardInterrupt, ExternalShutdownException):
-        return 130
+        return EXIT_INTERRUPTED
     finally:
         rclpy.try_shutdown()
         thread.join(2.0)
         node.destroy_node()
 
 
-def _carry_out(node: MissionPlanner, terrain: Terrain | None, options) -> int:
-    """Publish the map and ask for each goal."""
+def _end_with(code: int, error: Exception) -> int:
+    """Print on one line why the node ends, and return its exit code."""
+    print(f"{NODE_NAME}:", " ".join(str(error).split()), file=sys.stderr)
+    return code
+
+
+def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOptions) -> int:
+    """Publish the map and ask for each goal; return the exit code."""
     report = _print_json if options.json else _print_text
     report({"event": "waiting for the server"})
     node.wait_for_server()
     if terrain is not None:
         report({"event": "publishing the map"})
         node.publish_map(terrain)
-    for number, goal in enumerate(options.goal):
+    codes = set()
+    for number, goal in enumerate(options.goals, start=1):
         report({"event": "asking", "goal": number})
         asked = time.monotonic()
         answer = node.ask(options.start, goal)
         answer["response_time"] = time.monotonic() - asked
         report({"event": "answer", "goal": number, "answer": answer})
+        codes.add(_exit_code(answer))
         if options.drive and answer["traversable"]:
             report({"event": "driving", "goal": number})
             node.drive()
             report({"event": "arrived", "goal": number})
-    return 0
+    return next(code for code in (EXIT_FAILED, EXIT_NOT_TRAVERSABLE, EXIT_OK) if code in codes)
+
+
+def _was_judged(answer: dict[str, Any]) -> bool:
+    """Tell whether the answer is about a path, not a refusal of the question."""
+    return "waypoints" in answer
+
+
+def _exit_code(answer: dict[str, Any]) -> int:
+    """Return the exit code of one answer."""
+    if answer["traversable"]:
+        return EXIT_OK
+    return EXIT_NOT_TRAVERSABLE if _was_judged(answer) else EXIT_FAILED
 
 
 def _spin(executor: SingleThreadedExecutor) -> None:
@@ -274,39 +313,11 @@ def _print_json(event: dict[str, Any]) -> None:
 def _print_text(event: dict[str, Any]) -> None:
     if event["event"] == "answer":
         answer = event["answer"]
-        word = "yes" if answer["traversable"] else f"no, {answer['reason']}"
-        print(f"goal {event['goal'] + 1}: {word}", flush=True)
+        no = "no" if _was_judged(answer) else "not judged"
+        word = "yes" if answer["traversable"] else f"{no}, {answer['reason']}"
+        print(f"goal {event['goal']}: {word}", flush=True)
     elif event["event"] != "asking":
         print(event["event"], flush=True)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="mission_planner", description="Ask a traverse_server for one goal after another."
-    )
-    parser.add_argument("--map", help="elevation map to publish first, .npz")
-    parser.add_argument("--start", type=_pose, required=True, metavar="X,Y,YAW")
-    parser.add_argument("--goal", type=_pose, required=True, action="append", metavar="X,Y,YAW")
-    parser.add_argument(
-        "--drive",
-        action="store_true",
-        help="send the plan to the rover and wait until it is there",
-    )
-    parser.add_argument("--map-frame", default="map")
-    parser.add_argument("--timeout", type=float, default=60.0, help="for each answer [s]")
-    parser.add_argument("--json", action="store_true", help="print a JSON object a line")
-    return parser
-
-
-def _pose(text: str) -> tuple[float, ...]:
-    """Read a pose from the command line."""
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) != 3:
-        raise argparse.ArgumentTypeError(f"{text!r} is no pose; give X,Y,YAW in m and rad")
-    return values
 
 
 def _value(text: str) -> Any:

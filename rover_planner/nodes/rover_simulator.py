@@ -1,6 +1,5 @@
 """The node /rover_simulator: a rover on a terrain, with the topics of a real one."""
 
-import argparse
 import contextlib
 import json
 import sys
@@ -18,7 +17,6 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
@@ -28,12 +26,16 @@ from msg_adapters.errors import MessageError
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
+from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.nodes.programs import read_words
 from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
+from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
-from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.simulator.plant import PlantState
-from rover_planner.simulator.simulation import ENGINES, Simulation, settings_from_parameters
+from rover_planner.simulator.simulation import Simulation, settings_from_parameters
+from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "rover_simulator"
 COMMANDS = "/traction_controller/commands"
@@ -63,9 +65,11 @@ class RoverSimulator(Node):
         self.create_timer(1.0 / values["map_rate"], self._publish_map)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._publish_map()
+        warn_of_unknown_parameters(self, ROVER_SIMULATOR)
         self.get_logger().info(
-            f"rover {self._settings.rover.name} on {values['engine']}, starts at "
-            f"{', '.join(f'{value:.2f}' for value in self._settings.start)}"
+            f"ready: rover {self._settings.rover.name} on {values['engine']}, starts at "
+            f"{', '.join(f'{value:.2f}' for value in self._settings.start)}, terrain "
+            f"{values['terrain_file'] or 'made'}: {describe_terrain(self._settings.terrain)}"
         )
 
     @property
@@ -210,38 +214,29 @@ def _make_broadcaster(node: Node) -> Any:
     return None
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
-    given = remove_ros_args(sys.argv if arguments is None else ["", *arguments])[1:]
-    engine = _parser().parse_args(given).engine
-    rclpy.init(args=arguments)
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the node until it is told to stop; return 2 if a word or parameter is wrong, else 0."""
     node = None
     try:
-        overrides = [Parameter("engine", value=engine)] if engine else []
+        options = read_words(NODE_NAME, words)
+        if options == EXIT_OK:  # help was printed
+            return EXIT_OK
+        rclpy.init(args=words)
+        overrides = [Parameter(name, value=value) for name, value in options.items()]
         node = RoverSimulator(parameter_overrides=overrides)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()
-    except BAD_INPUT as error:
+    except INPUT_ERRORS as error:
         rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
-        return 2
+        return EXIT_BAD_INPUT
     except (KeyboardInterrupt, ExternalShutdownException):
-        return 0
+        return EXIT_OK
     finally:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NODE_NAME, description="A rover on a terrain, with the topics of a real one."
-    )
-    parser.add_argument(
-        "--engine", choices=ENGINES, help="what moves it; the same as the parameter engine"
-    )
-    return parser
+    return EXIT_OK
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import gc
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from types import FrameType
 from typing import Any
 
@@ -37,12 +38,15 @@ from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.traction_status import traction_diagnostics
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
+from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.nodes.programs import read_words
 from rover_planner.parameters.declare import check_changes, declare_parameters
 from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
+from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
-from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.traction_service import (
@@ -80,6 +84,7 @@ class TractionController(Node):
         self.add_post_set_parameters_callback(self._apply_parameters)
         self._timer = self.create_timer(1.0 / self._values["rate"], self.update)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        warn_of_unknown_parameters(self, TRACTION_CONTROLLER)
         self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
 
     @property
@@ -258,12 +263,14 @@ class _Stop:
         self.wanted = True
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the node until it is told to stop; return 2 if a word or parameter is wrong, else 0."""
     stop = _Stop()
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
+        if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
+            return EXIT_OK
+        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.logging.get_logger(NODE_NAME).info(
             "compiling kernels; the first start takes longest"
         )
@@ -276,16 +283,16 @@ def main(arguments: list[str] | None = None) -> int:
         sys.setswitchinterval(SWITCH_INTERVAL)
         while not stop.wanted:
             executor.spin_once(timeout_sec=0.1)
-    except BAD_INPUT as error:
+    except INPUT_ERRORS as error:
         rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
-        return 2
+        return EXIT_BAD_INPUT
     except ExternalShutdownException:
-        return 0
+        return EXIT_OK
     finally:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+    return EXIT_OK
 
 
 if __name__ == "__main__":

@@ -3,13 +3,12 @@
 import gc
 import sys
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 from urllib.parse import unquote, urlparse
 
-import numpy as np
 import rclpy
 import rclpy.logging
 from nav_msgs.msg import Path
@@ -31,15 +30,19 @@ from msg_adapters.paths import (
 from msg_adapters.verdicts import verdict_to_json
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.warm_up import warm_up
+from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.parameters.declare import check_changes, declare_parameters
 from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
+from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.judgement import Judgement, refusal
 from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
-from rover_planner.ros.refusals import BAD_INPUT, answer_or_refuse
+from rover_planner.ros.refusals import INPUT_ERRORS, answer_or_refuse
+from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "traverse_server"
 
@@ -55,7 +58,7 @@ class TraverseServer(Node):
         self._seen_maps: deque[int] = deque(maxlen=8)
         self._deferred_work = DeferredWork(self)
         self._results = ResultTopics(self, self._deferred_work, self._map_frame)
-        self._load_first_map()
+        file = self._load_first_map()
         self._create_subscriptions()
         self.create_service(GetPlan, "~/can_traverse", self._can_traverse)
         self.create_service(Trigger, "~/check_path", self._check_path)
@@ -65,7 +68,10 @@ class TraverseServer(Node):
             check_changes(TRAVERSE_SERVER, self._values, settings_from_parameters)
         )
         self.add_post_set_parameters_callback(self._apply_parameters)
-        self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
+        warn_of_unknown_parameters(self, TRAVERSE_SERVER)
+        name, ground = self._service.settings.rover.name, self._service.terrain
+        there = f"map {file}: {describe_terrain(ground)}" if ground else "no map yet"
+        self.get_logger().info(f"ready for rover {name}, {there}")
 
     @property
     def service(self) -> TraverseService:
@@ -88,14 +94,15 @@ class TraverseServer(Node):
         self.create_subscription(JointState, "joint_states", self._take_joints, sensor_qos())
         self.create_subscription(Path, "~/path", self._take_path, topic_qos())
 
-    def _load_first_map(self) -> None:
-        file = self._values["terrain_file"]
-        if not file:
-            return
-        try:
-            self._take_terrain(load_terrain(file), file)
-        except BAD_INPUT as error:
-            self.get_logger().error(f"terrain_file not loaded: {error}")
+    def _load_first_map(self) -> str:
+        """Load the map that a parameter names, if it can be loaded, and return its name."""
+        file: str = self._values["terrain_file"]
+        if file:
+            try:
+                self._service.take_terrain(load_terrain(file))
+            except INPUT_ERRORS as error:
+                self.get_logger().error(f"terrain_file not loaded: {error}")
+        return file
 
     def _apply_parameters(self, parameters) -> None:
         self._values.update(
@@ -116,7 +123,7 @@ class TraverseServer(Node):
                 cloud, self._values["map_resolution"], self._values["cell_height"]
             )
             self._take_terrain(terrain, "elevation_cloud")
-        except BAD_INPUT as error:
+        except INPUT_ERRORS as error:
             there = self._service.terrain is not None
             kept = "the last good map stays" if there else "there is no map yet"
             self.get_logger().error(f"elevation_cloud refused, {kept}: {error}")
@@ -135,12 +142,7 @@ class TraverseServer(Node):
         self._service.take_terrain(terrain)
         taken = self._service.terrain
         assert taken is not None
-        rows, columns = taken.elevation.shape
-        known = 100.0 * np.isfinite(taken.elevation).mean()
-        self.get_logger().info(
-            f"map from {source}: {columns} x {rows} cells of {taken.resolution:g} m, "
-            f"{known:.1f} % known"
-        )
+        self.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
 
     def _take_joints(self, state: JointState) -> None:
         try:
@@ -200,7 +202,7 @@ class TraverseServer(Node):
         try:
             terrain = load_terrain(file)
             self._take_terrain(terrain, str(file))
-        except BAD_INPUT as error:
+        except INPUT_ERRORS as error:
             self.get_logger().error(f"load_map: {error}")
             response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
             return response
@@ -236,22 +238,24 @@ def _file_of_url(url: str) -> FilePath | None:
     return FilePath(url) if "://" not in url else None
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node until it is told to stop; return 2 if a parameter is wrong, else 0."""
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the node until it is told to stop; return 2 if a word or parameter is wrong, else 0."""
     logger = rclpy.logging.get_logger(NODE_NAME)
     try:
+        if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
+            return EXIT_OK
         logger.info("compiling kernels; the first start takes longest")
         warm_up()
-        rclpy.init(args=arguments)
+        rclpy.init(args=words)
         _run(TraverseServer)
     except (KeyboardInterrupt, ExternalShutdownException):
-        return 0
-    except BAD_INPUT as error:
+        return EXIT_OK
+    except INPUT_ERRORS as error:
         logger.fatal(str(error))
-        return 2
+        return EXIT_BAD_INPUT
     finally:
         rclpy.try_shutdown()
-    return 0
+    return EXIT_OK
 
 
 def _run(make_node: Callable[[], Node]) -> None:

@@ -1,8 +1,10 @@
 """Parameters of every node that takes a map: how its cells and its publishers are chosen."""
 
-from msg_adapters.elevation import CELL_HEIGHTS
+from msg_adapters.gridding import CELL_HEIGHTS
 from rover_planner.parameters.spec import ParameterSpec
-from rover_planner.ros.qos import MAP_DURABILITIES
+
+MAP_DURABILITIES = ("either", "transient_local", "volatile")
+"""Which publishers of a map are heard; see `rover_planner.ros.qos.map_subscriptions_qos`."""
 
 MAP_INTAKE = (
     ParameterSpec(

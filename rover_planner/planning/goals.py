@@ -14,6 +14,7 @@ Pose = tuple[float, float, float]
 
 _STARTS = 200
 _RAYS = 72
+_VIEWS = 721
 _HALF_CONE = np.deg2rad(50.0)
 _WIDE_CONE = np.deg2rad(75.0)
 
@@ -25,7 +26,7 @@ class Goal:
     name: str
     """A letter for tables and pictures."""
     intent: str
-    """Why it is asked for: "plain", "steep", "unknown ground" or "off the map"."""
+    """Why it is asked for: "plain", "rough", "steep", "unknown ground" or "off the map"."""
     pose: Pose
     """x, y [m] and yaw [rad] of the body origin, map frame."""
 
@@ -79,8 +80,9 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: i
     """Choose a start and goals from what a map shows; the verdicts are the model's business.
 
     The start is on gentle known ground with much of the same ahead. Goals on the plain can be
-    reached over such ground as the crow flies, rocks aside. Then come the steepest known ground,
-    unknown ground where the map has any, and a place beyond its edge.
+    reached over such ground as the crow flies, rocks aside. Then come the roughest ground with
+    known ground all the way to it, the steepest known ground, unknown ground where the map has
+    any, and a place beyond its edge.
 
     Args:
         terrain: The map, with or without unknown cells.
@@ -96,6 +98,7 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: i
     start = _choose_start(ground, rng)
     found = [("plain", pose) for pose in _choose_plain(ground, start, plain_goals, rng)]
     for intent, choose in (
+        ("rough", _choose_rough),
         ("steep", _choose_steep),
         ("unknown ground", _choose_unknown),
         ("off the map", _choose_off_map),
@@ -119,7 +122,9 @@ def footprint_radius(rover: Rover) -> float:
 def _survey(terrain: Terrain, rover: Rover) -> _Ground:
     """Measure slopes and steps under a rover centred on each cell."""
     known = np.isfinite(terrain.elevation)
-    z = np.where(known, terrain.elevation, 0.0)
+    # Unknown cells take the nearest known height, so that the rim of a gap is no step.
+    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    z = terrain.elevation[tuple(nearest)]
     side = _odd_cells(2 * footprint_radius(rover), terrain.resolution)
     whole = ndimage.minimum_filter(known, side, mode="constant", cval=False)
     if not whole.any():
@@ -154,38 +159,38 @@ def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
     chosen = rng.permutation(np.nonzero(gentle)[0])[:_STARTS]
     x, y = ground.place(rows[chosen], columns[chosen])
     bearings = np.linspace(-np.pi, np.pi, _RAYS, endpoint=False)
-    sight = _sight(ground, x, y, bearings)
+    sight = _sight(ground, ground.gentle, x, y, bearings)
     cone = round(_HALF_CONE / (2 * np.pi / _RAYS))
     ahead = np.sum([np.roll(sight, k, axis=1) for k in range(-cone, cone + 1)], axis=0)
     best, ray = np.unravel_index(np.argmax(ahead), ahead.shape)
     return (float(x[best]), float(y[best]), float(bearings[ray]))
 
 
-def _sight(ground: _Ground, x, y, bearings) -> NDArray[np.float64]:
-    """Return how far [m] the ground is gentle from places (n,) in directions (m,): (n, m)."""
+def _sight(ground: _Ground, clear: NDArray[np.bool_], x, y, bearings) -> NDArray[np.float64]:
+    """Return how far [m] cells (ny, nx) are clear from places (n,) in directions (m,): (n, m)."""
     step = max(2 * ground.terrain.resolution, ground.reach / 60)
     distances = np.arange(0.0, ground.reach, step)
     px = x[:, None, None] + distances * np.cos(bearings)[:, None]
     py = y[:, None, None] + distances * np.sin(bearings)[:, None]
     row, column, inside = ground.cells(px, py)
-    clear = inside & ground.gentle[row, column]
-    return step * np.cumprod(clear, axis=2).sum(axis=2)
+    return step * np.cumprod(inside & clear[row, column], axis=2).sum(axis=2)
 
 
 def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
     """Choose goals in sight of the start, in directions spread over the cone ahead."""
     bearings = start[2] + np.linspace(-_HALF_CONE, _HALF_CONE, 4 * count + 1)
-    sight = _sight(ground, np.array([start[0]]), np.array([start[1]]), bearings)[0]
+    sight = _sight(ground, ground.gentle, np.array([start[0]]), np.array([start[1]]), bearings)[0]
     goals: list[Pose] = []
     for sector in np.array_split(np.arange(len(bearings)), count):
         ray = sector[np.argmax(sight[sector])]
         if sight[ray] < ground.near:
             continue
-        distance = rng.uniform(0.6, 0.9) * sight[ray]
+        distance = max(ground.near, rng.uniform(0.6, 0.9) * sight[ray])
         x = start[0] + distance * np.cos(bearings[ray])
         y = start[1] + distance * np.sin(bearings[ray])
         goal = _facing(start, *_gentlest_near(ground, x, y))
-        if all(np.hypot(goal[0] - p[0], goal[1] - p[1]) > 0.5 * ground.near for p in goals):
+        away = [np.hypot(goal[0] - p[0], goal[1] - p[1]) for p in (start, *goals)]
+        if away[0] > 0.75 * ground.near and min(away) > 0.5 * ground.near:
             goals.append(goal)
     return goals
 
@@ -200,6 +205,17 @@ def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
     best = np.unravel_index(np.argmin(window), window.shape)
     px, py = ground.place(best[0] + j, best[1] + i)
     return float(px), float(py)
+
+
+def _choose_rough(ground: _Ground, start: Pose) -> Pose | None:
+    """Choose the most difficult place to which all ground is known, somewhat rather ahead."""
+    distance, turn = _polar(ground, start)
+    bearings = np.linspace(-np.pi, np.pi, _VIEWS)
+    known = np.isfinite(ground.slope)
+    sight = _sight(ground, known, np.array([start[0]]), np.array([start[1]]), bearings)[0]
+    in_view = known & (distance < np.interp(_bearing(ground, start), bearings, sight))
+    score = ground.difficulty * (1 - turn / (2 * np.pi))
+    return _choose_cell(ground, start, np.where(in_view, score, -np.inf))
 
 
 def _choose_steep(ground: _Ground, start: Pose) -> Pose | None:
@@ -250,8 +266,15 @@ def _polar(ground: _Ground, start: Pose) -> tuple[NDArray[np.float64], NDArray[n
     """Return distance [m] and angle off the start's heading [rad] of every cell (ny, nx)."""
     ny, nx = ground.slope.shape
     x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
-    dx, dy = x - start[0], y - start[1]
-    return np.hypot(dx, dy), np.abs(np.angle(np.exp(1j * (np.arctan2(dy, dx) - start[2]))))
+    turn = np.abs(np.angle(np.exp(1j * (_bearing(ground, start) - start[2]))))
+    return np.hypot(x - start[0], y - start[1]), turn
+
+
+def _bearing(ground: _Ground, start: Pose) -> NDArray[np.float64]:
+    """Return the direction [rad] of every cell (ny, nx) as seen from the start."""
+    ny, nx = ground.slope.shape
+    x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
+    return np.arctan2(y - start[1], x - start[0])
 
 
 def _facing(start: Pose, x: float, y: float) -> Pose:

@@ -99,6 +99,11 @@ class PathAnswer:
         return self.candidates[self.nearest]
 
     @property
+    def number(self) -> int:
+        """Number of the chosen candidate as words and messages count: 1 is the first made."""
+        return self.nearest + 1
+
+    @property
     def traversable(self) -> bool:
         """Whether any candidate is traversable."""
         return self.best >= 0
@@ -111,13 +116,13 @@ class PathAnswer:
         if self.traversable:
             risk, energy = chosen.cost
             return (
-                f"{passable} of {total} candidate paths traversable; chose {self.best + 1}: "
+                f"{passable} of {total} candidate paths traversable; chose {self.number}: "
                 f"{chosen.length:.2f} m, {energy:.1f} J, risk {risk:.2f}"
             )
         driven = chosen.reach * chosen.length
         return (
-            f"none of {total} candidate paths is traversable; the one that gets furthest fails "
-            f"after {driven:.2f} m of {chosen.length:.2f} m: {chosen.verdict.reason}"
+            f"none of {total} candidate paths is traversable; number {self.number} gets furthest, "
+            f"{driven:.2f} m of {chosen.length:.2f} m: {chosen.verdict.reason}"
         )
 
 

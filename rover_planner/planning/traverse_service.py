@@ -259,7 +259,7 @@ class TraverseService:
             return {
                 "candidates": len(answer.candidates),
                 "traversable_candidates": passable,
-                "chosen_candidate": answer.nearest,
+                "chosen_candidate": answer.number,
                 "goal": reached.tolist(),
                 "goal_offset": float(np.hypot(*(reached - goal)[:2])),
                 "alternative_goals_tried": tried,

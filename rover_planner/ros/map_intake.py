@@ -6,7 +6,7 @@ from collections.abc import Callable
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
-from rover_planner.ros.refusals import BAD_INPUT
+from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.traction.prepared_map import PreparedMap
 
 
@@ -19,7 +19,7 @@ class MapIntake:
         """Start the thread.
 
         Args:
-            prepare: Makes a map of a cloud, called in the thread; it may raise BAD_INPUT.
+            prepare: Makes a map of a cloud, called in the thread; it may raise INPUT_ERRORS.
             refuse: Called in the thread with the reason why a cloud cannot be used.
         """
         self._prepare, self._refuse = prepare, refuse
@@ -61,7 +61,7 @@ class MapIntake:
                 return
             try:
                 self._ready = self._prepare(deserialize_message(cloud, PointCloud2))
-            except BAD_INPUT as error:
+            except INPUT_ERRORS as error:
                 self._refuse(str(error))
             except Exception as error:
                 # A fault of this program must not end the thread: the next map may be better.

@@ -2,9 +2,6 @@
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-MAP_DURABILITIES = ("either", "transient_local", "volatile")
-"""Which publishers of a map are heard; see `map_subscriptions_qos`."""
-
 
 def topic_qos() -> QoSProfile:
     """Return the profile of ordinary topics: reliable, the last ten."""

@@ -8,7 +8,7 @@ from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
 from rover_planner.errors import PlanningError
 
-BAD_INPUT = (MessageError, PlanningError, RoverError)
+INPUT_ERRORS = (MessageError, PlanningError, RoverError)
 """Errors that are about what was asked, not about this program."""
 
 Answer = TypeVar("Answer")
@@ -20,7 +20,7 @@ def answer_or_refuse(
     """Return the answer to a request, or the refusal of it with code and reason."""
     try:
         return answer()
-    except BAD_INPUT as error:
+    except INPUT_ERRORS as error:
         return refuse("bad_request", str(error))
     except Exception as error:
         # A fault of this program must not leave the rover without a planner.

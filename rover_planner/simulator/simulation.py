@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,7 +65,7 @@ def settings_from_parameters(values: Mapping[str, Any]) -> SimulationSettings:
     rover = load_rover(values["rover"])
     name = values["terrain_file"]
     if name:
-        terrain = load_terrain(Path(name))
+        terrain = load_terrain(name)
     else:
         terrain = make_mars_terrain(values["seed"], MADE_SIZE, MADE_RESOLUTION)
     return SimulationSettings(

@@ -1,169 +1,14 @@
-"""The command keeps its contract: arrays out, exit code 0, or exit code 2 and one line."""
-
-import json
-import os
-import subprocess
-import sys
-from dataclasses import replace
-from pathlib import Path
+"""The command line as a whole: usage errors, help, negative numbers, and what it says it wrote."""
 
 import numpy as np
 import pytest
+import typer
 
-from rover_physics.names import WHEELS
-from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
-from rover_planner.cli import main
+from rover_physics.terrain.grid import load_terrain
+from rover_planner.cli import app, main
+from support.command_line import assert_refused
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-N = 30
-
-SHAPES = {
-    "settled": (N,),
-    "position": (N, 3),
-    "roll": (N,),
-    "pitch": (N,),
-    "rocker_angle": (N, 2),
-    "bogie_angle": (N, 2),
-    "wheel_centres": (N, 6, 3),
-    "wheel_loads": (N, 6),
-    "tangential": (N, 6),
-    "lateral": (N, 6),
-    "friction_utilisation": (N, 6),
-    "slip_ratio": (N, 6),
-    "torque_saturation": (N, 6),
-    "tip_over_ratio": (N,),
-    "tip_over_force_angle": (N,),
-    "belly_clearance": (N,),
-    "energy": (N,),
-    "time": (N,),
-    "reason": (N,),
-    "traversable": (),
-    "first_failure": (),
-}
-REPLAY_SHAPES = {
-    "poses": (N, 3),
-    "status": (N,),
-    "contact_points": (N, 6, 3),
-    "contact_angle": (N, 6),
-    "torque": (N, 6),
-    "friction": (N, 6),
-    "sinkage": (N, 6),
-    "motion_resistance": (N, 6),
-    "power": (N,),
-    "distance": (N,),
-    "wheel_drop": (N, 6),
-    "falling": (N, 6),
-}
-"""What the file holds beside the contract's arrays, for a replay."""
-
-
-@pytest.fixture
-def files(tmp_path):
-    """A flat terrain with a hole, and a path that ends before it, in files."""
-    elevation = np.zeros((80, 120))
-    elevation[:, 100:] = np.nan
-    save_terrain(tmp_path / "terrain.npz", Terrain(elevation, 0.05, (0.0, 0.0)))
-    poses = np.column_stack([np.linspace(1, 3, N), np.full(N, 2.0), np.zeros(N)])
-    np.savez(tmp_path / "poses.npz", poses=poses)
-    return tmp_path
-
-
-def arguments(folder, rover="lsr1", terrain="terrain.npz", poses="poses.npz", out="out.npz"):
-    return ["predict", str(rover), *(str(folder / name) for name in (terrain, poses, out))]
-
-
-def run(*words, cwd=REPOSITORY):
-    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
-    return subprocess.run(
-        [sys.executable, "-m", "rover_planner", *words],
-        cwd=cwd,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
-
-
-def assert_refused(capfd, code, word):
-    err = capfd.readouterr().err
-    assert code == 2
-    assert err.count("\n") == 1
-    assert err.startswith("rover_planner: ")
-    assert word in err
-    assert "Traceback" not in err
-
-
-def test_an_uncertain_map_adds_bounds_unless_told_not_to(files):
-    terrain = load_terrain(files / "terrain.npz")
-    std = np.full(terrain.elevation.shape, 0.004)
-    save_terrain(files / "uncertain.npz", replace(terrain, elevation_std=std))
-    words = arguments(files, terrain="uncertain.npz")
-    assert main([*words, "--sigmas", "2", "--friction", "0.2"]) == 0
-    with np.load(files / "out.npz") as out:
-        assert out["map_sigmas"] == 2.0
-        shapes = {"roll": (), "belly_clearance": (), "bogie_angle": (2,), "wheel_loads": (6,)}
-        for name, shape in shapes.items():
-            bounds = out[f"{name}_bounds"]
-            assert bounds.shape == (N, *shape, 2)
-            assert np.all(bounds[..., 0] < out[name])
-            assert np.all(bounds[..., 1] > out[name])
-        assert not out["traversable"]
-        assert out["reason"][0].endswith("at worst within 2 sigma of the map")
-    assert main([*words, "--sigmas", "0", "--friction", "0.2"]) == 0
-    with np.load(files / "out.npz") as out:
-        assert out["traversable"]
-        assert not [name for name in out.files if name.endswith("_bounds")]
-
-
-def test_sigmas_below_zero_are_refused(files, capfd):
-    assert_refused(capfd, main([*arguments(files), "--sigmas", "-1"]), "sigmas is -1.0")
-
-
-def test_prediction_has_every_array_of_the_contract(files):
-    result = run(*arguments(files))
-    assert (result.returncode, result.stderr, result.stdout) == (0, "", "")
-    with np.load(files / "out.npz", allow_pickle=False) as out:
-        assert {name: out[name].shape for name in out.files} == SHAPES | REPLAY_SHAPES
-        assert out["settled"].dtype == bool
-        assert out["traversable"].dtype == bool
-        assert bool(out["traversable"])
-        assert out["first_failure"].dtype.kind == "i"
-        assert int(out["first_failure"]) == -1
-        assert out["reason"].dtype.kind == "U"
-        assert (out["reason"] == "").all()
-        floats = SHAPES.keys() - {"settled", "traversable", "first_failure", "reason"}
-        assert all(out[name].dtype == np.float64 for name in floats)
-        assert out["wheel_loads"].sum(axis=1) == pytest.approx(out["wheel_loads"][0].sum())
-
-
-def test_a_refused_path_is_still_exit_code_0_with_the_reason_and_nan(files):
-    poses = np.column_stack([np.linspace(1, 7, N), np.full(N, 2.0), np.zeros(N)])
-    np.savez(files / "poses.npz", poses=poses)
-    assert main(arguments(files)) == 0
-    with np.load(files / "out.npz") as out:
-        first = int(out["first_failure"])
-        assert not out["traversable"]
-        assert first > 0
-        assert out["reason"][first] != ""
-        assert (out["reason"][:first] == "").all()
-        assert not out["settled"][-1]
-        assert np.isnan(out["position"][-1]).all()
-        assert np.isnan(out["wheel_loads"][-1]).all()
-
-
-def test_options_change_the_prediction(files):
-    assert main([*arguments(files), "--friction", "0.4", "--max-torque", "3"]) == 0
-    with np.load(files / "out.npz") as out:
-        little = out["friction_utilisation"].copy()
-    assert main([*arguments(files), "--policy", "optimal"]) == 0
-    assert main([*arguments(files), "--friction", "0.8", "--policy", "equal"]) == 0
-    with np.load(files / "out.npz") as out:
-        assert out["friction_utilisation"] == pytest.approx(little / 2)
-
-
-def test_output_goes_to_exactly_the_file_named(files):
-    assert main(arguments(files, out="prediction.data")) == 0
-    assert (files / "prediction.data").is_file()
+COMMANDS = typer.main.get_command(app).commands
 
 
 @pytest.mark.parametrize(
@@ -184,84 +29,6 @@ def test_usage_errors_are_one_line(capfd, words, names):
     assert_refused(capfd, code, names)
 
 
-@pytest.mark.parametrize(
-    ("change", "names"),
-    [
-        ({"rover": "curiosity"}, "curiosity"),
-        ({"terrain": "none.npz"}, "none.npz"),
-        ({"poses": "none.npz"}, "none.npz"),
-        ({"terrain": "poses.npz"}, "elevation"),
-        ({"poses": "terrain.npz"}, "poses"),
-        ({"out": "no/such/folder/out.npz"}, "out.npz"),
-        ({"out": "."}, "cannot write"),
-    ],
-)
-def test_wrong_files_are_one_line(capfd, files, change, names):
-    code = main(arguments(files, **change))
-    assert_refused(capfd, code, names)
-
-
-@pytest.mark.parametrize(
-    "poses",
-    [
-        np.zeros((4, 2)),
-        np.zeros(3),
-        np.zeros((0, 3)),
-        np.full((4, 3), np.nan),
-        np.array([["a", "b", "c"]]),
-        np.zeros((2, 3), dtype=complex),
-        np.array([[{}, {}, {}]], dtype=object),
-    ],
-)
-def test_impossible_poses_are_one_line(capfd, files, poses):
-    np.savez(files / "poses.npz", poses=poses)
-    assert_refused(capfd, main(arguments(files)), "pose")
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"hello", b"\x93NUMPY"])
-def test_files_of_another_kind_are_one_line(capfd, files, content):
-    (files / "poses.npz").write_bytes(content)
-    assert_refused(capfd, main(arguments(files)), "poses.npz")
-    (files / "terrain.npz").write_bytes(content)
-    assert_refused(capfd, main(arguments(files)), "terrain.npz")
-
-
-def test_a_bare_array_is_no_poses_file(capfd, files):
-    with open(files / "poses.npz", "wb") as file:
-        np.save(file, np.zeros((3, 3)))
-    assert_refused(capfd, main(arguments(files)), ".npz")
-
-
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [
-        ("--policy", "lucky"),
-        ("--friction", "0"),
-        ("--friction", "-1"),
-        ("--friction", "nan"),
-        ("--max-torque", "0"),
-        ("--max-torque", "inf"),
-    ],
-)
-def test_impossible_options_are_one_line(capfd, files, option, value):
-    code = main([*arguments(files), option, value])
-    assert_refused(capfd, code, "policy" if "policy" in option else value.lstrip("-"))
-
-
-def test_a_bad_rover_file_is_one_line_that_names_the_key(capfd, files):
-    (files / "rover.yaml").write_text("name: half\ngravity: 9.81\n")
-    assert_refused(capfd, main(arguments(files, rover=files / "rover.yaml")), "wheel")
-    (files / "rover.yaml").write_text("name: [unclosed\n")
-    assert_refused(capfd, main(arguments(files, rover=files / "rover.yaml")), "rover.yaml")
-
-
-def test_refusal_of_the_program_is_exit_code_2_and_one_line(files):
-    result = run(*arguments(files, terrain="none.npz"))
-    assert result.returncode == 2
-    assert result.stdout == ""
-    assert result.stderr.count("\n") == 1
-
-
 def test_terrain_command_makes_the_same_map_for_the_same_seed(tmp_path, capfd):
     for name in ("a.npz", "b.npz"):
         words = ["terrain", str(tmp_path / name), "--seed", "5", "--size", "4"]
@@ -272,143 +39,58 @@ def test_terrain_command_makes_the_same_map_for_the_same_seed(tmp_path, capfd):
     assert_refused(capfd, main(["terrain", str(tmp_path / "no" / "c.npz")]), "c.npz")
 
 
+def test_terrain_says_what_it_wrote(tmp_path, capfd):
+    assert main(["terrain", str(tmp_path / "a.npz"), "--size", "4", "--resolution", "0.1"]) == 0
+    columns = load_terrain(tmp_path / "a.npz").elevation.shape[1]
+    told = f"wrote {tmp_path / 'a.npz'}: {columns} x {columns} cells of 0.1 m, 100 % known\n"
+    assert capfd.readouterr().out == told
+
+
 def test_help_is_exit_code_0(capfd):
     assert main(["--help"]) == 0
-    assert main(["predict", "--help"]) == 0
-    assert "TERRAIN" in capfd.readouterr().out
+    listed = capfd.readouterr().out
+    for name in COMMANDS:
+        assert name in listed
+        assert main([name, "--help"]) == 0
+        assert f"rover_planner {name}" in capfd.readouterr().out
 
 
-GRADE_SHAPES = {
-    "traversability_class": (N,),
-    "class_constraint": (N,),
-    "class_wheel": (N,),
-    "class_margin": (N,),
-    "torque_range": (N, 6, 2),
-}
-
-
-def test_classes_and_torque_ranges_are_added_on_demand(files):
-    assert main([*arguments(files), "--classes", "--torque-ranges"]) == 0
-    with np.load(files / "out.npz", allow_pickle=False) as out:
-        assert {
-            name: out[name].shape for name in out.files
-        } == SHAPES | REPLAY_SHAPES | GRADE_SHAPES
-        assert set(out["traversability_class"]) == {"passable"}
-        assert set(out["class_constraint"]) <= {"friction", "torque", "wheel_lift"}
-        assert set(out["class_wheel"]) <= set(WHEELS)
-        assert (out["class_margin"] > 0.5).all()
-        low, high = out["torque_range"][..., 0], out["torque_range"][..., 1]
-        assert (low < 0.0).all() and (high > 0.0).all()
-
-
-def test_what_only_traction_control_passes_is_classified_so_under_either_policy(files):
-    rise = np.tile(0.45 * 0.05 * np.arange(120), (80, 1))
-    save_terrain(files / "terrain.npz", Terrain(rise, 0.05, (0.0, 0.0)))
-    for policy, traversable in (("equal", False), ("optimal", True)):
-        assert main([*arguments(files), "--classes", "--policy", policy]) == 0
-        with np.load(files / "out.npz") as out:
-            assert bool(out["traversable"]) == traversable
-            assert set(out["traversability_class"]) == {"passable with traction control"}
-            assert (out["class_margin"] > 0.0).all()
-
-
-def test_on_soil_the_file_has_sinkage_and_resistance_too(files):
-    assert main([*arguments(files), "--soil", "dry_sand"]) == 0
-    with np.load(files / "out.npz") as out:
-        assert set(out.files) == SHAPES.keys() | REPLAY_SHAPES.keys()
-        assert out["sinkage"].shape == out["motion_resistance"].shape == (N, 6)
-        assert (out["sinkage"] > 0.001).all()
-        assert (out["motion_resistance"] > 0.5).all()
-        assert (out["slip_ratio"] > 0.0).all()
-
-
-def test_arm_payload_and_tool_load_change_the_prediction(files):
-    loads = {}
-    stretched = ["arm_yaw=0", "arm_shoulder=0", "arm_elbow=0"]
-    for name, words in {
-        "stowed": [],
-        "stretched": [word for joint in stretched for word in ("--arm", joint)],
-        "payload": ["--payload", "1.5"],
-        "force": ["--tool-force", "0", "0", "5.5"],
-        "moment": ["--tool-moment", "0", "-2", "0"],
-    }.items():
-        assert main([*arguments(files), *words]) == 0
-        with np.load(files / "out.npz") as out:
-            loads[name] = out["wheel_loads"][0].copy()
-    front, stowed = [2, 5], loads["stowed"]
-    weight = stowed.sum()
-    assert loads["stretched"][front].sum() > stowed[front].sum() + 0.1
-    assert loads["payload"].sum() == pytest.approx(weight + 1.5 * 9.81)
-    assert loads["force"].sum() == pytest.approx(weight - 5.5)
-    assert loads["moment"][front].sum() < stowed[front].sum() - 0.1
+def params_of(name, *words):
+    """Return what the parser of a command makes of words, without running the command."""
+    return COMMANDS[name].make_context(name, list(words)).params
 
 
 @pytest.mark.parametrize(
-    ("words", "names"),
+    ("words", "name", "value"),
     [
-        (["--soil", "snow"], "dry_sand"),
-        (["--payload", "-1"], "payload"),
-        (["--payload", "nan"], "payload"),
-        (["--tool-force", "0", "nan", "0"], "tool_force"),
-        (["--tool-force", "0", "1"], "tool-force"),
-        (["--tool-moment", "inf", "0", "0"], "tool_moment"),
-        (["--arm", "arm_yaw"], "NAME=RAD"),
-        (["--arm", "arm_yaw=left"], "NAME=RAD"),
-        (["--arm", "arm_yaw=nan"], "NAME=RAD"),
-        (["--arm", "arm_wrist=0.1"], "arm_elbow"),
-        (["--arm", "arm_yaw=0.1"], "lacks arm_shoulder, arm_elbow"),
-        (["--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"], "twice"),
+        (["--start", "-3", "-0.5", "-1e-1"], "start", (-3.0, -0.5, -0.1)),
+        (["--start=-3", "0", "-1"], "start", (-3.0, 0.0, -1.0)),
+        (["lsr1", "spirit", "--goal", "-3", "0", "-.5", "--port", "0"], "goal", (-3.0, 0.0, -0.5)),
     ],
 )
-def test_impossible_soils_arms_and_loads_are_one_line(capfd, files, words, names):
-    assert_refused(capfd, main([*arguments(files), *words]), names)
-
-
-def test_an_arm_that_is_not_there_has_no_angles(capfd, files):
-    words = [*arguments(files, rover="m2020"), "--arm", "arm_yaw=0"]
-    assert_refused(capfd, main(words), "no manipulator")
-
-
-def ask_reach(files, *words, rover="lsr1"):
-    return main(["reach", rover, str(files / "terrain.npz"), *words])
-
-
-def test_reach_answers_in_json_whatever_the_answer(capfd, files):
-    there = ["2.0", "2.0", "0.5", "2.5", "2.3", "0.3"]
-    assert ask_reach(files, *there) == 0
-    answer = json.loads(capfd.readouterr().out)
-    assert answer["possible"] and answer["reachable"] and answer["code"] == ""
-    assert set(answer["joint_angles"]) == {"arm_yaw", "arm_shoulder", "arm_elbow"}
-    free = answer["wheel_loads"]
-    assert ask_reach(files, *there, "--force", "0", "0", "-10", "--payload", "0") == 0
-    pushed = json.loads(capfd.readouterr().out)["wheel_loads"]
-    assert sum(pushed) == pytest.approx(sum(free) + 10.0)
-    assert ask_reach(files, *there[:3], "-3.5", "2.0", "0.3") == 0
-    answer = json.loads(capfd.readouterr().out)
-    assert not answer["possible"] and answer["code"] == "too_far" and answer["out_of_reach"] > 4.0
-    assert ask_reach(files, *there, "--force", "-500", "0", "0") == 0
-    answer = json.loads(capfd.readouterr().out)
-    assert answer["reachable"] and not answer["possible"] and answer["reason"]
-    assert ask_reach(files, "-9.0", *there[1:]) == 0
-    assert json.loads(capfd.readouterr().out)["code"] == "off_map"
+def test_view_takes_negative_numbers(words, name, value):
+    assert params_of("view", *words)[name] == value
 
 
 @pytest.mark.parametrize(
-    ("change", "names"),
+    ("words", "name", "value"),
     [
-        ({"place": "nan"}, "pose"),
-        ({"target": "inf"}, "target"),
-        ({"place": "here"}, "'X'"),
-        ({"more": ["--force", "0", "0"]}, "force"),
-        ({"more": ["--moment", "0", "nan", "0"]}, "moment"),
-        ({"more": ["--soil", "snow"]}, "dry_sand"),
-        ({"more": ["--payload", "-2"]}, "payload"),
-        ({"more": ["--policy", "lucky"]}, "lucky"),
-        ({"more": ["--colour"]}, "--colour"),
-        ({"rover": "m2020"}, "no manipulator"),
+        (["--payload", "-1"], "payload", -1.0),
+        (["--payload=-1"], "payload", -1.0),
+        (["--tool-force", "-1", "0", "-2.5"], "tool_force", (-1.0, 0.0, -2.5)),
+        (["--tool-moment=-1", "-.5", "0"], "tool_moment", (-1.0, -0.5, 0.0)),
+        (["--arm", "arm_yaw=-0.5"], "arm", ["arm_yaw=-0.5"]),
     ],
 )
-def test_impossible_questions_to_the_arm_are_one_line(capfd, files, change, names):
-    place, target = change.get("place", "2"), change.get("target", "2.5")
-    words = [place, "2", "0.5", target, "2.3", "0.3", *change.get("more", [])]
-    assert_refused(capfd, ask_reach(files, *words, rover=change.get("rover", "lsr1")), names)
+def test_predict_takes_negative_numbers(words, name, value):
+    found = params_of("predict", "lsr1", "a.npz", "b.npz", "c.npz", *words)[name]
+    assert (list(found) if isinstance(value, list) else found) == value
+
+
+def test_reach_takes_negative_numbers_as_arguments_and_options():
+    words = ("lsr1", "a.npz", "-1", "-.5", "-3e-1", "-2", "0", "-0.2", "--force", "-1", "0", "-10")
+    params = params_of("reach", *words)
+    assert [params[name] for name in ("x", "y", "yaw", "tx", "ty", "tz")] == [
+        -1.0, -0.5, -0.3, -2.0, 0.0, -0.2,
+    ]  # fmt: skip
+    assert params["force"] == (-1.0, 0.0, -10.0)

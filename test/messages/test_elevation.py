@@ -19,7 +19,7 @@ from msg_adapters.elevation import (
 from msg_adapters.errors import MessageError
 from msg_adapters.gridding import detect_raster
 from rover_physics.errors import TerrainError
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.grid import Terrain
 
 FLOAT32, FLOAT64 = PointField.FLOAT32, PointField.FLOAT64
 
@@ -98,11 +98,9 @@ def test_any_grid_in_millimetres_comes_back_as_it_was(rows, columns, millimetres
     assert_same(terrain_from_point_cloud(terrain_to_point_cloud(terrain, "map")), terrain)
 
 
-@pytest.mark.parametrize(
-    "name", ["erc_marsyard2021_9cm", "mer_spirit_sol1352_hazcam_3cm", "otira_tls_boulders_3cm"]
-)
-def test_a_real_map_comes_back_as_it_was(terrain_dir, name):
-    terrain = load_terrain(terrain_dir / f"{name}.npz")
+@pytest.mark.parametrize("name", ["spirit", "erc_marsyard2021_9cm", "otira_tls_boulders_3cm"])
+def test_a_real_map_comes_back_as_it_was(real_map, name):
+    terrain = real_map(name)
     back = terrain_from_point_cloud(terrain_to_point_cloud(terrain, "map"))
     np.testing.assert_array_equal(back.elevation, terrain.elevation)
     assert back.resolution == pytest.approx(terrain.resolution, abs=1e-8)

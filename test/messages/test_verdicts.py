@@ -53,6 +53,14 @@ def test_every_entry_but_those_per_waypoint_becomes_a_key_and_a_value():
     }
 
 
+def test_json_opens_with_the_verdict_and_ends_with_the_long_lists():
+    verdict = {"codes": ["", "tilt"], "min_tip_over_ratio": 0.8, "reasons": ["", "x"]} | BAD
+    names = list(json.loads(verdict_to_json(verdict)))
+    assert names[:3] == ["traversable", "code", "reason"]
+    assert set(names[-2:]) == {"codes", "reasons"}
+    assert set(names) == set(verdict)
+
+
 def test_json_is_strict_whatever_the_numbers():
     text = verdict_to_json(
         GOOD

@@ -1,17 +1,23 @@
-"""The mission planner reads its goals, and says so when no server answers."""
+"""The mission planner reads its goals, and tells by its exit code what came of them."""
 
+import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
+from rover_planner.nodes.mission_options import MissionOptions, Pose
 from rover_planner.nodes.mission_planner import main
+from rover_planner.nodes.programs import read_words
+from support.command_line import REPOSITORY
+from support.grounds import make_terrain, wall_at
+from support.ros_fixtures import domain_id
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
+"""Words for a start, a goal before the wall at x = 0.5 m, and one behind it."""
 
 
 @pytest.mark.parametrize(
@@ -19,46 +25,103 @@ REPOSITORY = Path(__file__).resolve().parents[2]
     [
         ([], "--start"),
         (["--start=0,0,0"], "--goal"),
-        (["--start=0,0", "--goal=1,0,0"], "0,0"),
-        (["--start=0,0,0", "--goal=home"], "home"),
+        (["--start=0,0", "--goal=1,0,0"], "'0,0' is no pose; it must be X,Y,YAW"),
+        (["--start=0,0,0,0", "--goal=1,0,0"], "'0,0,0,0' is no pose"),
+        (["--start=0,0,0", "--goal=home"], "'home' is no pose"),
+        (["--start=0,0,0", "--goal=1,nan,0"], "'1,nan,0' is no pose"),
+        (["--start=0,0,0", "--goal=1,0,0", "--map=opportunity"], "presets are spirit"),
     ],
 )
-def test_bad_arguments_are_exit_code_2(capfd, words, names):
-    with pytest.raises(SystemExit) as exit_info:
-        main(words)
-    assert exit_info.value.code == 2
-    assert names in capfd.readouterr().err
-
-
-def test_a_bad_map_is_exit_code_2_with_one_line(capfd, tmp_path):
-    words = ["--start=0,0,0", "--goal=1,0,0", f"--map={tmp_path / 'none.npz'}"]
+def test_bad_words_are_exit_code_2_with_one_line(capfd, words, names):
     assert main(words) == 2
     err = capfd.readouterr().err
-    assert err.count("\n") == 1
-    assert "none.npz" in err
+    assert err.startswith("mission_planner: ") and err.count("\n") == 1
+    assert names in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
+        ["--start=-3,0,0", "--goal=-.5,-1e-1,0"],
+    ],
+)
+def test_negative_numbers_need_no_equals_sign(words):
+    options = read_words("mission_planner", words)
+    assert isinstance(options, MissionOptions)
+    assert options.start == Pose(-3.0, 0.0, 0.0)
+    assert options.goals == (Pose(-0.5, -0.1, 0.0),)
+
+
+def test_words_of_ros_are_put_aside():
+    ros_words = ["--ros-args", "-r", "__node:=planner", "-p", "use_sim_time:=true"]
+    words = [START, NEAR, *ros_words, "--", BEYOND, "--json"]
+    options = read_words("mission_planner", words)
+    assert options.goals == (Pose(-0.5, 0.0, 0.0), Pose(2.0, 0.0, 0.0))
+    assert options.json and not options.drive
+
+
+def run_planner(*words):
+    """Run the program in a process of its own; return exit code, stdout and stderr."""
+    ended = subprocess.run(
+        [sys.executable, "-m", "rover_planner.nodes.mission_planner", *words],
+        cwd=REPOSITORY,
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert "Traceback" not in ended.stderr
+    return ended.returncode, ended.stdout, ended.stderr
+
+
+@pytest.fixture
+def walled(server):
+    """A server whose map has a wall at x = 0.5 m."""
+    server.service.take_terrain(make_terrain(wall_at(0.5)))
+    return server
+
+
+@pytest.mark.parametrize(
+    ("goals", "code", "answers"),
+    [
+        ([NEAR], 0, ["yes"]),
+        ([BEYOND], 3, ["no, "]),
+        ([BEYOND, NEAR], 3, ["no, ", "yes"]),
+    ],
+)
+def test_a_goal_that_is_not_traversable_has_an_exit_code_of_its_own(walled, goals, code, answers):
+    ended, out, err = run_planner(START, *goals)
+    assert (ended, err) == (code, "")
+    told = [line for line in out.splitlines() if line.startswith("goal ")]
+    for number, (line, answer) in enumerate(zip(told, answers, strict=True), start=1):
+        assert line.startswith(f"goal {number}: {answer}")
+
+
+def test_goals_and_candidates_count_from_one_in_json(walled):
+    code, out, _ = run_planner(START, NEAR, NEAR, "--json")
+    assert code == 0
+    events = [json.loads(line) for line in out.splitlines()]
+    answers = [event for event in events if event["event"] == "answer"]
+    assert [event["goal"] for event in answers] == [1, 2]
+    for event in answers:
+        assert f"chose {event['answer']['chosen_candidate']}:" in event["answer"]["explanation"]
+
+
+def test_a_question_that_nothing_was_judged_for_is_a_failure(server):
+    code, out, err = run_planner(START, NEAR, "--timeout=1")
+    assert (code, err) == (1, "")
+    assert "goal 1: not judged, " in out
+
+
+def test_a_rover_that_is_not_there_fails_the_drive(walled):
+    code, out, err = run_planner(START, NEAR, "--drive", "--timeout=2")
+    assert code == 1
+    assert "goal 1: yes" in out
+    assert err == "mission_planner: waited 2 s in vain for a rover on the topic path\n"
 
 
 def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for():
-    result = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "rover_planner.nodes.mission_planner",
-            "--start=0,0,0",
-            "--goal=1,0,0",
-            "--timeout=1",
-        ],
-        cwd=REPOSITORY,
-        env=os.environ
-        | {
-            "ROS_DOMAIN_ID": "99",
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "PYTHONPATH": str(REPOSITORY),
-        },
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert result.returncode == 1
-    assert "can_traverse" in result.stderr
-    assert "Traceback" not in result.stderr
+    code, _, err = run_planner(START, NEAR, "--timeout=1")
+    assert code == 4
+    assert err.count("\n") == 1 and "can_traverse" in err

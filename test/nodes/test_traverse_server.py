@@ -15,7 +15,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.predictions import JOINTS, MEASURES, array_values
-from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_physics.terrain.grid import save_terrain
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
 from support.grounds import gap, make_terrain, wall_at, waves
@@ -265,9 +265,9 @@ def test_the_measured_suspension_raises_a_warning_where_it_disagrees(mapped, cli
 def test_a_real_map_is_answered_for_over_dds_as_from_its_file(
     server,
     client,
-    terrain_dir,
+    real_map,
 ):
-    terrain = load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz")
+    terrain = real_map("erc_marsyard2021_9cm")
     client.send_terrain(terrain)
     np.testing.assert_array_equal(server.service.terrain.elevation, terrain.elevation)
     plan, verdict, _ = ask(client, start=(-4.0, 0.0, 0.0), goal=(6.0, 1.0, 0.0))

@@ -1,10 +1,12 @@
 """Goals are chosen from the map: known ground to stand on, hard ground, and beyond the edge."""
 
+import math
+
 import numpy as np
 import pytest
 
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.goals import choose_mission, footprint_radius
 from rover_planner.worlds.mars_terrain import make_mars_terrain
@@ -47,6 +49,30 @@ def test_hard_goals_are_what_they_say(rover, holed):
     assert holed.contains(x, y)
     assert np.isnan(holed.elevation_at(x, y))
     assert np.isfinite(holed.elevation_at(*places["steep"][:2]))
+
+
+def test_all_ground_on_the_way_to_the_rough_goal_is_known(rover):
+    spirit = load_terrain("spirit").fill_gaps(0.2)
+    for seed in (1, 2):
+        mission = choose_mission(spirit, rover, seed)
+        goal = by_intent(mission)["rough"]
+        way = np.linspace(mission.start[:2], goal[:2], 200)
+        assert np.isfinite(spirit.elevation_at(way[:, 0], way[:, 1])).all()
+
+
+def test_the_height_of_a_map_with_holes_does_not_matter(rover, holed):
+    raised = Terrain(holed.elevation + 100.0, holed.resolution, holed.origin)
+    assert choose_mission(raised, rover) == choose_mission(holed, rover)
+
+
+def test_no_goal_on_the_plain_is_beside_the_start(rover):
+    spirit = load_terrain("spirit").fill_gaps(0.2)
+    for seed in range(1, 6):
+        mission = choose_mission(spirit, rover, seed)
+        plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
+        assert len(plain) >= 2
+        away = [math.hypot(x - mission.start[0], y - mission.start[1]) for x, y, _ in plain]
+        assert min(away) > 2.0 * footprint_radius(rover)
 
 
 def test_a_map_without_holes_has_no_unknown_goal(rover):

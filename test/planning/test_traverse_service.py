@@ -1,6 +1,7 @@
 """The service knows a map, a path and joint angles, and answers from them without ROS."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -211,6 +212,15 @@ def test_terrain_and_request_turned_together_give_the_same_answer():
     )
 
 
+@pytest.mark.parametrize(("ground", "opening"), [(rocky, "chose"), (wall_at(0.5), "number")])
+def test_candidates_are_counted_from_one_in_words_and_numbers(ground, opening):
+    verdict = make_service(make_terrain(ground)).answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)).verdict
+    assert 1 <= verdict["chosen_candidate"] <= verdict["candidates"]
+    found = re.search(rf"\b{opening} (\d+)", verdict["explanation"])
+    assert found is not None, verdict["explanation"]
+    assert int(found[1]) == verdict["chosen_candidate"]
+
+
 def test_mirrored_terrain_and_request_swap_right_and_left():
     terrain = make_terrain(rocky)
     mirrored = Terrain(np.ascontiguousarray(terrain.elevation[::-1]), 0.05, terrain.origin)
@@ -270,19 +280,19 @@ PHYSICAL = {
     ids=["plain", "another plain", "crater rim", "hill", "off the map"],
 )
 def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
-    terrain_dir,
+    real_map,
     start,
     goal,
     codes,
 ):
-    service = make_service(load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz"))
+    service = make_service(real_map("erc_marsyard2021_9cm"))
     verdict = service.answer(start, goal).verdict
     assert verdict["code"] in codes, verdict["reason"]
     assert verdict["traversable"] == (not verdict["reason"]) == (codes == {""})
 
 
-def test_the_real_martian_ground_is_passed_where_it_is_known(terrain_dir):
-    terrain = load_terrain(terrain_dir / "mer_spirit_sol1352_hazcam_3cm.npz")
+def test_the_real_martian_ground_is_passed_where_it_is_known():
+    terrain = load_terrain("spirit")
     north = math.pi / 2
     start, goal = (-48.5, -20.5, north), (-48.5, -18.0, north)
     strict = make_service(terrain).answer(start, goal).verdict

@@ -6,7 +6,7 @@ import pytest
 from rover_physics.errors import RoverFileError
 from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import load_rover, preset_names
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge_path import judge_path
 from rover_planner.command.prediction_files import read_prediction, write_prediction
 from rover_planner.command.view import choose_ends
@@ -180,7 +180,15 @@ def test_default_ends_are_where_the_rover_can_stand():
     assert ViewSession(LSR1, ground, (x, y, 0.0), goal).shown.trajectory.length > 0.0
 
 
-def test_default_ends_exist_where_the_rover_can_stand_nowhere():
+def test_on_a_map_with_much_unknown_ground_the_ends_are_where_it_is_known():
+    spirit = load_terrain("spirit").fill_gaps(0.2)
+    start, goal = choose_ends(LSR1, spirit)
+    way = np.linspace(start[:2], goal[:2], 100)
+    assert np.isfinite(spirit.elevation_at(way[:, 0], way[:, 1])).all()
+    assert ViewSession(LSR1, spirit, start, goal).answer.traversable
+
+
+def test_where_the_rover_can_stand_nowhere_ends_are_chosen_all_the_same():
     steep = make_terrain(lambda x, y: 2.0 * x)
     start, goal = choose_ends(LSR1, steep)
     assert (start, goal) == (pytest.approx((-2.0, 0.0, 0.0)), pytest.approx((2.0, 0.0, 0.0)))

@@ -1,6 +1,7 @@
 """The terrain: what is refused, the bilinear look-up, filled gaps and files."""
 
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from rover_physics.errors import TerrainError
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.terrain.presets import terrain_presets
 
 
 def plane(ny=6, nx=8, resolution=0.5, origin=(-1.0, 2.0), a=0.1, b=-0.2, c=0.3):
@@ -390,20 +392,43 @@ def test_a_damaged_entry_is_named(tmp_path):
 
 
 def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
-    with pytest.raises(TerrainError, match=r"none\.npz: cannot be read: No such file"):
-        load_terrain(tmp_path / "none.npz")
+    for path in (tmp_path / "none.npz", str(tmp_path / "none.npz")):
+        with pytest.raises(
+            TerrainError, match=r"none\.npz': it is no file, and the presets are sp"
+        ):
+            load_terrain(path)
     with pytest.raises(TerrainError, match="cannot be read: Is a directory"):
         load_terrain(tmp_path)
     with pytest.raises(TerrainError, match="cannot be written: No such file"):
         save_terrain(tmp_path / "none" / "map.npz", plane())
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["erc_marsyard2021_9cm", "mer_spirit_sol1352_hazcam_3cm", "otira_tls_boulders_3cm"],
-)
-def test_a_real_map_is_loaded_and_known_at_its_known_cells(terrain_dir, name):
-    terrain = load_terrain(terrain_dir / f"{name}.npz")
+def test_a_preset_is_found_by_its_name_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    terrain = load_terrain("spirit")
+    assert terrain.elevation.shape == (400, 434)
+    assert terrain.resolution == pytest.approx(0.03)
+    assert np.isnan(terrain.elevation).mean() == pytest.approx(0.55, abs=0.01)
+
+
+def test_a_preset_keeps_its_source_and_licence():
+    for name, path in terrain_presets().items():
+        with np.load(path, allow_pickle=False) as entries:
+            assert "NASA/JPL" in str(entries["licence"]), name
+            assert str(entries["source"])
+
+
+def test_a_name_that_is_neither_preset_nor_file_is_refused_with_the_presets(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(TerrainError, match="no terrain 'opportunity': .* presets are spirit"):
+        load_terrain("opportunity")
+    with pytest.raises(TerrainError, match="no terrain 'spirit'"):
+        load_terrain(Path("spirit"))  # a path is a file, whatever the presets are called
+
+
+@pytest.mark.parametrize("name", ["spirit", "erc_marsyard2021_9cm", "otira_tls_boulders_3cm"])
+def test_a_real_map_is_loaded_and_known_at_its_known_cells(real_map, name):
+    terrain = real_map(name)
     known = np.isfinite(terrain.elevation)
     rows, columns = np.nonzero(known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:])
     x = terrain.origin[0] + terrain.resolution * columns

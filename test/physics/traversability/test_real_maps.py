@@ -15,15 +15,15 @@ SLOPE_REASONS = {"friction", "tilt", "tip_over", "wheel_lift"}
 
 
 @pytest.fixture(scope="module")
-def mars_yard(terrain_dir) -> Terrain:
+def mars_yard(real_map) -> Terrain:
     """Return the Mars Yard of the European Rover Challenge: craters, hills, stones."""
-    return load_terrain(terrain_dir / "erc_marsyard2021_9cm.npz")
+    return real_map("erc_marsyard2021_9cm")
 
 
 @pytest.fixture(scope="module")
-def gusev(terrain_dir) -> Terrain:
+def gusev() -> Terrain:
     """Return the ground around Spirit on sol 1352: more than half of it unknown."""
-    return load_terrain(terrain_dir / "mer_spirit_sol1352_hazcam_3cm.npz")
+    return load_terrain("spirit")
 
 
 def straight(start, end, spacing=0.02) -> np.ndarray:

@@ -1,0 +1,33 @@
+"""Terrains that come with the package, found by name."""
+
+from pathlib import Path
+
+from rover_physics.errors import TerrainError
+from rover_physics.files.config_files import find_config
+
+
+def terrain_presets() -> dict[str, Path]:
+    """Return the files of the preset terrains by name, which is the first word of the file's."""
+    files = sorted(find_config("terrain").glob("*.npz"))
+    return {path.stem.partition("_")[0]: path for path in files}
+
+
+def find_terrain_file(name_or_path: str | Path) -> Path:
+    """Return the file of a preset terrain, or the path as it is.
+
+    Args:
+        name_or_path: A preset's name such as ``"spirit"``, or the path of an ``.npz`` file.
+
+    Raises:
+        TerrainError: Neither a preset nor a file; names the presets.
+    """
+    presets = terrain_presets()
+    if not isinstance(name_or_path, Path) and name_or_path in presets:
+        return presets[name_or_path]
+    path = Path(name_or_path)
+    if not path.exists():
+        raise TerrainError(
+            f"no terrain {str(name_or_path)!r}: it is no file, and the presets are "
+            f"{', '.join(presets)}"
+        )
+    return path

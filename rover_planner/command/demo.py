@@ -1,0 +1,33 @@
+"""The command `rover_planner demo`: a server, a planner that asks it, a table and a picture."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rover_planner.command.options import MaxGap, RoverOption
+
+
+def demo(
+    map_name: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            metavar="TERRAIN",
+            help="Preset name (spirit) or elevation map, .npz; by default one is made.",
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Picture to write, .png.")] = Path(
+        "demo_output/demo.png"
+    ),
+    rover: RoverOption = "lsr1",
+    seed: Annotated[int, typer.Option(help="Seed of the terrain and the goals.")] = 1,
+    max_gap: MaxGap = 0.2,
+) -> None:
+    """Ask a running traverse_server over ROS 2 for several goals, and picture its answers.
+
+    Exit code 0 when it ran, whatever the answers; 1 if a part of it failed; 2 for bad input.
+    """
+    from rover_planner.demo.demo import run_demo
+
+    run_demo(map_name, out, rover, seed, max_gap)

@@ -1,0 +1,28 @@
+"""The command `rover_planner figure4`: Figure 4 of the paper."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rover_planner.command.extras import need
+from rover_planner.command.options import RoverOption
+
+
+def figure4(
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="Picture to write, .png; is overwritten.")
+    ] = Path("figure4.png"),
+    rover: RoverOption = "lsr1",
+) -> None:
+    """Draw Figure 4 of the paper: how the torque of one wheel changes the loads of all."""
+    need("matplotlib", "the picture")
+    from rover_physics.rover.rover_file import load_rover
+    from rover_planner.figures.figure4 import draw_figure4
+    from rover_planner.progress import show_progress
+
+    model = load_rover(rover)
+    with show_progress() as progress:
+        progress(f"draw {out.name} (the first run compiles the model)")
+        draw_figure4(out, model)
+    typer.echo(f"wrote {out}")

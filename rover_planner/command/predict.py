@@ -1,0 +1,116 @@
+"""The command `rover_planner predict`: loads, slip and margins along a path, into a file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rover_planner.command.options import (
+    Friction,
+    MaxTorque,
+    Payload,
+    Policy,
+    RoverName,
+    SoilName,
+    TerrainName,
+    Vector,
+)
+
+if TYPE_CHECKING:
+    from rover_physics.traversability.verdict import Verdict
+
+
+def predict(
+    rover: RoverName,
+    terrain: TerrainName,
+    poses: Annotated[
+        Path, typer.Argument(metavar="POSES", help="Poses x, y, yaw of the body, .npz.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Predictions, .npz; is overwritten.")],
+    friction: Friction = None,
+    max_torque: MaxTorque = None,
+    policy: Policy = "equal",
+    soil: SoilName = None,
+    arm: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=RAD", help="Angle of a joint of the arm in rad; give all."),
+    ] = None,
+    payload: Payload = None,
+    tool_force: Annotated[
+        Vector | None,
+        typer.Option(metavar="FX FY FZ", help="Force on the arm's tip in N, body frame."),
+    ] = None,
+    tool_moment: Annotated[
+        Vector | None,
+        typer.Option(metavar="MX MY MZ", help="Moment on the arm's tip in N m, body frame."),
+    ] = None,
+    sigmas: Annotated[
+        float,
+        typer.Option(
+            metavar="K",
+            help="Standard deviations to allow for where the map has elevation_std; 0: none.",
+        ),
+    ] = 3.0,
+    classes: Annotated[
+        bool,
+        typer.Option(
+            "--classes",
+            help="Add the class of each waypoint, by both torque policies.",
+        ),
+    ] = False,
+    torque_ranges: Annotated[
+        bool,
+        typer.Option("--torque-ranges", help="Add the torques with which each wheel can do."),
+    ] = False,
+) -> None:
+    """Predict loads, slip and margins along a path of poses and write them to a file.
+
+    Exit code 0 when it ran, whatever the verdict; 2 for bad input.
+    """
+    from rover_physics.prediction.sweep_options import SweepOptions
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.terrain.grid import load_terrain
+    from rover_physics.traversability.classification import classify_judged
+    from rover_physics.traversability.judge_path import judge_path
+    from rover_physics.traversability.torque_ranges import find_torque_ranges
+    from rover_planner.command.arm_options import read_arm_angles
+    from rover_planner.command.prediction_files import read_poses, write_prediction
+    from rover_planner.progress import show_progress
+
+    model = load_rover(rover)
+    ground = load_terrain(terrain)
+    path = read_poses(poses)
+    options = SweepOptions(
+        policy=policy,
+        friction=friction,
+        max_torque=max_torque,
+        soil=soil,
+        joint_angles=read_arm_angles(model, arm or ()),
+        payload=payload,
+        tool_force=tool_force,
+        tool_moment=tool_moment,
+    )
+    with show_progress() as progress:
+        progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
+        judged = judge_path(model, ground, path, options, sigmas=sigmas)
+        if classes:
+            progress("classify the waypoints")
+        found = (
+            classify_judged(model, ground, *judged, options, sigmas=sigmas) if classes else None
+        )
+        if torque_ranges:
+            progress("find the ranges of the torques")
+        ranges = find_torque_ranges(model, ground, path, options) if torque_ranges else None
+    on_soil = soil is not None or bool(ground.soil_names)
+    write_prediction(out, *judged, on_soil=on_soil, classes=found, ranges=ranges)
+    typer.echo(f"wrote {out}: {_summarise(len(path), judged[1])}")
+
+
+def _summarise(count: int, verdict: "Verdict") -> str:
+    """Return the number of waypoints and the verdict in words."""
+    waypoints = f"{count} waypoint{'s' if count > 1 else ''}"
+    if verdict.traversable:
+        return f"{waypoints}, traversable"
+    return (
+        f"{waypoints}, not traversable from waypoint {verdict.first_failure} on: {verdict.reason}"
+    )

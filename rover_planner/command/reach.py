@@ -1,0 +1,67 @@
+"""The command `rover_planner reach`: whether the arm of a rover at rest reaches a point."""
+
+import json
+from typing import Annotated
+
+import typer
+
+from rover_planner.command.options import (
+    Friction,
+    MaxTorque,
+    Payload,
+    Policy,
+    RoverName,
+    SoilName,
+    TerrainName,
+    Vector,
+)
+
+
+def reach(
+    rover: RoverName,
+    terrain: TerrainName,
+    x: Annotated[float, typer.Argument(metavar="X", help="Place of the body in m, map frame.")],
+    y: Annotated[float, typer.Argument(metavar="Y")],
+    yaw: Annotated[float, typer.Argument(metavar="YAW", help="Heading of the body in rad.")],
+    tx: Annotated[float, typer.Argument(metavar="TX", help="Place for the tip in m, map frame.")],
+    ty: Annotated[float, typer.Argument(metavar="TY")],
+    tz: Annotated[float, typer.Argument(metavar="TZ")],
+    force: Annotated[
+        Vector | None,
+        typer.Option(metavar="FX FY FZ", help="Force on the tip there in N, map frame."),
+    ] = None,
+    moment: Annotated[
+        Vector | None,
+        typer.Option(metavar="MX MY MZ", help="Moment on the tip there in N m, map frame."),
+    ] = None,
+    payload: Payload = None,
+    friction: Friction = None,
+    max_torque: MaxTorque = None,
+    policy: Policy = "equal",
+    soil: SoilName = None,
+) -> None:
+    """Tell as JSON whether the rover at rest can reach a point with its arm, and push there.
+
+    Exit code 0 when it ran, whatever the answer; 2 for bad input.
+    """
+    from rover_physics.prediction.sweep_options import SweepOptions
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.terrain.grid import load_terrain
+    from rover_physics.traversability.reach import judge_reach
+    from rover_planner.progress import show_progress
+
+    model, ground = load_rover(rover), load_terrain(terrain)
+    with show_progress() as progress:
+        progress(f"ask {model.name} (the first run compiles the model)")
+        answer = judge_reach(
+            model,
+            ground,
+            (x, y, yaw),
+            (tx, ty, tz),
+            SweepOptions(
+                payload=payload, friction=friction, max_torque=max_torque, policy=policy, soil=soil
+            ),
+            force=force,
+            moment=moment,
+        )
+    typer.echo(json.dumps(answer.to_dict(), allow_nan=False))

@@ -1,0 +1,90 @@
+"""What the words of the program mission_planner mean; needs no ROS."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+import typer
+
+
+class Pose(NamedTuple):
+    """A pose of the body in the map frame."""
+
+    x: float
+    """In [m]."""
+    y: float
+    """In [m]."""
+    yaw: float
+    """In [rad]."""
+
+
+@dataclass(frozen=True)
+class MissionOptions:
+    """What a mission planner is to do."""
+
+    start: Pose
+    """Where the rover stands."""
+    goals: tuple[Pose, ...]
+    """Where it is asked to go, one question each."""
+    map_name: str | None
+    """Preset or file of the map to publish first; None publishes none."""
+    drive: bool
+    """Whether to send plans to the rover."""
+    map_frame: str
+    """Frame of map and poses."""
+    timeout: float
+    """Longest wait for an answer [s]."""
+    json: bool
+    """Whether to print JSON."""
+
+
+def read_pose(text: str) -> Pose:
+    """Read X,Y,YAW.
+
+    Raises:
+        typer.BadParameter: Not three finite numbers.
+    """
+    try:
+        pose = Pose(*(float(part) for part in text.split(",")))
+    except (TypeError, ValueError):
+        pose = Pose(math.nan, math.nan, math.nan)
+    if not all(map(math.isfinite, pose)):
+        raise typer.BadParameter(f"{text!r} is no pose; it must be X,Y,YAW in m and rad")
+    return pose
+
+
+def read_mission(
+    start: Annotated[
+        Pose,
+        typer.Option(
+            parser=read_pose, metavar="X,Y,YAW", help="Where the rover stands, in m and rad."
+        ),
+    ],
+    goal: Annotated[
+        list[Pose],
+        typer.Option(
+            parser=read_pose, metavar="X,Y,YAW", help="Where it is to go; may be given repeatedly."
+        ),
+    ],
+    map_name: Annotated[
+        str | None,
+        typer.Option(
+            "--map", metavar="TERRAIN", help="Map to publish first: preset (spirit) or .npz file."
+        ),
+    ] = None,
+    drive: Annotated[
+        bool,
+        typer.Option("--drive", help="Send each plan to the rover and wait until it is there."),
+    ] = False,
+    map_frame: Annotated[
+        str, typer.Option(metavar="FRAME", help="Frame of map and poses.")
+    ] = "map",
+    timeout: Annotated[
+        float, typer.Option(metavar="S", help="Longest wait for an answer in s.")
+    ] = 60.0,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a JSON object a line; goals count from 1.")
+    ] = False,
+) -> MissionOptions:
+    """Return what the words of the program mean."""
+    return MissionOptions(start, tuple(goal), map_name, drive, map_frame, timeout, as_json)

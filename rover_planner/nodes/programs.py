@@ -1,0 +1,175 @@
+"""The node programs: what each is for its help, and how its words are read; needs no ROS."""
+
+import itertools
+import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import typer
+
+from rover_planner.command.run_app import run_app
+from rover_planner.errors import PlanningError
+from rover_planner.nodes.mission_options import read_mission
+from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
+from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
+from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
+from rover_planner.parameters.spec import ParameterSpec
+
+HELP_WORDS = ("-h", "--help")
+_EXIT_CODES = "Exit code 0 when it was told to stop; 2 for a wrong parameter or missing library."
+
+
+@dataclass(frozen=True)
+class Program:
+    """One of the node programs."""
+
+    what: str
+    """What it does, in a sentence."""
+    topics: str
+    """What it hears, serves and publishes, in a line."""
+    read: Callable[..., Any]
+    """Its options, as typer takes them; returns what they mean."""
+    parameters: tuple[ParameterSpec, ...] = ()
+    """Its table of parameters."""
+    exit_codes: str = _EXIT_CODES
+    """Which exit code means what."""
+
+
+def read_nothing() -> dict[str, Any]:
+    """Return the parameters that the words of a program without options set: none."""
+    return {}
+
+
+def read_engine(
+    engine: Annotated[
+        str,
+        typer.Option(
+            metavar="quasi_static|mujoco", help="What moves it; sets the parameter engine."
+        ),
+    ] = "",
+) -> dict[str, Any]:
+    """Return the parameters that the words of rover_simulator set."""
+    return {"engine": engine} if engine else {}
+
+
+PROGRAMS = {
+    "traverse_server": Program(
+        "Answer over ROS 2 whether the rover can traverse a path, and why not.",
+        "subscribes elevation_cloud, joint_states, ~/path, ~/tool_target, ~/tool_wrench; serves "
+        "~/can_traverse, ~/check_path, ~/check_reach, ~/load_map; publishes ~/plan, ~/verdict, "
+        "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
+        "~/torque_saturation, ~/tip_over_margin, ~/markers",
+        read_nothing,
+        TRAVERSE_SERVER,
+    ),
+    "traction_controller": Program(
+        "Share the wheel torques by a quadratic program at its rate.",
+        "subscribes joint_states, imu, cmd_vel, odometry, elevation_cloud; publishes ~/commands, "
+        "~/wheel_loads, ~/friction_utilisation, ~/contact_angles, /diagnostics",
+        read_nothing,
+        TRACTION_CONTROLLER,
+    ),
+    "rover_simulator": Program(
+        "Simulate a rover on a terrain, with the topics of a real one.",
+        "subscribes path, cmd_vel, /traction_controller/commands; publishes joint_states, "
+        "odometry, imu, elevation_cloud, cmd_vel, /diagnostics",
+        read_engine,
+        ROVER_SIMULATOR,
+    ),
+    "mission_planner": Program(
+        "Ask a traverse_server over ROS 2 for one goal after another.",
+        "calls /traverse_server/can_traverse; subscribes /traverse_server/verdict, "
+        "/traverse_server/wheel_loads, /traverse_server/slip_ratios, odometry; publishes "
+        "elevation_cloud, path",
+        read_mission,
+        exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "
+        "question was refused before any path was judged, or the rover did not get there. 2: bad "
+        "input, or a missing library. 3: a goal is not traversable. 4: no server, or no answer in "
+        "time.",
+    ),
+}
+"""The node programs by name."""
+
+
+def read_words(name: str, words: Sequence[str] | None) -> Any:
+    """Return what the words of a node program mean, ROS's own put aside.
+
+    Args:
+        name: One of PROGRAMS.
+        words: Its arguments; None takes those of the process.
+
+    Returns:
+        What the program's `read` returns; 0, an exit code, after help was printed.
+
+    Raises:
+        PlanningError: The words have no meaning, ROS's own included.
+    """
+    from rclpy.utilities import remove_ros_args
+
+    given = sys.argv[1:] if words is None else list(words)
+    _refuse_old_remappings(given)
+    try:
+        own = remove_ros_args([name, *given])[1:]
+    except RuntimeError as error:  # of several classes that rclpy does not export
+        raise PlanningError(str(error)) from error
+    return run_app(_make_app(name), name, own)
+
+
+def _refuse_old_remappings(words: Sequence[str]) -> None:
+    """Refuse NAME:=VALUE without --ros-args: ROS takes it as a remapping, not as a parameter."""
+    for word in itertools.takewhile(lambda word: word != "--ros-args", words):
+        if ":=" in word:
+            raise PlanningError(
+                f"{word} has no meaning without --ros-args: set a parameter by --ros-args -p "
+                "NAME:=VALUE, remap a topic by --ros-args -r NAME:=NAME"
+            )
+
+
+def print_help(name: str) -> None:
+    """Print the help of a node program."""
+    run_app(_make_app(name), name, HELP_WORDS[-1:])
+
+
+def _make_app(name: str) -> typer.Typer:
+    """Return the app that reads the words of a program and has its help."""
+    program = PROGRAMS[name]
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+    app.command(
+        name,
+        help=f"{program.what}\n\n{program.exit_codes}",
+        epilog="\n\n".join(_epilog(program)),
+        options_metavar="[OPTIONS] [--ros-args -p NAME:=VALUE ...]",
+        context_settings={"help_option_names": list(HELP_WORDS), "max_content_width": 99},
+    )(program.read)
+    return app
+
+
+def _epilog(program: Program) -> list[str]:
+    """Return the paragraphs of the help that follow the options."""
+    topics = f"Topics and services: {program.topics}."
+    if not program.parameters:
+        return [topics]
+    as_they_are = "\b"  # click keeps the lines of such a paragraph
+    lines = [as_they_are, "Parameters, each set by --ros-args -p NAME:=VALUE:"]
+    for spec in program.parameters:
+        lines += _indent(f"{spec.name}: {_describe(spec)}", 2, 10)
+        lines += _indent(spec.doc, 6, 6)
+    return [topics, "\n".join(lines)]
+
+
+def _indent(text: str, first: int, others: int) -> list[str]:
+    """Return the lines of a text, indented by a number of blanks."""
+    return textwrap.wrap(text, 88, initial_indent=first * " ", subsequent_indent=others * " ")
+
+
+def _describe(spec: ParameterSpec) -> str:
+    """Return type, default and unit of a parameter, and what it may be."""
+    default = "empty" if spec.default == "" else str(spec.default)
+    words = [spec.type_name, f"default {default} {spec.unit}".rstrip()]
+    if spec.bounds is not None:
+        words.append(f"{spec.bounds[0]:g} to {spec.bounds[1]:g}")
+    if spec.choices:
+        words.append("one of " + ", ".join(spec.choices))
+    return ", ".join(words)

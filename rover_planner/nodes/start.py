@@ -1,0 +1,41 @@
+"""Starts the node programs: help and missing libraries are told before ROS is imported."""
+
+import importlib
+import sys
+
+from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.command.extras import need
+from rover_planner.errors import PlanningError
+from rover_planner.nodes.programs import HELP_WORDS, print_help
+
+
+def start_traverse_server() -> int:
+    """Run the program traverse_server and return its exit code."""
+    return _start("traverse_server")
+
+
+def start_traction_controller() -> int:
+    """Run the program traction_controller and return its exit code."""
+    return _start("traction_controller")
+
+
+def start_rover_simulator() -> int:
+    """Run the program rover_simulator and return its exit code."""
+    return _start("rover_simulator")
+
+
+def start_mission_planner() -> int:
+    """Run the program mission_planner and return its exit code."""
+    return _start("mission_planner")
+
+
+def _start(name: str) -> int:
+    if not set(HELP_WORDS).isdisjoint(sys.argv[1:]):
+        print_help(name)
+        return EXIT_OK
+    try:
+        need("rclpy", "the node")
+    except PlanningError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    return importlib.import_module(f"rover_planner.nodes.{name}").main()

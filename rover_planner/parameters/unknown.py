@@ -1,0 +1,31 @@
+"""Parameters that were given to a node at its start and that it does not have."""
+
+import difflib
+from collections.abc import Iterable
+
+from rclpy.node import Node
+
+from rover_planner.parameters.spec import ParameterSpec
+
+_ROS_OWN = ("qos_overrides.",)
+
+
+def warn_of_unknown_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
+    """Warn once of each parameter that was given at start and is not declared.
+
+    Args:
+        node: The node, all its parameters declared.
+        specs: Its table.
+    """
+    names = [spec.name for spec in specs]
+    given = node._parameter_overrides  # rclpy has no public way to ask for them
+    for name in sorted(given):
+        if not node.has_parameter(name) and not name.startswith(_ROS_OWN):
+            node.get_logger().warning(_describe(name, names))
+
+
+def _describe(name: str, names: list[str]) -> str:
+    """Say that a parameter does not exist, and which has the nearest name."""
+    nearest = difflib.get_close_matches(name, names, n=1)
+    hint = f"the nearest is {nearest[0]}" if nearest else "--help lists those there are"
+    return f"parameter {name} does not exist and is ignored; {hint}"

@@ -1,0 +1,53 @@
+"""Command lines for tests: files to run `rover_planner` on, and what a refusal looks like."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from rover_physics.terrain.grid import Terrain, save_terrain
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+N = 30
+"""Poses of the path in `write_ground_and_path`."""
+
+
+def write_ground_and_path(folder: Path) -> Path:
+    """Write a flat terrain with a hole, and a path that ends before it; return the folder."""
+    elevation = np.zeros((80, 120))
+    elevation[:, 100:] = np.nan
+    save_terrain(folder / "terrain.npz", Terrain(elevation, 0.05, (0.0, 0.0)))
+    poses = np.column_stack([np.linspace(1, 3, N), np.full(N, 2.0), np.zeros(N)])
+    np.savez(folder / "poses.npz", poses=poses)
+    return folder
+
+
+def predict_words(
+    folder: Path, rover="lsr1", terrain="terrain.npz", poses="poses.npz", out="out.npz"
+) -> list[str]:
+    """Return the words of `rover_planner predict` on files of a folder."""
+    return ["predict", str(rover), *(str(folder / name) for name in (terrain, poses, out))]
+
+
+def run_program(*words: str) -> subprocess.CompletedProcess:
+    """Run `rover_planner` in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "rover_planner", *words],
+        cwd=REPOSITORY,
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+
+
+def assert_refused(capfd, code: int, word: str) -> None:
+    """Hold that the command ended with code 2 and one line on stderr that has a word in it."""
+    err = capfd.readouterr().err
+    assert code == 2
+    assert err.count("\n") == 1
+    assert err.startswith("rover_planner: ")
+    assert word in err
+    assert "Traceback" not in err

@@ -1,0 +1,314 @@
+"""`predict` keeps its contract: arrays in a file, exit code 0, or exit code 2 and one line."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.names import WHEELS
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_planner.cli import main
+from support.command_line import (
+    N,
+    assert_refused,
+    predict_words,
+    run_program,
+    write_ground_and_path,
+)
+
+SHAPES = {
+    "settled": (N,),
+    "position": (N, 3),
+    "roll": (N,),
+    "pitch": (N,),
+    "rocker_angle": (N, 2),
+    "bogie_angle": (N, 2),
+    "wheel_centres": (N, 6, 3),
+    "wheel_loads": (N, 6),
+    "tangential": (N, 6),
+    "lateral": (N, 6),
+    "friction_utilisation": (N, 6),
+    "slip_ratio": (N, 6),
+    "torque_saturation": (N, 6),
+    "tip_over_ratio": (N,),
+    "tip_over_force_angle": (N,),
+    "belly_clearance": (N,),
+    "energy": (N,),
+    "time": (N,),
+    "reason": (N,),
+    "traversable": (),
+    "first_failure": (),
+}
+REPLAY_SHAPES = {
+    "poses": (N, 3),
+    "status": (N,),
+    "contact_points": (N, 6, 3),
+    "contact_angle": (N, 6),
+    "torque": (N, 6),
+    "friction": (N, 6),
+    "sinkage": (N, 6),
+    "motion_resistance": (N, 6),
+    "power": (N,),
+    "distance": (N,),
+    "wheel_drop": (N, 6),
+    "falling": (N, 6),
+}
+"""What the file holds beside the contract's arrays, for a replay."""
+
+
+@pytest.fixture
+def files(tmp_path):
+    return write_ground_and_path(tmp_path)
+
+
+def test_an_uncertain_map_adds_bounds_unless_told_not_to(files):
+    terrain = load_terrain(files / "terrain.npz")
+    std = np.full(terrain.elevation.shape, 0.004)
+    save_terrain(files / "uncertain.npz", replace(terrain, elevation_std=std))
+    words = predict_words(files, terrain="uncertain.npz")
+    assert main([*words, "--sigmas", "2", "--friction", "0.2"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert out["map_sigmas"] == 2.0
+        shapes = {"roll": (), "belly_clearance": (), "bogie_angle": (2,), "wheel_loads": (6,)}
+        for name, shape in shapes.items():
+            bounds = out[f"{name}_bounds"]
+            assert bounds.shape == (N, *shape, 2)
+            assert np.all(bounds[..., 0] < out[name])
+            assert np.all(bounds[..., 1] > out[name])
+        assert not out["traversable"]
+        assert out["reason"][0].endswith("at worst within 2 sigma of the map")
+    assert main([*words, "--sigmas", "0", "--friction", "0.2"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert out["traversable"]
+        assert not [name for name in out.files if name.endswith("_bounds")]
+
+
+def test_sigmas_below_zero_are_refused(files, capfd):
+    assert_refused(capfd, main([*predict_words(files), "--sigmas", "-1"]), "sigmas is -1.0")
+
+
+def test_prediction_has_every_array_of_the_contract(files):
+    result = run_program(*predict_words(files))
+    told = f"wrote {files / 'out.npz'}: {N} waypoints, traversable\n"
+    assert (result.returncode, result.stderr, result.stdout) == (0, "", told)
+    with np.load(files / "out.npz", allow_pickle=False) as out:
+        assert {name: out[name].shape for name in out.files} == SHAPES | REPLAY_SHAPES
+        assert out["settled"].dtype == bool
+        assert out["traversable"].dtype == bool
+        assert bool(out["traversable"])
+        assert out["first_failure"].dtype.kind == "i"
+        assert int(out["first_failure"]) == -1
+        assert out["reason"].dtype.kind == "U"
+        assert (out["reason"] == "").all()
+        floats = SHAPES.keys() - {"settled", "traversable", "first_failure", "reason"}
+        assert all(out[name].dtype == np.float64 for name in floats)
+        assert out["wheel_loads"].sum(axis=1) == pytest.approx(out["wheel_loads"][0].sum())
+
+
+def test_a_refused_path_is_still_exit_code_0_with_the_reason_and_nan(files, capfd):
+    poses = np.column_stack([np.linspace(1, 7, N), np.full(N, 2.0), np.zeros(N)])
+    np.savez(files / "poses.npz", poses=poses)
+    assert main(predict_words(files)) == 0
+    with np.load(files / "out.npz") as out:
+        first = int(out["first_failure"])
+        assert not out["traversable"]
+        assert first > 0
+        assert out["reason"][first] != ""
+        assert (out["reason"][:first] == "").all()
+        told = f"{N} waypoints, not traversable from waypoint {first} on: {out['reason'][first]}"
+        assert capfd.readouterr().out == f"wrote {files / 'out.npz'}: {told}\n"
+        assert not out["settled"][-1]
+        assert np.isnan(out["position"][-1]).all()
+        assert np.isnan(out["wheel_loads"][-1]).all()
+
+
+def test_options_change_the_prediction(files):
+    assert main([*predict_words(files), "--friction", "0.4", "--max-torque", "3"]) == 0
+    with np.load(files / "out.npz") as out:
+        little = out["friction_utilisation"].copy()
+    assert main([*predict_words(files), "--policy", "optimal"]) == 0
+    assert main([*predict_words(files), "--friction", "0.8", "--policy", "equal"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert out["friction_utilisation"] == pytest.approx(little / 2)
+
+
+def test_a_preset_terrain_is_found_by_its_name(files, capfd):
+    poses = np.array([[-44.684, -19.499, 3.41], [-44.78, -19.53, 3.41]])
+    np.savez(files / "poses.npz", poses=poses)
+    words = ["predict", "lsr1", "spirit", str(files / "poses.npz"), str(files / "out.npz")]
+    assert main(words) == 0
+    assert capfd.readouterr().out.endswith("2 waypoints, traversable\n")
+
+
+def test_output_goes_to_exactly_the_file_named(files):
+    assert main(predict_words(files, out="prediction.data")) == 0
+    assert (files / "prediction.data").is_file()
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"rover": "curiosity"}, "curiosity"),
+        ({"terrain": "none.npz"}, "none.npz"),
+        ({"poses": "none.npz"}, "none.npz"),
+        ({"terrain": "poses.npz"}, "elevation"),
+        ({"poses": "terrain.npz"}, "poses"),
+        ({"out": "no/such/folder/out.npz"}, "out.npz"),
+        ({"out": "."}, "cannot write"),
+    ],
+)
+def test_wrong_files_are_one_line(capfd, files, change, names):
+    code = main(predict_words(files, **change))
+    assert_refused(capfd, code, names)
+
+
+@pytest.mark.parametrize(
+    "poses",
+    [
+        np.zeros((4, 2)),
+        np.zeros(3),
+        np.zeros((0, 3)),
+        np.full((4, 3), np.nan),
+        np.array([["a", "b", "c"]]),
+        np.zeros((2, 3), dtype=complex),
+        np.array([[{}, {}, {}]], dtype=object),
+    ],
+)
+def test_impossible_poses_are_one_line(capfd, files, poses):
+    np.savez(files / "poses.npz", poses=poses)
+    assert_refused(capfd, main(predict_words(files)), "pose")
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"hello", b"\x93NUMPY"])
+def test_files_of_another_kind_are_one_line(capfd, files, content):
+    (files / "poses.npz").write_bytes(content)
+    assert_refused(capfd, main(predict_words(files)), "poses.npz")
+    (files / "terrain.npz").write_bytes(content)
+    assert_refused(capfd, main(predict_words(files)), "terrain.npz")
+
+
+def test_a_bare_array_is_no_poses_file(capfd, files):
+    with open(files / "poses.npz", "wb") as file:
+        np.save(file, np.zeros((3, 3)))
+    assert_refused(capfd, main(predict_words(files)), ".npz")
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--policy", "lucky"),
+        ("--friction", "0"),
+        ("--friction", "-1"),
+        ("--friction", "nan"),
+        ("--max-torque", "0"),
+        ("--max-torque", "inf"),
+    ],
+)
+def test_impossible_options_are_one_line(capfd, files, option, value):
+    code = main([*predict_words(files), option, value])
+    assert_refused(capfd, code, "policy" if "policy" in option else value.lstrip("-"))
+
+
+def test_a_bad_rover_file_is_one_line_that_names_the_key(capfd, files):
+    (files / "rover.yaml").write_text("name: half\ngravity: 9.81\n")
+    assert_refused(capfd, main(predict_words(files, rover=files / "rover.yaml")), "wheel")
+    (files / "rover.yaml").write_text("name: [unclosed\n")
+    assert_refused(capfd, main(predict_words(files, rover=files / "rover.yaml")), "rover.yaml")
+
+
+def test_refusal_of_the_program_is_exit_code_2_and_one_line(files):
+    result = run_program(*predict_words(files, terrain="none.npz"))
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert result.stderr.count("\n") == 1
+
+
+CLASS_SHAPES = {
+    "traversability_class": (N,),
+    "class_constraint": (N,),
+    "class_wheel": (N,),
+    "class_margin": (N,),
+    "torque_range": (N, 6, 2),
+}
+
+
+def test_classes_and_torque_ranges_are_added_on_demand(files):
+    assert main([*predict_words(files), "--classes", "--torque-ranges"]) == 0
+    with np.load(files / "out.npz", allow_pickle=False) as out:
+        assert {
+            name: out[name].shape for name in out.files
+        } == SHAPES | REPLAY_SHAPES | CLASS_SHAPES
+        assert set(out["traversability_class"]) == {"passable"}
+        assert set(out["class_constraint"]) <= {"friction", "torque", "wheel_lift"}
+        assert set(out["class_wheel"]) <= set(WHEELS)
+        assert (out["class_margin"] > 0.5).all()
+        low, high = out["torque_range"][..., 0], out["torque_range"][..., 1]
+        assert (low < 0.0).all() and (high > 0.0).all()
+
+
+def test_what_only_traction_control_passes_is_classified_so_under_either_policy(files):
+    rise = np.tile(0.45 * 0.05 * np.arange(120), (80, 1))
+    save_terrain(files / "terrain.npz", Terrain(rise, 0.05, (0.0, 0.0)))
+    for policy, traversable in (("equal", False), ("optimal", True)):
+        assert main([*predict_words(files), "--classes", "--policy", policy]) == 0
+        with np.load(files / "out.npz") as out:
+            assert bool(out["traversable"]) == traversable
+            assert set(out["traversability_class"]) == {"passable with traction control"}
+            assert (out["class_margin"] > 0.0).all()
+
+
+def test_on_soil_the_file_has_sinkage_and_resistance_too(files):
+    assert main([*predict_words(files), "--soil", "dry_sand"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert set(out.files) == SHAPES.keys() | REPLAY_SHAPES.keys()
+        assert out["sinkage"].shape == out["motion_resistance"].shape == (N, 6)
+        assert (out["sinkage"] > 0.001).all()
+        assert (out["motion_resistance"] > 0.5).all()
+        assert (out["slip_ratio"] > 0.0).all()
+
+
+def test_arm_payload_and_tool_load_change_the_prediction(files):
+    loads = {}
+    stretched = ["arm_yaw=0", "arm_shoulder=0", "arm_elbow=0"]
+    for name, words in {
+        "stowed": [],
+        "stretched": [word for joint in stretched for word in ("--arm", joint)],
+        "payload": ["--payload", "1.5"],
+        "force": ["--tool-force", "0", "0", "5.5"],
+        "moment": ["--tool-moment", "0", "-2", "0"],
+    }.items():
+        assert main([*predict_words(files), *words]) == 0
+        with np.load(files / "out.npz") as out:
+            loads[name] = out["wheel_loads"][0].copy()
+    front, stowed = [2, 5], loads["stowed"]
+    weight = stowed.sum()
+    assert loads["stretched"][front].sum() > stowed[front].sum() + 0.1
+    assert loads["payload"].sum() == pytest.approx(weight + 1.5 * 9.81)
+    assert loads["force"].sum() == pytest.approx(weight - 5.5)
+    assert loads["moment"][front].sum() < stowed[front].sum() - 0.1
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["--soil", "snow"], "dry_sand"),
+        (["--payload", "-1"], "payload"),
+        (["--payload", "nan"], "payload"),
+        (["--tool-force", "0", "nan", "0"], "tool_force"),
+        (["--tool-force", "0", "1"], "tool-force"),
+        (["--tool-moment", "inf", "0", "0"], "tool_moment"),
+        (["--arm", "arm_yaw"], "NAME=RAD"),
+        (["--arm", "arm_yaw=left"], "NAME=RAD"),
+        (["--arm", "arm_yaw=nan"], "NAME=RAD"),
+        (["--arm", "arm_wrist=0.1"], "arm_elbow"),
+        (["--arm", "arm_yaw=0.1"], "lacks arm_shoulder, arm_elbow"),
+        (["--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"], "twice"),
+    ],
+)
+def test_impossible_soils_arms_and_loads_are_one_line(capfd, files, words, names):
+    assert_refused(capfd, main([*predict_words(files), *words]), names)
+
+
+def test_an_arm_that_is_not_there_has_no_angles(capfd, files):
+    words = [*predict_words(files, rover="m2020"), "--arm", "arm_yaw=0"]
+    assert_refused(capfd, main(words), "no manipulator")

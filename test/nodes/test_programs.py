@@ -1,0 +1,168 @@
+"""The node programs have help that is true, need ROS only to run, and name wrong words."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from rclpy.parameter import Parameter
+
+from rover_planner.nodes import start
+from rover_planner.nodes.mission_planner import MissionPlanner
+from rover_planner.nodes.mission_planner import main as mission_planner
+from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.nodes.rover_simulator import RoverSimulator
+from rover_planner.nodes.rover_simulator import main as rover_simulator
+from rover_planner.nodes.traction_controller import TractionController
+from rover_planner.nodes.traction_controller import main as traction_controller
+from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.nodes.traverse_server import main as traverse_server
+from support.command_line import REPOSITORY
+from support.ros_fixtures import domain_id, wait_until
+
+MAINS = {
+    "traverse_server": traverse_server,
+    "traction_controller": traction_controller,
+    "rover_simulator": rover_simulator,
+    "mission_planner": mission_planner,
+}
+NODES = {
+    "traverse_server": TraverseServer,
+    "traction_controller": TractionController,
+    "rover_simulator": RoverSimulator,
+    "mission_planner": MissionPlanner,
+}
+OF_ROS = re.compile(r"/(parameter_events|rosout|.*/(\w+_parameters?\w*|get_type_description))$")
+
+
+def run_entry_point(name, *words):
+    """Run the entry point of a program in a process that has no ROS."""
+    code = (
+        "import sys; sys.modules['rclpy'] = None; "
+        f"from rover_planner.nodes.start import start_{name}; sys.exit(start_{name}())"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", code, *words],
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_help_comes_without_ros_and_lists_every_parameter(name):
+    ended = run_entry_point(name, "--help")
+    assert (ended.returncode, ended.stderr) == (0, "")
+    program = PROGRAMS[name]
+    told = " ".join(ended.stdout.split())
+    assert told.startswith(f"Usage: {name} ")
+    assert program.what in told and program.topics in told
+    for spec in program.parameters:
+        assert f" {spec.name}: {spec.type_name}, default " in told
+        assert spec.doc in told
+        assert re.search(rf"^ +{spec.name}: {spec.type_name}, ", ended.stdout, re.MULTILINE)
+    assert max(map(len, ended.stdout.splitlines())) <= 99
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_without_ros_a_program_says_in_one_line_what_to_install(name):
+    ended = run_entry_point(name)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.count("\n") == 1
+    assert ended.stderr.startswith(f"{name}: ")
+    assert "pip install 'rover_planner[ros]'" in ended.stderr
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_help_comes_before_anything_is_started(name, capfd):
+    assert MAINS[name](["--help"]) == 0
+    told = capfd.readouterr()
+    assert told.out.startswith(f"Usage: {name} ") and told.err == ""
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--colour", "red"], "--colour"),
+        (["terrain_file:=mars.npz"], "--ros-args -p"),
+        (["--ros-args", "-p", "friction"], "-p friction"),
+        (["--ros-args", "--colour"], "--colour"),
+    ],
+)
+def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd):
+    assert MAINS[name](words) == 2
+    err = capfd.readouterr().err
+    assert said in err and "Traceback" not in err
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_the_topics_in_the_help_are_those_of_the_node(name, ros):
+    node = ros.spin(NODES[name](context=ros.context))
+    kinds = ("publisher", "subscriber", "service", "client")
+
+    def names() -> set[str]:
+        found = set()
+        for kind in kinds:
+            ask = getattr(node, f"get_{kind}_names_and_types_by_node")
+            found |= {topic for topic, _ in ask(name, "/") if not OF_ROS.match(topic)}
+        return found
+
+    told = set(re.findall(r"[~/]?[a-z_/]+", PROGRAMS[name].topics))
+    told -= {"subscribes", "serves", "publishes", "calls", ""}
+    told = {re.sub(r"^~", f"/{name}", topic) for topic in told}
+    told = {topic if topic.startswith("/") else f"/{topic}" for topic in told}
+    # A topic that needs follow_commands is in the help, but not in this node.
+    optional = {"/cmd_vel", "/traction_controller/commands"} & told
+    wait_until(lambda: told - optional <= names(), f"{told - optional}")
+    assert names() <= told | {"/tf"}
+
+
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if PROGRAMS[name].parameters])
+def test_a_parameter_that_does_not_exist_is_warned_of_once_with_the_nearest(name, ros, capfd):
+    wrong = [Parameter("rovr", value="lsr1"), Parameter("zzz", value=1)]
+    node = ros.spin(NODES[name](context=ros.context, parameter_overrides=wrong))
+    assert not node.has_parameter("rovr")
+    err = capfd.readouterr().err
+    assert err.count("parameter rovr does not exist and is ignored; the nearest is rover") == 1
+    assert err.count("parameter zzz does not exist and is ignored; --help lists") == 1
+
+
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if PROGRAMS[name].parameters])
+def test_parameters_that_exist_are_not_warned_of(name, ros, capfd):
+    right = [Parameter("rover", value="m2020"), Parameter("use_sim_time", value=False)]
+    ros.spin(NODES[name](context=ros.context, parameter_overrides=right))
+    assert "does not exist" not in capfd.readouterr().err
+
+
+def test_a_misspelt_parameter_of_the_command_line_is_warned_of():
+    words = ["--ros-args", "-p", "terain_file:=spirit"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rover_planner.nodes.traverse_server", *words],
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "PYTHONUNBUFFERED": "1"},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    lines: list[str] = []
+    for line in process.stderr:
+        lines.append(line)
+        if "ready" in line:
+            break
+    process.terminate()
+    process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert "terain_file does not exist and is ignored; the nearest is terrain_file" in lines[-2]
+    assert lines[-1].rstrip().endswith("ready for rover lsr1, no map yet")
+
+
+def test_ready_says_which_map_there_is(start_server, capfd):
+    start_server(terrain_file="spirit")
+    told = "ready for rover lsr1, map spirit: 434 x 400 cells of 0.03 m, 44.8 % known"
+    assert told in capfd.readouterr().err
+
+
+def test_every_program_has_an_entry_point():
+    for name in PROGRAMS:
+        assert callable(getattr(start, f"start_{name}"))
