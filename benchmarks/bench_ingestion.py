@@ -9,8 +9,9 @@ from sensor_msgs.msg import PointCloud2
 from benchmarks.measure import Figure, median_times
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics.terrain.grid import Terrain
-from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.service_settings import load_service_settings
+from rover_planner.planning.traverse_service import TraverseService
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 CELLS = 1_000
@@ -39,7 +40,7 @@ def scatter(cloud: PointCloud2) -> PointCloud2:
 
 def measure() -> list[Figure]:
     """Measure a cloud that comes row by row, and one that comes in any order."""
-    settings = settings_from_parameters({spec.name: spec.default for spec in TRAVERSE_SERVER})
+    settings = load_service_settings(TraverseServerParameters())
     service = TraverseService(settings)
     cloud = terrain_to_point_cloud(make_map(), "map")
     scattered = scatter(cloud)

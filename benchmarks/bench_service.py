@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from benchmarks.measure import Figure, quantile
 from benchmarks.planner_process import SERVER, Planner, planner_and_processes
 from rover_physics.terrain.grid import Terrain
-from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.service_settings import load_service_settings
+from rover_planner.planning.traverse_service import TraverseService
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 ECHO = "/echo/can_traverse"
@@ -40,10 +41,9 @@ class Asker:
 ASKERS = (Asker("after a pause", 0.03, 1), Asker("at once", 0.0, 20))
 
 
-def make_service(ground: Terrain, **parameters: object) -> TraverseService:
-    """Return what the server knows, without ROS."""
-    values = {spec.name: spec.default for spec in TRAVERSE_SERVER} | parameters
-    service = TraverseService(settings_from_parameters(values))
+def make_service(ground: Terrain, parameters: TraverseServerParameters) -> TraverseService:
+    """Return the service of a server without ROS."""
+    service = TraverseService(load_service_settings(parameters))
     service.take_terrain(ground)
     return service
 
@@ -76,7 +76,7 @@ def _time(ask: Callable[[], object], pause: float) -> float:
 def measure() -> list[Figure]:
     """Measure one path either way, and a fan of nine."""
     ground = make_mars_terrain(1, 24.0, 0.05)
-    service = make_service(ground, candidate_count=1)
+    service = make_service(ground, TraverseServerParameters(candidate_count=1))
     figures = []
     with planner_and_processes() as (planner, processes):
         processes.start_server(ground, candidate_count=1)
@@ -112,7 +112,7 @@ def _tell(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]
 
 
 def _measure_nine(ground: Terrain) -> list[Figure]:
-    """Measure the question as the server answers it unless told: with nine candidates."""
+    """Measure the question with the default of nine candidates."""
     with planner_and_processes() as (planner, processes):
         processes.start_server(ground)
         times = []

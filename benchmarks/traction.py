@@ -17,12 +17,13 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from rover_physics.names import EQUAL, OPTIMAL
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
+from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.simulator.mujoco_rover import MujocoRover
-from rover_planner.traction.traction_service import TractionService, settings_from_parameters
+from rover_planner.traction.traction_service import TractionService, load_traction_settings
 from support.reference_drives import drive_ground
 from support.rough_grounds import bouldered, fractal
 
@@ -95,12 +96,9 @@ def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain
     if name == SERVO_CONTROLLER:
         rates = np.full(6, SPEED / rover.wheel.radius)
         return lambda plant: plant.servo(rates, PERIOD)
-    values = {spec.name: spec.default for spec in TRACTION_CONTROLLER}
-    values |= {
-        "policy": "equal" if name == EQUAL_CONTROLLER else "optimal",
-        "friction": obstacle.friction,
-    }
-    service = TractionService(settings_from_parameters(values))
+    policy = EQUAL if name == EQUAL_CONTROLLER else OPTIMAL
+    parameters = TractionControllerParameters(policy=policy, friction=obstacle.friction)
+    service = TractionService(load_traction_settings(parameters))
     if name == MAP_CONTROLLER:
         service.take_terrain(ground)
 

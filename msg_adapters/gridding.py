@@ -19,6 +19,9 @@ CELL_HEIGHTS = ("max", "mean")
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud; one stray point far away must not take the memory."""
 
+CELL_HEIGHTS = ("max", "mean")
+"""Ways to choose the height of a cell with several points."""
+
 _MIN_FILL = 0.05
 """Least share of a detected grid's cells that have a point; below it the spacing is a chance."""
 

@@ -2,69 +2,74 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from rover_physics.numerics.plain_values import to_plain
-
 STATUS_NAME = "traverse_server: can the rover traverse"
-PER_WAYPOINT = (
-    "reasons",
-    "codes",
-    "traversability_classes",
-    "class_constraints",
-    "class_wheels",
-    "class_margins",
-)
-"""Entries of a verdict with a value for each waypoint; only in JSON."""
 
 
-FIRST = ("traversable", "code", "reason")
-"""Entries that open the JSON."""
+class Report(Protocol):
+    """What a report must have to be written as JSON."""
+
+    def to_dict(self) -> Mapping[str, Any]:
+        """Return all entries as JSON can hold them: no NaN, no infinity."""
 
 
-def verdict_to_json(verdict: Mapping[str, Any]) -> str:
-    """Write a verdict as one line of strict JSON; what is not a finite number becomes null.
+class PathVerdict(Protocol):
+    """What a verdict on a path must have to be written as a diagnostic status."""
 
-    The FIRST entries come first and the PER_WAYPOINT ones, which are long, last.
+    @property
+    def traversable(self) -> bool:
+        """Whether the rover may drive the path."""
+
+    @property
+    def reason(self) -> str:
+        """Why not; empty if traversable."""
+
+    @property
+    def has_warning(self) -> bool:
+        """Whether the operator is to look at something though the path is traversable."""
+
+    def summary(self) -> Mapping[str, Any]:
+        """Return the entries to show as JSON can hold them, none of them long."""
+
+
+def report_to_json(report: Report) -> str:
+    """Write a report as one line of strict JSON.
+
+    Raises:
+        ValueError: An entry is NaN or infinite.
     """
-    short = [key for key in verdict if key not in FIRST + PER_WAYPOINT]
-    order = [key for key in (*FIRST, *short, *PER_WAYPOINT) if key in verdict]
-    return json.dumps(to_plain({key: verdict[key] for key in order}), allow_nan=False)
+    return json.dumps(report.to_dict(), allow_nan=False)
 
 
 def verdict_to_diagnostics(
-    verdict: Mapping[str, Any],
-    hardware_id: str,
-    frame_id: str,
-    stamp,
-    warn: bool = False,
+    verdict: PathVerdict, hardware_id: str, frame_id: str, stamp: Any
 ) -> DiagnosticArray:
     """Write a verdict as one diagnostic status.
 
     Args:
-        verdict: At least `traversable` and `reason`; every entry becomes a key and a value, a
-            nested one as JSON, but for the PER_WAYPOINT ones, which are too long to read.
+        verdict: Every entry of its summary becomes a key and a value: a text as it is, any other
+            value as JSON.
         hardware_id: Name of the rover.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
-        warn: A traversable path is reported as WARN, where something needs a look.
 
     Returns:
-        An array with one status: OK (or WARN) where traversable, else ERROR with the reason.
+        An array with one status: OK where traversable, WARN where traversable with a warning,
+        else ERROR with the reason as its message.
     """
-    level = DiagnosticStatus.WARN if warn else DiagnosticStatus.OK
+    level = DiagnosticStatus.WARN if verdict.has_warning else DiagnosticStatus.OK
     status = DiagnosticStatus(
-        level=level if verdict["traversable"] else DiagnosticStatus.ERROR,
+        level=level if verdict.traversable else DiagnosticStatus.ERROR,
         name=STATUS_NAME,
-        message=verdict["reason"] or "traversable",
+        message=verdict.reason or "traversable",
         hardware_id=hardware_id,
     )
-    to_tell = {key: value for key, value in verdict.items() if key not in PER_WAYPOINT}
     status.values = [
         KeyValue(key=key, value=value if isinstance(value, str) else json.dumps(value))
-        for key, value in to_plain(to_tell).items()
+        for key, value in verdict.summary().items()
     ]
     message = DiagnosticArray(status=[status])
     message.header.frame_id = frame_id

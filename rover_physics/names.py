@@ -1,4 +1,4 @@
-"""Names and order of wheels, sides and joints in every per-wheel and per-side array."""
+"""Names of wheels, sides and joints in the order of every array, and of the torque policies."""
 
 WHEELS = (
     "rear_right",
@@ -24,3 +24,7 @@ SUSPENSION_JOINTS = ("rocker_right", "rocker_left", "bogie_right", "bogie_left")
 
 WHEEL_JOINTS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
 """Wheel drive joints as they are called in joint messages, in wheel order."""
+
+EQUAL, OPTIMAL = "equal", "optimal"
+TORQUE_POLICIES = (EQUAL, OPTIMAL)
+"""Torque policies: all wheels pull alike; the torques that need the least friction."""

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from rover_physics.errors import ModelError
+from rover_physics.names import EQUAL, OPTIMAL
 from rover_physics.rover.manipulator import as_vector
 from rover_physics.status import TorquePolicy
 
-POLICIES = {policy.name.lower(): policy for policy in TorquePolicy}
+POLICIES = {EQUAL: TorquePolicy.EQUAL, OPTIMAL: TorquePolicy.OPTIMAL}
 """Torque policies by name."""
 
 JointAngles = tuple[tuple[str, float], ...]
@@ -25,8 +26,8 @@ class SweepOptions:
         ModelError: A value out of range; names the option and what would be right.
     """
 
-    policy: str = "equal"
-    """"equal": all wheels pull alike; "optimal": the torques that need the least friction."""
+    policy: str = EQUAL
+    """EQUAL: all wheels pull alike; OPTIMAL: the torques that need the least friction."""
     friction: float | None = None
     """Coulomb friction coefficient; None: that of the rover file. A friction layer of the terrain
     comes first."""

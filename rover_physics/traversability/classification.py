@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.names import WHEELS
+from rover_physics.names import EQUAL, OPTIMAL, TORQUE_POLICIES, WHEELS
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
@@ -33,7 +33,7 @@ class ClassifiedWaypoint:
     traversability_class: str
     """PASSABLE, WITH_TRACTION_CONTROL or IMPASSABLE."""
     policy: str
-    """Torque policy that the rest is about: "equal" where passable, else "optimal"."""
+    """Torque policy that the rest is about: EQUAL where passable, else OPTIMAL."""
     constraint: str
     """Code of the limit that is broken; else of the tightest of WHEEL_CONSTRAINTS."""
     wheel: str
@@ -68,7 +68,7 @@ def classify_path(
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
     """
-    equal = replace(options, policy="equal")
+    equal = replace(options, policy=EQUAL)
     judged = judge_path(rover, terrain, poses, equal, sigmas=sigmas)
     return classify_judged(rover, terrain, *judged, equal, sigmas=sigmas)
 
@@ -98,14 +98,14 @@ def classify_judged(
         PoseError, ModelError, SoilError: As `judge_path`.
     """
     judged = {prediction.policy: (prediction, verdict)}
-    for policy in ("equal", "optimal"):
+    for policy in TORQUE_POLICIES:
         if policy not in judged:
             asked = replace(options, policy=policy)
             judged[policy] = judge_path(rover, terrain, prediction.poses, asked, sigmas=sigmas)
         if judged[policy][1].traversable:
             break
-    equal = _decide(rover, *judged["equal"])
-    optimal = _decide(rover, *judged["optimal"]) if "optimal" in judged else equal
+    equal = _decide(rover, *judged[EQUAL])
+    optimal = _decide(rover, *judged[OPTIMAL]) if OPTIMAL in judged else equal
     return tuple(_classify(one, other) for one, other in zip(equal, optimal, strict=True))
 
 
@@ -145,18 +145,18 @@ _NOTHING_ASKED = _Decision("", -1, float("nan"), "")
 def _classify(equal: _Decision, optimal: _Decision) -> ClassifiedWaypoint:
     """Return the class of a waypoint from what decides about it under either policy."""
     if not equal.reason:
-        traversability_class, policy, decision, reason = PASSABLE, "equal", equal, ""
+        traversability_class, policy, decision, reason = PASSABLE, EQUAL, equal, ""
     elif not optimal.reason:
         traversability_class, policy, decision, reason = (
             WITH_TRACTION_CONTROL,
-            "optimal",
+            OPTIMAL,
             optimal,
             equal.reason,
         )
     else:
         traversability_class, policy, decision, reason = (
             IMPASSABLE,
-            "optimal",
+            OPTIMAL,
             optimal,
             optimal.reason,
         )

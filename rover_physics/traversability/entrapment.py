@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics.forces.soil import use_of_shear
+from rover_physics.names import EQUAL
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -105,9 +106,9 @@ def _judge_way(
     rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
 ) -> Verdict:
     """Judge a way; under whatever policy, equal torques are asked first: that is much faster."""
-    equal = replace(options, policy="equal")
+    equal = replace(options, policy=EQUAL)
     verdict = judge(rover, sweep_path(rover, terrain, poses, equal))
-    if verdict.traversable or options.policy == "equal":
+    if verdict.traversable or options.policy == EQUAL:
         return verdict
     return judge(rover, sweep_path(rover, terrain, poses, options))
 

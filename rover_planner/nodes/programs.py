@@ -12,10 +12,10 @@ import typer
 from rover_planner.command.run_app import run_app
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission_options import read_mission
-from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
-from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.parameters.spec import ParameterSpec
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.table import ParameterSpec, specs_of
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 
 HELP_WORDS = ("-h", "--help")
 _EXIT_CODES = "Exit code 0 when it was told to stop; 2 for a wrong parameter or missing library."
@@ -62,21 +62,21 @@ PROGRAMS = {
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
         "~/torque_saturation, ~/tip_over_margin, ~/markers",
         read_nothing,
-        TRAVERSE_SERVER,
+        specs_of(TraverseServerParameters),
     ),
     "traction_controller": Program(
         "Share the wheel torques by a quadratic program at its rate.",
         "subscribes joint_states, imu, cmd_vel, odometry, elevation_cloud; publishes ~/commands, "
         "~/wheel_loads, ~/friction_utilisation, ~/contact_angles, /diagnostics",
         read_nothing,
-        TRACTION_CONTROLLER,
+        specs_of(TractionControllerParameters),
     ),
     "rover_simulator": Program(
         "Simulate a rover on a terrain, with the topics of a real one.",
         "subscribes path, cmd_vel, /traction_controller/commands; publishes joint_states, "
         "odometry, imu, elevation_cloud, cmd_vel, /diagnostics",
         read_engine,
-        ROVER_SIMULATOR,
+        specs_of(RoverSimulatorParameters),
     ),
     "mission_planner": Program(
         "Ask a traverse_server over ROS 2 for one goal after another.",
@@ -155,18 +155,24 @@ def _epilog(program: Program) -> list[str]:
     lines = [as_they_are, "Parameters, each set by --ros-args -p NAME:=VALUE:"]
     for spec in program.parameters:
         lines += _indent(f"{spec.name}: {_describe(spec)}", 2, 10)
-        lines += _indent(spec.doc, 6, 6)
+        lines += _indent(spec.meaning, 6, 6)
     return [topics, "\n".join(lines)]
 
 
 def _indent(text: str, first: int, others: int) -> list[str]:
     """Return the lines of a text, indented by a number of blanks."""
-    return textwrap.wrap(text, 88, initial_indent=first * " ", subsequent_indent=others * " ")
+    return textwrap.wrap(
+        text,
+        88,
+        initial_indent=first * " ",
+        subsequent_indent=others * " ",
+        break_on_hyphens=False,
+    )
 
 
 def _describe(spec: ParameterSpec) -> str:
     """Return type, default and unit of a parameter, and what it may be."""
-    default = "empty" if spec.default == "" else str(spec.default)
+    default = "empty" if spec.default == "" else str(spec.ros_default)
     words = [spec.type_name, f"default {default} {spec.unit}".rstrip()]
     if spec.bounds is not None:
         words.append(f"{spec.bounds[0]:g} to {spec.bounds[1]:g}")

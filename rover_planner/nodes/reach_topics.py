@@ -6,7 +6,7 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-from msg_adapters.verdicts import verdict_to_json
+from msg_adapters.verdicts import report_to_json
 from rover_planner.planning.reach_query import ReachQuery, refuse_reach
 from rover_planner.planning.traverse_service import TraverseService
 from rover_planner.ros.qos import topic_qos
@@ -49,10 +49,10 @@ class ReachTopics:
         answer = answer_or_refuse(
             logger, "check_reach", lambda: self._query.ask(self._service), refuse_reach
         )
-        if answer["possible"]:
+        if answer.possible:
             logger.info("check_reach: possible")
         else:
-            logger.warning(f"check_reach: refused ({answer['code']}): {answer['reason']}")
-        response.success = answer["possible"]
-        response.message = verdict_to_json(answer)
+            logger.warning(f"check_reach: refused ({answer.code}): {answer.reason}")
+        response.success = answer.possible
+        response.message = report_to_json(answer)
         return response

@@ -131,9 +131,8 @@ class _Results:
         )
 
     def _verdict(self) -> DiagnosticArray:
-        verdict = self.judgement.verdict
-        warn = not verdict.get("suspension_agrees", True)
-        return verdict_to_diagnostics(verdict, self.rover.name, self.frame, self.stamp, warn=warn)
+        report = self.judgement.report
+        return verdict_to_diagnostics(report, self.rover.name, self.frame, self.stamp)
 
     def _nothing(self, topic: str) -> object:
         """Return the empty message for where no path was judged."""

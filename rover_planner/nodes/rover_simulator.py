@@ -29,12 +29,12 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.nodes.programs import read_words
 from rover_planner.parameters.declare import declare_parameters
-from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.simulator.plant import PlantState
-from rover_planner.simulator.simulation import Simulation, settings_from_parameters
+from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "rover_simulator"
@@ -50,26 +50,26 @@ class RoverSimulator(Node):
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
-        values = declare_parameters(self, ROVER_SIMULATOR)
-        self._frame = values["map_frame"]
-        self._order = joint_order(values["joints"])
-        self._settings = settings_from_parameters(values)
+        parameters = declare_parameters(self, RoverSimulatorParameters)
+        self._frame = parameters.map_frame
+        self._order = joint_order(parameters.joints)
+        self._settings = load_simulation_settings(parameters)
         self._simulation = Simulation(self._settings)
-        self._period = 1.0 / values["rate"]
+        self._period = 1.0 / parameters.rate
         self._told = ""
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self._simulation.plant.state()
         self.create_timer(self._period, self._advance)
-        self.create_timer(1.0 / values["map_rate"], self._publish_map)
+        self.create_timer(1.0 / parameters.map_rate, self._publish_map)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._publish_map()
-        warn_of_unknown_parameters(self, ROVER_SIMULATOR)
+        warn_of_unknown_parameters(self, RoverSimulatorParameters)
         self.get_logger().info(
-            f"ready: rover {self._settings.rover.name} on {values['engine']}, starts at "
+            f"ready: rover {self._settings.rover.name} on {parameters.engine}, starts at "
             f"{', '.join(f'{value:.2f}' for value in self._settings.start)}, terrain "
-            f"{values['terrain_file'] or 'made'}: {describe_terrain(self._settings.terrain)}"
+            f"{parameters.terrain_file or 'made'}: {describe_terrain(self._settings.terrain)}"
         )
 
     @property

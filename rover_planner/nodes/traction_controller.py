@@ -40,8 +40,8 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.nodes.programs import read_words
-from rover_planner.parameters.declare import check_changes, declare_parameters
-from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
+from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
@@ -52,7 +52,7 @@ from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.traction_service import (
     TractionService,
     TractionUpdate,
-    settings_from_parameters,
+    load_traction_settings,
 )
 
 NODE_NAME = "traction_controller"
@@ -69,22 +69,19 @@ class TractionController(Node):
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
-        self._values = declare_parameters(self, TRACTION_CONTROLLER)
-        self._order = joint_order(self._values["joints"])
-        self._service = TractionService(settings_from_parameters(self._values))
+        self._values = declare_parameters(self, TractionControllerParameters)
+        self._order = joint_order(self._values.joints)
+        self._service = TractionService(load_traction_settings(self._values))
         self._warm_up()
-        self._statistics = TractionStatistics(1.0 / self._values["rate"])
+        self._statistics = TractionStatistics(1.0 / self._values.rate)
         self._fault, self._warning = "", ""
         self._create_publishers()
         self._maps = MapIntake(self._prepare_map, self._refuse_map)
         self._create_subscriptions()
-        self.add_on_set_parameters_callback(
-            check_changes(TRACTION_CONTROLLER, self._values, settings_from_parameters)
-        )
-        self.add_post_set_parameters_callback(self._apply_parameters)
-        self._timer = self.create_timer(1.0 / self._values["rate"], self.update)
+        follow_changes(self, lambda: self._values, load_traction_settings, self._apply_parameters)
+        self._timer = self.create_timer(1.0 / self._values.rate, self.update)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
-        warn_of_unknown_parameters(self, TRACTION_CONTROLLER)
+        warn_of_unknown_parameters(self, TractionControllerParameters)
         self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
 
     @property
@@ -99,7 +96,7 @@ class TractionController(Node):
 
     def take_priority(self) -> None:
         """Let this process run before others, if a parameter asks for it; say so if it can't."""
-        refusal = take_priority(self._values["realtime_priority"])
+        refusal = take_priority(self._values.realtime_priority)
         if refusal:
             self.get_logger().warning(refusal)
 
@@ -118,7 +115,7 @@ class TractionController(Node):
 
     def _warm_up(self) -> None:
         """Compile and run everything once, so that the first update is no slower than others."""
-        service = TractionService(settings_from_parameters(self._values))
+        service = TractionService(load_traction_settings(self._values))
         joints = dict.fromkeys(JOINTS, 0.0)
         service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
         for now in (0.0, 0.01):
@@ -147,7 +144,7 @@ class TractionController(Node):
         self.create_subscription(Imu, "imu", self._take_imu, qos)
         self.create_subscription(TwistStamped, "cmd_vel", self._take_command, qos)
         self.create_subscription(Odometry, "odometry", self._take_odometry, qos)
-        profiles = map_subscriptions_qos(self._values["map_durability"])
+        profiles = map_subscriptions_qos(self._values.map_durability)
         for qos in profiles:
             events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
             self.create_subscription(
@@ -155,11 +152,9 @@ class TractionController(Node):
                 raw=True,
             )  # fmt: skip
 
-    def _apply_parameters(self, parameters) -> None:
-        changes = {p.name: p.value for p in parameters if p.name in self._values}
-        if changes:
-            self._values.update(changes)
-            self._service.settings = settings_from_parameters(self._values)
+    def _apply_parameters(self, parameters: TractionControllerParameters) -> None:
+        self._values = parameters
+        self._service.settings = load_traction_settings(parameters)
 
     def _take_joints(self, state: JointState) -> None:
         try:
@@ -183,7 +178,7 @@ class TractionController(Node):
 
     def _take_odometry(self, odometry: Odometry) -> None:
         try:
-            pose, deviation = odometry_to_pose(odometry, self._values["map_frame"])
+            pose, deviation = odometry_to_pose(odometry, self._values.map_frame)
             self._service.take_odometry(pose, deviation, _now())
         except MessageError as error:
             self._service.refuse("odometry", str(error))
@@ -191,9 +186,9 @@ class TractionController(Node):
 
     def _prepare_map(self, cloud: PointCloud2) -> PreparedMap:
         """Make a map of a cloud, in the thread of the intake."""
-        check_frame(cloud.header.frame_id, self._values["map_frame"], "elevation_cloud")
+        check_frame(cloud.header.frame_id, self._values.map_frame, "elevation_cloud")
         terrain = terrain_from_point_cloud(
-            cloud, self._values["map_resolution"], self._values["cell_height"]
+            cloud, self._values.map_resolution, self._values.cell_height
         )
         return prepare_map(self._service.settings.rover, terrain)
 

@@ -27,18 +27,19 @@ from msg_adapters.paths import (
     path_to_poses,
     stamped_pose_to_array,
 )
-from msg_adapters.verdicts import verdict_to_json
+from msg_adapters.verdicts import report_to_json
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.warm_up import warm_up
 from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
-from rover_planner.parameters.declare import check_changes, declare_parameters
-from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
+from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.judgement import Judgement, refusal
-from rover_planner.planning.traverse_service import TraverseService, settings_from_parameters
+from rover_planner.planning.service_settings import load_service_settings
+from rover_planner.planning.traverse_service import TraverseService
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS, answer_or_refuse
@@ -52,9 +53,9 @@ class TraverseServer(Node):
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
-        self._values = declare_parameters(self, TRAVERSE_SERVER)
-        self._service = TraverseService(settings_from_parameters(self._values))
-        self._map_frame: str = self._values["map_frame"]
+        self._values = declare_parameters(self, TraverseServerParameters)
+        self._service = TraverseService(load_service_settings(self._values))
+        self._map_frame = self._values.map_frame
         self._seen_maps: deque[int] = deque(maxlen=8)
         self._deferred_work = DeferredWork(self)
         self._results = ResultTopics(self, self._deferred_work, self._map_frame)
@@ -64,11 +65,8 @@ class TraverseServer(Node):
         self.create_service(Trigger, "~/check_path", self._check_path)
         self.create_service(LoadMap, "~/load_map", self._load_map)
         self._reach = ReachTopics(self, self._service, self._map_frame)
-        self.add_on_set_parameters_callback(
-            check_changes(TRAVERSE_SERVER, self._values, settings_from_parameters)
-        )
-        self.add_post_set_parameters_callback(self._apply_parameters)
-        warn_of_unknown_parameters(self, TRAVERSE_SERVER)
+        follow_changes(self, lambda: self._values, load_service_settings, self._apply_parameters)
+        warn_of_unknown_parameters(self, TraverseServerParameters)
         name, ground = self._service.settings.rover.name, self._service.terrain
         there = f"map {file}: {describe_terrain(ground)}" if ground else "no map yet"
         self.get_logger().info(f"ready for rover {name}, {there}")
@@ -84,7 +82,7 @@ class TraverseServer(Node):
         return self._reach
 
     def _create_subscriptions(self) -> None:
-        profiles = map_subscriptions_qos(self._values["map_durability"])
+        profiles = map_subscriptions_qos(self._values.map_durability)
         for qos in profiles:
             # With several profiles a mismatch of one is no news.
             events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
@@ -96,7 +94,7 @@ class TraverseServer(Node):
 
     def _load_first_map(self) -> str:
         """Load the map that a parameter names, if it can be loaded, and return its name."""
-        file: str = self._values["terrain_file"]
+        file = self._values.terrain_file
         if file:
             try:
                 self._service.take_terrain(load_terrain(file))
@@ -104,15 +102,9 @@ class TraverseServer(Node):
                 self.get_logger().error(f"terrain_file not loaded: {error}")
         return file
 
-    def _apply_parameters(self, parameters) -> None:
-        self._values.update(
-            {
-                parameter.name: parameter.value
-                for parameter in parameters
-                if parameter.name in self._values
-            }
-        )
-        self._service.settings = settings_from_parameters(self._values)
+    def _apply_parameters(self, parameters: TraverseServerParameters) -> None:
+        self._values = parameters
+        self._service.settings = load_service_settings(parameters)
 
     def _take_cloud(self, cloud: PointCloud2, info) -> None:
         if self._is_second_copy(info):
@@ -120,7 +112,7 @@ class TraverseServer(Node):
         try:
             check_frame(cloud.header.frame_id, self._map_frame, "elevation_cloud")
             terrain = terrain_from_point_cloud(
-                cloud, self._values["map_resolution"], self._values["cell_height"]
+                cloud, self._values.map_resolution, self._values.cell_height
             )
             self._take_terrain(terrain, "elevation_cloud")
         except INPUT_ERRORS as error:
@@ -169,7 +161,7 @@ class TraverseServer(Node):
             goal = stamped_pose_to_array(request.goal, self._map_frame, "goal")
             judgement = self._service.answer(start, goal, request.tolerance)
             if judgement.traversable:
-                judgement.changes()  # worked out here, where a fault makes a refusal
+                judgement.changes()  # computed here, where a fault makes a refusal
             return judgement
 
         _, response.plan = self._judge("can_traverse", answer)
@@ -182,12 +174,12 @@ class TraverseServer(Node):
     ) -> Trigger.Response:
         def answer() -> Judgement:
             judgement = self._service.check_last_path()
-            _ = judgement.verdict  # worked out here, where a fault makes a refusal
+            _ = judgement.report  # computed here, where a fault makes a refusal
             return judgement
 
         judgement, _ = self._judge("check_path", answer)
         response.success = judgement.traversable
-        response.message = verdict_to_json(judgement.verdict)
+        response.message = report_to_json(judgement.report)
         return response
 
     def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
@@ -218,7 +210,7 @@ class TraverseServer(Node):
         Results and a line in the log follow when the answer has been sent.
         """
         judgement = answer_or_refuse(self.get_logger(), request, judge, refusal)
-        rover, spacing = self._service.settings.rover, self._values["plan_spacing"]
+        rover, spacing = self._service.settings.rover, self._values.plan_spacing
         log = partial(self._log, request, judgement)
         return judgement, self._results.take(judgement, rover, spacing, log)
 

@@ -1,1 +1,1 @@
-"""Parameters of the nodes: one table each, from which declaration, checks and docs are made."""
+"""Parameters of the nodes: a dataclass each, which declaration, checks and docs are made from."""

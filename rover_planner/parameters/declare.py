@@ -1,7 +1,8 @@
-"""Declares a table of parameters with a node, and checks what others set."""
+"""Declares the table of a node's parameters, checks what others set, and tells the node."""
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -16,65 +17,87 @@ from rclpy.parameter import Parameter
 from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
 from rover_planner.errors import PlanningError
-from rover_planner.parameters.spec import ParameterError, ParameterSpec
+from rover_planner.parameters.table import (
+    ParameterError,
+    ParameterSpec,
+    ParameterTable,
+    specs_of,
+)
+
+Table = TypeVar("Table", bound=ParameterTable)
 
 
-def declare_parameters(node: Node, specs: Iterable[ParameterSpec]) -> dict[str, Any]:
-    """Declare parameters with their descriptors and return their checked values by name.
+def declare_parameters(node: Node, table: type[Table]) -> Table:
+    """Declare the parameters of a table with their descriptors and return their values.
 
     Raises:
-        ParameterError: an override that `ParameterSpec.check` refuses.
+        ParameterError: An override that the table refuses.
     """
-    values = {}
-    for spec in specs:
+    found = []
+    for spec in specs_of(table):
         try:
-            node.declare_parameter(spec.name, spec.default, _descriptor(spec))
+            node.declare_parameter(spec.name, spec.ros_default, _descriptor(spec))
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
             raise ParameterError(f"parameter {spec.name}: {error}") from error
-        values[spec.name] = node.get_parameter(spec.name).value
-        spec.check(values[spec.name])
-    return values
+        found.append(node.get_parameter(spec.name))
+    return replace(table(), **_changes(table, found))
 
 
-def check_changes(
-    specs: Iterable[ParameterSpec],
-    values: Mapping[str, Any],
-    accept: Callable[[dict[str, Any]], Any],
-) -> Callable[[list[Parameter]], SetParametersResult]:
-    """Make an on-set callback that refuses bad values with the reason in the result.
+def follow_changes(
+    node: Node,
+    current: Callable[[], Table],
+    accept: Callable[[Table], object],
+    apply: Callable[[Table], None],
+) -> None:
+    """Refuse bad changes of a node's parameters with the reason; apply the others.
 
     Args:
-        specs: The node's table; other parameters, such as use_sim_time, pass unchecked.
-        values: The values in force, looked at when the callback is called.
+        node: A node that has declared the table.
+        current: Returns the values in force.
         accept: Called with all values as they would be; raises where they do not go together.
+        apply: Called with all values after a change. Parameters that are not in the table, such
+            as use_sim_time, pass unchecked and call neither.
     """
-    by_name = {spec.name: spec for spec in specs}
 
     def check(parameters: list[Parameter]) -> SetParametersResult:
-        changes = {
-            parameter.name: parameter.value
-            for parameter in parameters
-            if parameter.name in by_name
-        }
+        values = current()
         try:
             if any(not parameter.name for parameter in parameters):
-                raise ParameterError("a parameter has no name; name one of " + ", ".join(by_name))
-            for name, value in changes.items():
-                by_name[name].check(value)
+                names = ", ".join(spec.name for spec in specs_of(type(values)))
+                raise ParameterError(f"a parameter has no name; it must be one of {names}")
+            changes = _changes(type(values), parameters)
             if changes:
-                accept({**values, **changes})
+                accept(replace(values, **changes))
         except (MessageError, PlanningError, RoverError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    return check
+    def pass_on(parameters: list[Parameter]) -> None:
+        changes = _changes(type(current()), parameters)
+        if changes:
+            apply(replace(current(), **changes))
+
+    node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(pass_on)
+
+
+def _changes(table: type[ParameterTable], parameters: Iterable[Parameter]) -> dict[str, Any]:
+    """Return the values of those parameters that are in a table by name, lists as tuples."""
+    names = {spec.name for spec in specs_of(table)}
+    return {
+        parameter.name: (
+            tuple(parameter.value) if isinstance(parameter.value, list) else parameter.value
+        )
+        for parameter in parameters
+        if parameter.name in names
+    }
 
 
 def _descriptor(spec: ParameterSpec) -> ParameterDescriptor:
     """Return the descriptor that tools show."""
     unit = f" [{spec.unit}]" if spec.unit else ""
     descriptor = ParameterDescriptor(
-        name=spec.name, description=spec.doc + unit, read_only=spec.read_only
+        name=spec.name, description=spec.meaning + unit, read_only=spec.read_only
     )
     if spec.choices:
         descriptor.additional_constraints = "one of " + ", ".join(spec.choices)

@@ -1,11 +1,18 @@
 """Makes docs/parameters.md from the tables."""
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 
-from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
-from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.parameters.spec import ParameterSpec
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.table import ParameterSpec, ParameterTable, specs_of
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+
+TABLES: dict[str, type[ParameterTable]] = {
+    "/traverse_server": TraverseServerParameters,
+    "/traction_controller": TractionControllerParameters,
+    "/rover_simulator": RoverSimulatorParameters,
+}
+"""Nodes in the order of the document, and the parameters of each."""
 
 
 def parameters_document() -> str:
@@ -18,18 +25,7 @@ def parameters_document() -> str:
             "`python -m rover_planner.parameters > docs/parameters.md`; "
             "a test holds them together.",
             "",
-            "## /traverse_server",
-            "",
-            *_table(TRAVERSE_SERVER),
-            "",
-            "## /traction_controller",
-            "",
-            *_table(TRACTION_CONTROLLER),
-            "",
-            "## /rover_simulator",
-            "",
-            *_table(ROVER_SIMULATOR),
-            "",
+            *_sections(),
             "Read-only parameters are set at start, the others at any time "
             "(`ros2 param set /traverse_server friction 0.6`).",
             "A value of the wrong type, NaN, out of bounds or not among the choices "
@@ -39,14 +35,19 @@ def parameters_document() -> str:
     )
 
 
-def _table(specs: Iterable[ParameterSpec]) -> list[str]:
-    """Return the lines of a Markdown table of parameters."""
-    lines = ["| name | type | default | allowed | meaning |", "|---|---|---|---|---|"]
-    for spec in specs:
-        default = f"`{spec.default}`" if spec.default != "" else "empty"
-        name = f"`{spec.name}`" + (" (read-only)" if spec.read_only else "")
-        lines.append(f"| {name} | {spec.type_name} | {default} | {_allowed(spec)} | {spec.doc} |")
-    return lines
+def _sections() -> Iterator[str]:
+    """Yield the lines of a Markdown table per node, under its name."""
+    for node, table in TABLES.items():
+        yield from (f"## {node}", "")
+        yield from ("| name | type | default | allowed | meaning |", "|---|---|---|---|---|")
+        yield from (_row(spec) for spec in specs_of(table))
+        yield ""
+
+
+def _row(spec: ParameterSpec) -> str:
+    default = f"`{spec.ros_default}`" if spec.default != "" else "empty"
+    name = f"`{spec.name}`" + (" (read-only)" if spec.read_only else "")
+    return f"| {name} | {spec.type_name} | {default} | {_allowed(spec)} | {spec.meaning} |"
 
 
 def _allowed(spec: ParameterSpec) -> str:

@@ -1,23 +1,22 @@
 """Parameters that were given to a node at its start and that it does not have."""
 
 import difflib
-from collections.abc import Iterable
 
 from rclpy.node import Node
 
-from rover_planner.parameters.spec import ParameterSpec
+from rover_planner.parameters.table import ParameterTable, specs_of
 
 _ROS_OWN = ("qos_overrides.",)
 
 
-def warn_of_unknown_parameters(node: Node, specs: Iterable[ParameterSpec]) -> None:
+def warn_of_unknown_parameters(node: Node, table: type[ParameterTable]) -> None:
     """Warn once of each parameter that was given at start and is not declared.
 
     Args:
         node: The node, all its parameters declared.
-        specs: Its table.
+        table: Its table.
     """
-    names = [spec.name for spec in specs]
+    names = [spec.name for spec in specs_of(table)]
     given = node._parameter_overrides  # rclpy has no public way to ask for them
     for name in sorted(given):
         if not node.has_parameter(name) and not name.startswith(_ROS_OWN):

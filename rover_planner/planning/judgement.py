@@ -1,16 +1,18 @@
-"""The answer to one request: yes or no at once, and all there is to say about it on demand."""
+"""The answer to one request: yes or no at once, its report on demand."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.names import EQUAL
 from rover_physics.traversability.classification import ClassifiedWaypoint
+from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate
-from rover_planner.planning.path_report import describe_classes, describe_path
+from rover_planner.planning.path_report import report_path
+from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +26,11 @@ class Judgement:
     candidate: Candidate | None = None
     """The path that was judged; None where the request was refused before."""
     classify: Callable[[], tuple[ClassifiedWaypoint, ...]] = tuple
-    """Classes the waypoints; may have to sweep the path once more."""
-    notes: Callable[[], Mapping[str, Any]] = dict
-    """Tells further entries of the verdict."""
+    """Classifies the waypoints; may sweep the path once more."""
+    suspension: SuspensionReport | None = None
+    """Comparison with the measured suspension, None without measurements."""
+    search: PathSearch | None = None
+    """The search that found the path, None where the path was given."""
 
     @property
     def traversable(self) -> bool:
@@ -35,28 +39,26 @@ class Judgement:
 
     @cached_property
     def classes(self) -> tuple[ClassifiedWaypoint, ...]:
-        """How passable each waypoint is; empty where no path was judged."""
+        """The class of each waypoint; empty where no path was judged. Computed on first use."""
         return self.classify()
 
     @cached_property
-    def verdict(self) -> dict[str, Any]:
-        """What there is to say, of JSON's types or numpy's: `traversable`, `code`, `reason`..."""
+    def report(self) -> VerdictReport:
+        """All that is said about the request. Computed on first use, with the classes."""
         if self.candidate is None:
-            said = {"code": self.code, "reason": self.reason, "first_failure": -1}
-            return {"traversable": False, **said, **self.notes()}
-        path, classes = describe_path(self.candidate), describe_classes(self.classes)
-        return {**path, **classes, **self.notes()}
+            return VerdictReport(False, self.code, self.reason)
+        return report_path(self.candidate, self.classes, self.suspension, self.search)
 
     def changes(self) -> NDArray[np.intp]:
-        """Return the waypoints that have another class than the one before."""
+        """Return the indices of waypoints that have another class than the one before."""
         candidate = self.candidate
-        if candidate is None or (self.traversable and candidate.verdict.policy == "equal"):
-            return np.empty(0, np.intp)  # all are passable: no need to ask
+        if candidate is None or (self.traversable and candidate.verdict.policy == EQUAL):
+            return np.empty(0, np.intp)  # all waypoints have the same class: no need to classify
         names = np.array([waypoint.traversability_class for waypoint in self.classes])
         return np.flatnonzero(names[1:] != names[:-1]) + 1
 
     def summary(self) -> str:
-        """Say in a few words what the answer is."""
+        """Return the answer in a few words."""
         if self.candidate is None or not self.traversable:
             return f"refused ({self.code}): {self.reason}"
         prediction = self.candidate.prediction
@@ -67,5 +69,5 @@ class Judgement:
 
 
 def refusal(code: str, reason: str) -> Judgement:
-    """Refuse a request that no path could be judged for."""
+    """Refuse a request before any path was judged."""
     return Judgement(code, reason)

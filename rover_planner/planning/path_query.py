@@ -1,4 +1,4 @@
-"""The question a mission planner asks: which path from here to there can the rover drive."""
+"""Candidate paths between two poses: judged, compared by risk and energy, and explained."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.bounds.path import SIGMAS
+from rover_physics.names import EQUAL
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
@@ -29,10 +30,10 @@ class PathQueryOptions:
     """Lateral distance between neighbouring candidates half-way [m]."""
     waypoint_spacing: float = 0.02
     """Largest distance between waypoints along a path [m]."""
-    policy: str = "equal"
-    """How the wheels share the traction: "equal" torques, or "optimal" with traction control."""
+    policy: str = EQUAL
+    """How the wheels share the traction, one of `TORQUE_POLICIES`."""
     friction: float | None = None
-    """Coulomb friction everywhere; None: that of the terrain, or of the rover file."""
+    """Coulomb friction where the terrain has none; None: that of the rover file."""
     max_torque: float | None = None
     """Largest wheel torque [N m]; None: that of the rover file."""
     soil: str | None = None
@@ -43,7 +44,7 @@ class PathQueryOptions:
     """Standard deviations of an uncertain map to allow for; 0 takes its heights as exact."""
 
     def sweep_options(self, joint_angles: Mapping[str, float] | None = None) -> SweepOptions:
-        """Return what of these options the model is asked with; angles [rad] are the arm's."""
+        """Return the options of the model; joint angles [rad] are the arm's, None is stowed."""
         return SweepOptions(
             policy=self.policy,
             friction=self.friction,
@@ -56,7 +57,7 @@ class PathQueryOptions:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A path with what the model predicts along it and what the limits say to that."""
+    """A path with its prediction, its verdict and its cost."""
 
     poses: NDArray[np.float64]
     """x, y [m] and yaw [rad] of the body origin at each waypoint, (n, 3), map frame."""
@@ -65,8 +66,8 @@ class Candidate:
     verdict: Verdict
     """Whether the rover may drive it, and the reason if not."""
     cost: tuple[float, float]
-    """Risk (share of the safety limits used up, in steps of RISK_STEP) and energy [J]; infinite
-    where the path is not traversable."""
+    """Risk (share of the safety limits that is used, in steps of RISK_STEP) and energy [J];
+    infinite where the path is not traversable."""
 
     @property
     def length(self) -> float:

@@ -1,48 +1,119 @@
-"""What is said about a judged path: extents, failure and classes, as keys of a verdict."""
+"""Makes the report of a judged path: extremes, failure, classes and the search for it."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
+from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate
-
-PER_WAYPOINT = {
-    "traversability_classes": "traversability_class",
-    "class_constraints": "constraint",
-    "class_wheels": "wheel",
-    "class_margins": "margin",
-}
-"""Keys with a value for each waypoint, and the field of a ClassifiedWaypoint that each holds."""
-
-
-def describe_path(candidate: Candidate) -> dict[str, Any]:
-    """Return verdict, extents and failure of a judged path."""
-    prediction, failure = candidate.prediction, candidate.verdict.first_failure
-    verdict = dict(candidate.verdict.to_dict())
-    verdict["waypoints"] = len(prediction.poses)
-    verdict["length"] = candidate.length
-    verdict["time"] = float(prediction.time[-1])
-    verdict["energy"] = float(prediction.energy[-1])
-    if failure >= 0:
-        verdict["failure_pose"] = prediction.poses[failure].tolist()
-        verdict["failure_distance"] = candidate.reach * candidate.length
-    return verdict
+from rover_planner.planning.verdict_report import (
+    ClassReport,
+    FailureReport,
+    PathReport,
+    SearchReport,
+    SuspensionReport,
+    VerdictReport,
+    WaypointLists,
+)
 
 
-def describe_classes(classes: Sequence[ClassifiedWaypoint]) -> dict[str, Any]:
-    """Return the class of a path, with what decides it, and those of its waypoints."""
+def report_path(
+    candidate: Candidate,
+    classes: Sequence[ClassifiedWaypoint],
+    suspension: SuspensionReport | None = None,
+    search: PathSearch | None = None,
+) -> VerdictReport:
+    """Return all that is said about a judged path.
+
+    Args:
+        candidate: The path.
+        classes: The classes of its waypoints, at least one.
+        suspension: The comparison with the measured suspension, None without measurements.
+        search: The search that found the path, None where the path was given.
+    """
+    verdict = candidate.verdict
+    return VerdictReport(
+        traversable=verdict.traversable,
+        code=verdict.code,
+        reason=verdict.reason,
+        first_failure=verdict.first_failure,
+        failure=_report_failure(candidate),
+        path=_report_extremes(candidate),
+        classes=_report_class(classes),
+        suspension=suspension,
+        search=None if search is None else _report_search(search),
+        waypoint_lists=_list_waypoints(candidate, classes),
+    )
+
+
+def _report_failure(candidate: Candidate) -> FailureReport | None:
+    """Return where a path fails, None if it does not."""
+    failure = candidate.verdict.first_failure
+    if failure < 0:
+        return None
+    pose = tuple(candidate.prediction.poses[failure].tolist())
+    return FailureReport(pose, candidate.reach * candidate.length)
+
+
+def _report_extremes(candidate: Candidate) -> PathReport:
+    """Return size and extremes of a judged path."""
+    verdict, prediction = candidate.verdict, candidate.prediction
+    return PathReport(
+        policy=verdict.policy,
+        min_tip_over_ratio=verdict.min_tip_over_ratio,
+        max_friction_utilisation=verdict.max_friction_utilisation,
+        max_torque_saturation=verdict.max_torque_saturation,
+        max_tilt=verdict.max_tilt,
+        min_belly_clearance=verdict.min_belly_clearance,
+        max_wheel_drop=verdict.max_wheel_drop,
+        max_sinkage=verdict.max_sinkage,
+        map_sigmas=verdict.map_sigmas,
+        tip_over_ratio_bound=verdict.tip_over_ratio_bound,
+        friction_utilisation_bound=verdict.friction_utilisation_bound,
+        torque_saturation_bound=verdict.torque_saturation_bound,
+        tilt_bound=verdict.tilt_bound,
+        belly_clearance_bound=verdict.belly_clearance_bound,
+        waypoints=len(prediction.poses),
+        length=candidate.length,
+        time=float(prediction.time[-1]),
+        energy=float(prediction.energy[-1]),
+    )
+
+
+def _report_class(classes: Sequence[ClassifiedWaypoint]) -> ClassReport:
+    """Return the class of a path and the waypoint that decides it."""
     waypoint = deciding_waypoint(classes)
     worst = classes[waypoint]
-    summary = {
-        "traversability_class": worst.traversability_class,
-        "class_waypoint": waypoint,
-        "class_constraint": worst.constraint,
-        "class_wheel": worst.wheel,
-        "class_margin": worst.margin,
-        "class_reason": worst.reason,
-    }
-    lists = {
-        key: [getattr(waypoint, field) for waypoint in classes]
-        for key, field in PER_WAYPOINT.items()
-    }
-    return summary | lists
+    return ClassReport(
+        traversability_class=worst.traversability_class,
+        class_waypoint=waypoint,
+        class_constraint=worst.constraint,
+        class_wheel=worst.wheel,
+        class_margin=worst.margin,
+        class_reason=worst.reason,
+    )
+
+
+def _list_waypoints(candidate: Candidate, classes: Sequence[ClassifiedWaypoint]) -> WaypointLists:
+    """Return verdict and class of each waypoint."""
+    return WaypointLists(
+        codes=candidate.verdict.codes,
+        reasons=candidate.verdict.reasons,
+        traversability_classes=tuple(waypoint.traversability_class for waypoint in classes),
+        class_constraints=tuple(waypoint.constraint for waypoint in classes),
+        class_wheels=tuple(waypoint.wheel for waypoint in classes),
+        class_margins=tuple(waypoint.margin for waypoint in classes),
+    )
+
+
+def _report_search(search: PathSearch) -> SearchReport:
+    """Return what was tried to reach a goal."""
+    candidates = search.answer.candidates
+    return SearchReport(
+        goal=tuple(search.goal.tolist()),
+        goal_offset=search.goal_offset,
+        alternative_goals_tried=search.alternatives_tried,
+        candidates=len(candidates),
+        traversable_candidates=sum(candidate.verdict.traversable for candidate in candidates),
+        chosen_candidate=search.answer.number,
+        explanation=search.answer.explain(),
+    )

@@ -1,17 +1,43 @@
-"""The question to the rover at rest, without ROS: where its tool is to go and what acts on it."""
+"""The question whether the arm can reach a target and hold a load there, without ROS."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.traversability.reach import judge_reach
+from rover_physics.traversability.reach import ReachAnswer, judge_reach
 from rover_planner.planning.traverse_service import TraverseService
 
 
+@dataclass(frozen=True, eq=False)
+class ReachJudgement:
+    """The answer of the model, or a refusal before the model was asked."""
+
+    possible: bool
+    """Whether the tip reaches the target and the rover holds still within all its limits."""
+    code: str
+    """Why not, as one of the codes of a `ReachAnswer` or of a refusal; empty if possible."""
+    reason: str
+    """Why not, in words; empty if possible."""
+    answer: ReachAnswer | None = None
+    """The answer of the model; None where it was not asked."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the answer as JSON can hold it; what is not known is None or left out."""
+        if self.answer is not None:
+            return self.answer.to_dict()
+        return {
+            "possible": self.possible,
+            "reachable": False,
+            "code": self.code,
+            "reason": self.reason,
+        }
+
+
 class ReachQuery:
-    """The last target and wrench of the tool, and the question whether the rover can do that."""
+    """The last target and wrench of the tool, and the question about them."""
 
     def __init__(self) -> None:
         self._target: NDArray[np.float64] | None = None
@@ -48,15 +74,15 @@ class ReachQuery:
         self._force = self._moment = None
         self._wrench_refusal = f"the last wrench was refused: {reason}"
 
-    def ask(self, service: TraverseService) -> dict[str, Any]:
+    def ask(self, service: TraverseService) -> ReachJudgement:
         """Judge the rover standing at the last pose of the last path with its tool at the target.
 
         Raises:
             RoverError: The rover has no arm, or the model refuses an option.
         """
-        want = service.refuse_for_want()
-        if want is not None:
-            return refuse_reach(want.code, want.reason)
+        missing = service.refuse_if_missing()
+        if missing is not None:
+            return refuse_reach(missing.code, missing.reason)
         if self._target is None:
             return refuse_reach("no_target", self._target_refusal)
         if self._wrench_refusal:
@@ -65,13 +91,13 @@ class ReachQuery:
         arm = settings.rover.manipulator
         if arm is None:
             raise ModelError(f"rover {settings.rover.name!r} has no manipulator to reach with")
-        missing = [name for name in arm.joints if name not in service.joints]
-        if 0 < len(missing) < len(arm.joints):
-            text = f"joint_states has never had {', '.join(missing)}, but other joints of the arm"
+        unknown = [name for name in arm.joints if name not in service.joints]
+        if 0 < len(unknown) < len(arm.joints):
+            text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
             return refuse_reach("missing_joints", f"{text}; it must have all of them, or none")
         assert service.path is not None
         assert service.terrain is not None
-        return judge_reach(
+        answer = judge_reach(
             settings.rover,
             service.terrain,
             service.path[-1],
@@ -79,9 +105,10 @@ class ReachQuery:
             settings.query.sweep_options(),
             force=self._force,
             moment=self._moment,
-        ).to_dict()
+        )
+        return ReachJudgement(answer.possible, answer.code, answer.reason, answer)
 
 
-def refuse_reach(code: str, reason: str) -> dict[str, Any]:
-    """Return the answer to a question that could not be judged."""
-    return {"possible": False, "reachable": False, "code": code, "reason": reason}
+def refuse_reach(code: str, reason: str) -> ReachJudgement:
+    """Refuse a question before the model was asked."""
+    return ReachJudgement(False, code, reason)

@@ -2,6 +2,8 @@
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from rover_planner.parameters.shared import EITHER, TRANSIENT_LOCAL, VOLATILE
+
 
 def topic_qos() -> QoSProfile:
     """Return the profile of ordinary topics: reliable, the last ten."""
@@ -42,12 +44,15 @@ def map_subscriptions_qos(durability: str) -> list[QoSProfile]:
 
     A transient-local subscription gets the map that was published before it came, but does not
     match a volatile publisher; a volatile one matches both, but waits for the next map. So
-    "either" takes both, and the subscriber has to pass over the second copy.
+    EITHER takes both, and the subscriber has to pass over the second copy.
+
+    Args:
+        durability: One of `MAP_DURABILITIES`.
     """
     transient_local = map_qos(DurabilityPolicy.TRANSIENT_LOCAL)
     volatile = map_qos(DurabilityPolicy.VOLATILE)
     return {
-        "either": [transient_local, volatile],
-        "transient_local": [transient_local],
-        "volatile": [volatile],
+        EITHER: [transient_local, volatile],
+        TRANSIENT_LOCAL: [transient_local],
+        VOLATILE: [volatile],
     }[durability]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.forces.soil import coulomb_slip
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
@@ -45,7 +45,7 @@ class QuasiStaticPlant:
         terrain: Terrain,
         pose: tuple[float, float, float],
         friction: float | None = None,
-        policy: str = "equal",
+        policy: str = EQUAL,
         soil: str | None = None,
     ):
         """Put a rover on the ground.
@@ -55,7 +55,7 @@ class QuasiStaticPlant:
             terrain: The ground.
             pose: x, y [m] and yaw [rad] of the body origin.
             friction: Coulomb friction instead of the terrain's and the rover's own.
-            policy: How its servos share the traction, "equal" or "optimal".
+            policy: How its servos share the traction, one of TORQUE_POLICIES.
             soil: Preset soil where the terrain names none; None: Coulomb friction.
 
         Raises:
@@ -159,7 +159,7 @@ class QuasiStaticPlant:
 
     def _predict(self, poses: Floats, pulled: bool = False) -> PathPrediction:
         """Ask the model; about a rover that is pulled, what the best of torques could do."""
-        policy = "optimal" if pulled else self._policy
+        policy = OPTIMAL if pulled else self._policy
         return sweep_path(
             self._rover,
             self._terrain,

@@ -1,16 +1,16 @@
 """What drives the plant: a path, commanded speeds, or torques from elsewhere; no ROS."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.names import EQUAL
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
+from rover_planner.parameters.rover_simulator import MUJOCO, RoverSimulatorParameters
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.plant import Plant, PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -18,9 +18,8 @@ from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 Floats = NDArray[np.float64]
-ENGINES = ("quasi_static", "mujoco")
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
-"""Of the terrain that is made where none is given [m]."""
+"""Side and cell size of the terrain that is made where none is given [m]."""
 
 
 @dataclass(frozen=True)
@@ -28,64 +27,60 @@ class SimulationSettings:
     """The parameters of a simulator, loaded and ready to use."""
 
     rover: Rover
-    """The rover."""
+    """The rover that is simulated."""
     terrain: Terrain
     """The true ground."""
     start: tuple[float, float, float]
-    """x, y [m] and yaw [rad]."""
+    """x, y [m] and yaw [rad] of the rover at the start."""
     engine: str
     """One of ENGINES."""
     friction: float | None
-    """Coulomb friction instead of terrain's and rover's own."""
+    """Coulomb friction of the ground; None: that of the terrain, or of the rover file."""
     soil: str | None
     """Soil where the terrain names none; None: Coulomb friction."""
     policy: str
-    """How the rover's own servos share the traction, "equal" or "optimal"."""
+    """How the rover's own servos share the traction, one of TORQUE_POLICIES."""
     speed: float
-    """Along a path [m/s]."""
+    """Speed along a path [m/s]."""
     follow_commands: bool
     """Whether torques from elsewhere drive the wheels."""
     timeout: float
-    """Age from which speeds and torques count no more [s]."""
+    """Age from which speeds and torques are ignored [s]."""
     sensor: RangeSensor
-    """What it sees of the ground."""
+    """What measures the ground."""
     seed: int
-    """Of all noise."""
+    """Seed of all noise."""
 
 
-def settings_from_parameters(values: Mapping[str, Any]) -> SimulationSettings:
-    """Load what the parameters of the simulator name.
-
-    Args:
-        values: All of the table `ROVER_SIMULATOR`, each already checked.
+def load_simulation_settings(parameters: RoverSimulatorParameters) -> SimulationSettings:
+    """Load the rover and load or make the terrain that the parameters name.
 
     Raises:
         RoverError: Rover or terrain cannot be loaded.
     """
-    rover = load_rover(values["rover"])
-    name = values["terrain_file"]
-    if name:
-        terrain = load_terrain(name)
+    rover = load_rover(parameters.rover)
+    if parameters.terrain_file:
+        terrain = load_terrain(parameters.terrain_file)
     else:
-        terrain = make_mars_terrain(values["seed"], MADE_SIZE, MADE_RESOLUTION)
+        terrain = make_mars_terrain(parameters.seed, MADE_SIZE, MADE_RESOLUTION)
     return SimulationSettings(
         rover=rover,
         terrain=terrain,
-        start=(values["start_x"], values["start_y"], values["start_yaw"]),
-        engine=values["engine"],
-        friction=values["friction"] or None,
-        soil=values["soil"] or None,
-        policy=values["policy"],
-        speed=values["speed"] or rover.nominal_speed,
-        follow_commands=values["follow_commands"],
-        timeout=values["timeout"],
+        start=(parameters.start_x, parameters.start_y, parameters.start_yaw),
+        engine=parameters.engine,
+        friction=parameters.friction or None,
+        soil=parameters.soil or None,
+        policy=parameters.policy,
+        speed=parameters.speed or rover.nominal_speed,
+        follow_commands=parameters.follow_commands,
+        timeout=parameters.timeout,
         sensor=RangeSensor(
-            values["sensor_range"],
-            values["sensor_noise"],
-            values["sensor_height"],
-            values["sensor_occlusion"],
+            parameters.sensor_range,
+            parameters.sensor_noise,
+            parameters.sensor_height,
+            parameters.sensor_occlusion,
         ),
-        seed=values["seed"],
+        seed=parameters.seed,
     )
 
 
@@ -97,14 +92,14 @@ def make_plant(settings: SimulationSettings) -> Plant:
             the rover cannot start there.
         SoilError: No soil of that name.
     """
-    if settings.engine != "mujoco":
+    if settings.engine != MUJOCO:
         return QuasiStaticPlant(
             settings.rover, settings.terrain, settings.start,
             settings.friction, settings.policy, settings.soil,
         )  # fmt: skip
     if settings.soil is not None:
         raise PlanningError(f"soil is {settings.soil!r}; it must be empty with the engine mujoco")
-    if settings.policy != "equal":
+    if settings.policy != EQUAL:
         raise PlanningError(
             f"policy is {settings.policy!r}; it must be left out with the engine mujoco, whose "
             "servos hold speeds"

@@ -4,17 +4,14 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import median
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
-from rover_physics.prediction.sweep_options import POLICIES
+from rover_physics.names import OPTIMAL, SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import (
@@ -31,6 +28,8 @@ from rover_physics.traction.solver import (
     solve_traction,
 )
 from rover_physics.traction.wheel_limits import WheelLimits
+from rover_planner.parameters.shared import payload_or_none
+from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.traction.input_monitor import InputMonitor
 from rover_planner.traction.loops import (
     LoopGains,
@@ -44,8 +43,6 @@ from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 Floats = NDArray[np.float64]
 INPUTS = ("joint_states", "imu", "cmd_vel")
 ODOMETRY = "odometry"
-OWN_PAYLOAD = -1.0
-"""Value of the parameter payload that takes what the rover file has."""
 MAX_PUSH = 0.6
 """Largest push of the speed loop, in weights."""
 HEADING_INTEGRAL_GAIN = 0.5
@@ -65,19 +62,19 @@ class TractionSettings:
     rover: Rover
     """The rover that is driven."""
     friction: float
-    """Friction coefficient that is counted on."""
+    """Assumed friction coefficient."""
     max_torque: float
     """Largest torque of a wheel [N m]."""
     payload: float | None
     """Mass at the arm's tip [kg], None for the rover's own."""
     policy: str
-    """How the wheels share the traction: a name of POLICIES."""
+    """One of TORQUE_POLICIES."""
     timeout: float
     """Age from which an input is stale [s]."""
     odometry_timeout: float
     """The same for odometry [s]."""
     gains: LoopGains
-    """Of the loops."""
+    """Gains of the loops."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,30 +95,28 @@ class TractionUpdate:
     """How long it took [s]."""
 
 
-def settings_from_parameters(values: Mapping[str, Any]) -> TractionSettings:
-    """Load what the parameters of the traction controller name.
-
-    Args:
-        values: All of the table `TRACTION_CONTROLLER`, each already checked.
+def load_traction_settings(parameters: TractionControllerParameters) -> TractionSettings:
+    """Load the rover that the parameters name, and check what depends on it.
 
     Raises:
-        RoverError: The rover cannot be loaded, or the payload is none for this rover.
+        RoverError: The rover cannot be loaded, or cannot carry the payload.
+        ParameterError: The payload is below 0 and not OWN_PAYLOAD.
     """
-    rover, payload = load_rover(values["rover"]), values["payload"]
+    rover = load_rover(parameters.rover)
     settings = TractionSettings(
         rover=rover,
-        friction=values["friction"] or rover.friction,
-        max_torque=values["max_torque"] or rover.wheel.max_torque,
-        payload=None if payload == OWN_PAYLOAD else payload,
-        policy=values["policy"],
-        timeout=values["timeout"],
-        odometry_timeout=values["odometry_timeout"],
+        friction=parameters.friction or rover.friction,
+        max_torque=parameters.max_torque or rover.wheel.max_torque,
+        payload=payload_or_none(parameters.payload),
+        policy=parameters.policy,
+        timeout=parameters.timeout,
+        odometry_timeout=parameters.odometry_timeout,
         gains=LoopGains(
-            speed=values["speed_gain"],
-            travel=values["travel_gain"],
-            heading=values["heading_gain"],
-            slip=values["slip_gain"] * rover.weight * rover.wheel.radius**2,
-            torque_rate=values["torque_rate"],
+            speed=parameters.speed_gain,
+            travel=parameters.travel_gain,
+            heading=parameters.heading_gain,
+            slip=parameters.slip_gain * rover.weight * rover.wheel.radius**2,
+            torque_rate=parameters.torque_rate,
         ),
     )
     BalanceWriter(rover, settings.payload)
@@ -162,7 +157,7 @@ class TractionService:
         self._odometry_monitor.timeout = settings.odometry_timeout
         self._writer = BalanceWriter(rover, settings.payload)
         self._estimator = MotionContactEstimator(rover)
-        self._optimal = POLICIES[settings.policy] == TorquePolicy.OPTIMAL
+        self._optimal = settings.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
         self._limits = WheelLimits(friction, settings.max_torque, rover.wheel.radius)
         self._create_loops()

@@ -142,11 +142,10 @@ def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
 
 
 def test_the_picture_is_of_the_same_candidates_as_the_server_judges():
-    from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-    from rover_planner.planning.traverse_service import settings_from_parameters
+    from rover_planner.parameters.traverse_server import TraverseServerParameters
+    from rover_planner.planning.service_settings import load_service_settings
 
-    defaults = {spec.name: spec.default for spec in TRAVERSE_SERVER}
-    assert settings_from_parameters(defaults).query == PathQueryOptions()
+    assert load_service_settings(TraverseServerParameters()).query == PathQueryOptions()
 
 
 @pytest.mark.parametrize("content", [None, b"no map"])

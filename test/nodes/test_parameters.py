@@ -1,6 +1,7 @@
-"""One table makes declaration, checks and documentation; bad values are refused."""
+"""One table makes declaration, checks, docs and the typed values; bad values are refused."""
 
 import math
+from dataclasses import FrozenInstanceError, dataclass, fields, replace
 from pathlib import Path
 
 import pytest
@@ -8,10 +9,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from rover_planner.errors import PlanningError
-from rover_planner.parameters.declare import check_changes, declare_parameters
-from rover_planner.parameters.document import parameters_document
-from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.parameters.spec import ParameterError, ParameterSpec
+from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.document import TABLES, parameters_document
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.shared import MAP_DURABILITIES
+from rover_planner.parameters.table import ParameterError, ParameterTable, parameter, specs_of
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.ros.qos import map_subscriptions_qos
 
 
 @pytest.fixture
@@ -34,21 +39,35 @@ def make_node(ros):
         node.destroy_node()
 
 
-def spec_of(name):
-    return next(spec for spec in TRAVERSE_SERVER if spec.name == name)
+def spec_of(name, table=TraverseServerParameters):
+    return next(spec for spec in specs_of(table) if spec.name == name)
 
 
-def test_the_docs_agree_with_the_table():
+class Values:
+    """The values in force, as a node holds them."""
+
+    def __init__(self, node, accept=lambda values: None):
+        self.value = declare_parameters(node, TraverseServerParameters)
+        follow_changes(node, lambda: self.value, accept, self.take)
+
+    def take(self, values):
+        self.value = values
+
+
+def test_the_docs_agree_with_the_tables():
     docs = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
     assert docs.read_text() == parameters_document(), (
         "run: python -m rover_planner.parameters > docs/parameters.md"
     )
 
 
-def test_names_are_unique_and_defaults_are_allowed():
-    assert len({spec.name for spec in TRAVERSE_SERVER}) == len(TRAVERSE_SERVER)
-    for spec in TRAVERSE_SERVER:
-        spec.check(spec.default)
+@pytest.mark.parametrize("table", TABLES.values())
+def test_defaults_are_of_the_type_of_their_field_and_allowed(table):
+    assert table() == table()
+    for spec, field in zip(specs_of(table), fields(table), strict=True):
+        assert spec.meaning.endswith(".") and "|" not in spec.meaning
+        expected = tuple if field.type == tuple[str, ...] else field.type
+        assert type(spec.default) is expected
 
 
 @pytest.mark.parametrize(
@@ -69,23 +88,60 @@ def test_names_are_unique_and_defaults_are_allowed():
         ("map_frame", "", "map_frame is empty; it must be a text such as 'map'"),
     ],
 )
-def test_a_bad_value_is_refused_by_name(name, value, text):
+def test_a_table_with_a_bad_value_cannot_be_made(name, value, text):
     with pytest.raises(ParameterError, match=text):
-        spec_of(name).check(value)
+        replace(TraverseServerParameters(), **{name: value})
 
 
-def test_parameters_are_declared_as_the_table_says(make_node):
+def test_a_list_of_names_has_no_empty_one():
+    with pytest.raises(ParameterError, match=r"joints is \['a', ''\]; it must hold texts"):
+        TractionControllerParameters(joints=("a", ""))
+
+
+def test_values_cannot_be_changed_in_place():
+    with pytest.raises(FrozenInstanceError):
+        TraverseServerParameters().friction = 0.5
+
+
+def test_the_type_of_a_parameter_is_that_of_its_field():
+    @dataclass(frozen=True)
+    class Table(ParameterTable):
+        text: str = parameter("", "A text.")
+        number: float = parameter(0.0, "A number.", unit="m", bounds=(0.0, 1.0))
+        count: int = parameter(1, "A count.")
+        flag: bool = parameter(True, "A flag.")
+        names: tuple[str, ...] = parameter(("a",), "Names.", read_only=True)
+
+    assert [spec.type_name for spec in specs_of(Table)] == [
+        "string",
+        "double",
+        "integer",
+        "bool",
+        "string array",
+    ]
+    assert [spec.default for spec in specs_of(Table)] == ["", 0.0, 1, True, ("a",)]
+    assert spec_of("names", Table).ros_default == ["a"]
+    assert spec_of("number", Table).bounds == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("table", TABLES.values())
+def test_parameters_are_declared_as_the_table_says(make_node, table):
     node = make_node(friction=0.6)
-    values = declare_parameters(node, TRAVERSE_SERVER)
-    assert values == {spec.name: spec.default for spec in TRAVERSE_SERVER} | {"friction": 0.6}
-    for spec in TRAVERSE_SERVER:
+    assert declare_parameters(node, table) == table(friction=0.6)
+    for spec in specs_of(table):
         descriptor = node.describe_parameter(spec.name)
-        assert descriptor.description.startswith(spec.doc)
+        assert descriptor.description.startswith(spec.meaning)
         assert descriptor.read_only == spec.read_only
         ranges = descriptor.floating_point_range or descriptor.integer_range
         assert [(r.from_value, r.to_value) for r in ranges] == (
             [spec.bounds] if spec.bounds else []
         )
+
+
+def test_an_array_of_names_is_taken_from_ros(make_node):
+    names = list(reversed(RoverSimulatorParameters().joints))
+    values = declare_parameters(make_node(joints=names), RoverSimulatorParameters)
+    assert values.joints == tuple(names)
 
 
 @pytest.mark.parametrize(
@@ -100,14 +156,13 @@ def test_parameters_are_declared_as_the_table_says(make_node):
 )
 def test_a_bad_override_is_refused_at_the_start(make_node, name, value):
     with pytest.raises(ParameterError, match=f"parameter {name}"):
-        declare_parameters(make_node(**{name: value}), TRAVERSE_SERVER)
+        declare_parameters(make_node(**{name: value}), TraverseServerParameters)
 
 
 def test_a_bad_change_leaves_the_value_and_says_why(make_node):
-    node = make_node()
-    values = declare_parameters(node, TRAVERSE_SERVER)
-    seen = []
-    node.add_on_set_parameters_callback(check_changes(TRAVERSE_SERVER, values, seen.append))
+    node, seen = make_node(), []
+    values = Values(node, seen.append)
+    before = values.value
 
     def change(name, value):
         return node.set_parameters([Parameter(name, value=value)])[0]
@@ -122,27 +177,37 @@ def test_a_bad_change_leaves_the_value_and_says_why(make_node):
         result = change(name, value)
         assert not result.successful and text in result.reason
         assert node.get_parameter(name).value == spec_of(name).default
-    assert seen == []
+    assert seen == [] and values.value is before
     assert change("friction", 0.5).successful
-    assert seen == [values | {"friction": 0.5}]
+    assert seen == [values.value] and values.value == replace(before, friction=0.5)
+
+
+def test_changes_made_at_once_are_judged_together(make_node):
+    def accept(values):
+        if values.friction < values.max_torque:
+            raise PlanningError("friction is below max_torque")
+
+    node = make_node()
+    values = Values(node, accept)
+    changes = [Parameter("friction", value=2.0), Parameter("max_torque", value=1.0)]
+    assert not node.set_parameters(changes[1:])[0].successful
+    assert node.set_parameters_atomically(changes).successful
+    assert values.value == TraverseServerParameters(friction=2.0, max_torque=1.0)
 
 
 def test_what_the_node_cannot_accept_is_refused_with_its_reason(make_node):
     def accept(values):
-        raise PlanningError(f"no rover {values['rover']}")
+        raise PlanningError(f"no rover {values.rover}")
 
     node = make_node()
-    values = declare_parameters(node, TRAVERSE_SERVER)
-    node.add_on_set_parameters_callback(check_changes(TRAVERSE_SERVER, values, accept))
+    values = Values(node, accept)
+    before = values.value
     result = node.set_parameters([Parameter("rover", value="lsr9")])[0]
     assert not result.successful and result.reason == "no rover lsr9"
     assert node.set_parameters([Parameter("use_sim_time", value=False)])[0].successful
+    assert values.value is before
 
 
-def test_the_type_of_a_parameter_is_that_of_its_default():
-    assert [ParameterSpec("p", default, "").type_name for default in ("", 0.0, 1, True)] == [
-        "string",
-        "double",
-        "integer",
-        "bool",
-    ]
+@pytest.mark.parametrize("durability", MAP_DURABILITIES)
+def test_every_durability_of_maps_has_subscriptions(durability):
+    assert map_subscriptions_qos(durability)

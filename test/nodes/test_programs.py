@@ -61,7 +61,7 @@ def test_help_comes_without_ros_and_lists_every_parameter(name):
     assert program.what in told and program.topics in told
     for spec in program.parameters:
         assert f" {spec.name}: {spec.type_name}, default " in told
-        assert spec.doc in told
+        assert spec.meaning in told
         assert re.search(rf"^ +{spec.name}: {spec.type_name}, ", ended.stdout, re.MULTILINE)
     assert max(map(len, ended.stdout.splitlines())) <= 99
 

@@ -1,6 +1,7 @@
 """The traverse server classes paths, whichever policy it assumes; soil and payload count."""
 
 import json
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ from rover_physics.traversability.classification import (
     PASSABLE,
     WITH_TRACTION_CONTROL,
 )
-from rover_planner.planning.path_report import PER_WAYPOINT
+from rover_planner.planning.verdict_report import WaypointLists
 from support.grounds import make_terrain, waves
 from support.planner_client import ask
 
+LISTS = {field.name for field in fields(WaypointLists)}
 PATH = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
 
 
@@ -39,11 +41,11 @@ def test_traction_control_is_named_whichever_policy_is_assumed(
     assert verdict["traversability_class"] == WITH_TRACTION_CONTROL
     assert verdict["class_constraint"] == "friction" and verdict["class_wheel"] in WHEELS
     assert 0.0 < verdict["class_margin"] < 1.0
-    assert {len(verdict[key]) for key in PER_WAYPOINT} == {verdict["waypoints"]}
+    assert {len(verdict[key]) for key in LISTS} == {verdict["waypoints"]}
     assert set(verdict["traversability_classes"]) == {WITH_TRACTION_CONTROL}
 
 
-def test_a_plan_has_a_pose_where_the_grade_changes(server, client):
+def test_a_plan_has_a_pose_where_the_class_changes(server, client):
     client.send_terrain(make_terrain(lambda x, y: 0.45 * np.maximum(x - 0.13, 0.0)))
     for name, value in {"policy": "optimal", "plan_spacing": 50.0, "candidate_count": 1}.items():
         assert client.set_parameter(name, value)[0]
@@ -84,7 +86,7 @@ def test_an_impassable_path_is_classified_by_its_first_failure(mapped, client):
 def test_plans_are_classified_too_and_the_status_has_the_summary_alone(mapped, client):
     verdict = ask(client)[1]
     assert verdict["traversability_class"] == PASSABLE
-    assert not PER_WAYPOINT.keys() & verdict.keys()
+    assert not LISTS & verdict.keys()
 
 
 def test_the_soil_of_the_server_counts_and_is_checked(server, client):

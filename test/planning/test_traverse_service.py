@@ -13,19 +13,20 @@ from rover_physics.errors import RoverFileError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
-from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
-from rover_planner.planning.traverse_service import (
-    TraverseService,
-    densify,
-    settings_from_parameters,
-)
+from rover_planner.parameters.table import ParameterError
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.path_geometry import densify
+from rover_planner.planning.service_settings import load_service_settings
+from rover_planner.planning.traverse_service import TraverseService
 from support.grounds import make_terrain, rocky, wall_at, waves
 
-DEFAULTS = {spec.name: spec.default for spec in TRAVERSE_SERVER}
+
+def load(**parameters):
+    return load_service_settings(TraverseServerParameters(**parameters))
 
 
 def make_service(terrain=None, **parameters):
-    service = TraverseService(settings_from_parameters(DEFAULTS | parameters))
+    service = TraverseService(load(**parameters))
     if terrain is not None:
         service.take_terrain(terrain)
     return service
@@ -36,24 +37,30 @@ def test_the_module_imports_no_ros():
 
 
 def test_zero_takes_the_rovers_own_friction_and_torque():
-    query = settings_from_parameters(DEFAULTS).query
+    query = load().query
     assert query.friction is None and query.max_torque is None
-    query = settings_from_parameters(DEFAULTS | {"friction": 0.4, "max_torque": 1.5}).query
+    query = load(friction=0.4, max_torque=1.5).query
     assert query.friction == 0.4 and query.max_torque == 1.5
 
 
 def test_a_rover_that_cannot_be_loaded_is_an_error():
     with pytest.raises(RoverFileError):
-        settings_from_parameters(DEFAULTS | {"rover": "lsr9"})
+        load(rover="lsr9")
+
+
+@pytest.mark.parametrize("payload", [-0.5, -2.0])
+def test_a_payload_below_0_is_refused(payload):
+    with pytest.raises(ParameterError, match="payload is -"):
+        load(payload=payload)
 
 
 def test_settings_change_the_answer():
     service = make_service(make_terrain(waves))
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     assert service.answer(start, goal).traversable
-    service.settings = settings_from_parameters(DEFAULTS | {"friction": 0.01})
+    service.settings = load(friction=0.01)
     refused = service.answer(start, goal)
-    assert not refused.traversable and refused.verdict["code"] == "friction"
+    assert not refused.traversable and refused.code == "friction"
 
 
 def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
@@ -61,17 +68,17 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain)
-    refused = service.answer(start, goal).verdict
-    assert not refused["traversable"]
-    assert refused["reason"].endswith("at worst within 3 sigma of the map")
-    assert refused["map_sigmas"] == 3.0
-    assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
-    service.settings = settings_from_parameters(DEFAULTS | {"map_sigmas": 0.0})
-    passed = service.answer(start, goal).verdict
-    assert passed["traversable"]
-    assert passed["map_sigmas"] == 0.0
-    assert passed["friction_utilisation_bound"] is None
-    assert passed == make_service(certain).answer(start, goal).verdict
+    refused = service.answer(start, goal).report
+    assert not refused.traversable
+    assert refused.reason.endswith("at worst within 3 sigma of the map")
+    assert refused.path.map_sigmas == 3.0
+    assert refused.path.friction_utilisation_bound > refused.path.max_friction_utilisation
+    service.settings = load(map_sigmas=0.0)
+    passed = service.answer(start, goal).report
+    assert passed.traversable
+    assert passed.path.map_sigmas == 0.0
+    assert math.isnan(passed.path.friction_utilisation_bound)
+    assert passed.to_dict() == make_service(certain).answer(start, goal).report.to_dict()
 
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
@@ -79,16 +86,16 @@ def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     terrain.elevation[80, 80] = np.nan
     service = make_service(terrain)
     assert np.isnan(service.terrain.elevation[80, 80])
-    service.settings = settings_from_parameters(DEFAULTS | {"unknown_cells": "interpolate"})
+    service.settings = load(unknown_cells="interpolate")
     assert np.isfinite(service.terrain.elevation[80, 80])
-    service.settings = settings_from_parameters(DEFAULTS)
+    service.settings = load()
     assert np.isnan(service.terrain.elevation[80, 80])
 
 
 def test_the_exact_goal_is_preferred_to_its_neighbours():
     service = make_service(make_terrain(waves))
-    verdict = service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=1.0).verdict
-    assert verdict["goal_offset"] == 0.0 and verdict["alternative_goals_tried"] == 0
+    search = service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=1.0).search
+    assert search.goal_offset == 0.0 and search.alternatives_tried == 0
 
 
 @pytest.mark.parametrize("tolerance", [0.05, 0.3, 0.9])
@@ -107,21 +114,21 @@ def test_the_nearest_ring_that_can_be_reached_is_taken():
     offset = (
         make_service(wall)
         .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=0.6)
-        .verdict["goal_offset"]
+        .search.goal_offset
     )
     wide = (
         make_service(wall)
         .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=3.0)
-        .verdict["goal_offset"]
+        .search.goal_offset
     )
     assert 0.3 < offset <= 0.6 and offset <= wide <= 1.0
 
 
 def test_where_the_start_fails_no_other_goal_is_tried():
     service = make_service(make_terrain(waves))
-    verdict = service.answer((-9.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=0.5).verdict
-    assert verdict["code"] == "off_map" and verdict["alternative_goals_tried"] == 0
-    assert verdict["first_failure"] == 0
+    report = service.answer((-9.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=0.5).report
+    assert report.code == "off_map" and report.search.alternative_goals_tried == 0
+    assert report.first_failure == 0
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, math.nan, math.inf])
@@ -136,22 +143,22 @@ def test_a_refused_path_is_forgotten():
     assert service.check_last_path().traversable
     service.refuse_path("bad quaternion")
     judgement = service.check_last_path()
-    assert judgement.verdict["code"] == "no_path"
-    assert judgement.verdict["reason"] == "the last path was refused: bad quaternion"
+    assert judgement.code == "no_path"
+    assert judgement.reason == "the last path was refused: bad quaternion"
 
 
 def test_a_pose_alone_is_a_path():
     service = make_service(make_terrain(waves))
     service.take_path(np.array([[0.5, 0.2, 1.0]]))
-    verdict = service.check_last_path().verdict
-    assert verdict["traversable"] and verdict["waypoints"] == 1 and verdict["length"] == 0.0
+    report = service.check_last_path().report
+    assert report.traversable and report.path.waypoints == 1 and report.path.length == 0.0
 
 
 def test_the_measured_suspension_is_compared_with_the_predicted_one():
     service = make_service(make_terrain(rocky))
     service.take_path(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]))
     free = service.check_last_path()
-    assert "suspension_mismatch" not in free.verdict
+    assert free.suspension is None and "suspension_mismatch" not in free.report.to_dict()
     prediction = free.candidate.prediction
     predicted = dict(
         zip(
@@ -162,13 +169,13 @@ def test_the_measured_suspension_is_compared_with_the_predicted_one():
     )
     assert abs(predicted["rocker_left"]) > 0.001
     service.take_joints(predicted)
-    verdict = service.check_last_path().verdict
-    assert verdict["suspension_agrees"]
-    assert verdict["suspension_mismatch"] == dict.fromkeys(SUSPENSION_JOINTS, 0.0)
+    report = service.check_last_path().report
+    assert report.suspension.suspension_agrees and not report.has_warning
+    assert report.suspension.suspension_mismatch == dict.fromkeys(SUSPENSION_JOINTS, 0.0)
     service.take_joints({"bogie_left": predicted["bogie_left"] + 0.2})
-    verdict = service.check_last_path().verdict
-    assert not verdict["suspension_agrees"] and verdict["traversable"]
-    assert verdict["suspension_mismatch"]["bogie_left"] == pytest.approx(0.2)
+    report = service.check_last_path().report
+    assert report.has_warning and report.traversable
+    assert report.suspension.suspension_mismatch["bogie_left"] == pytest.approx(0.2)
 
 
 def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
@@ -202,9 +209,10 @@ def test_terrain_and_request_turned_together_give_the_same_answer():
 
     straight = make_service(terrain).answer(start, goal)
     sideways = make_service(turned).answer(turn(start), turn(goal))
-    assert sideways.verdict["chosen_candidate"] == straight.verdict["chosen_candidate"]
+    found, expected = sideways.report.to_dict(), straight.report.to_dict()
+    assert found["chosen_candidate"] == expected["chosen_candidate"]
     for name in ("energy", "min_tip_over_ratio", "max_friction_utilisation"):
-        assert sideways.verdict[name] == pytest.approx(straight.verdict[name], abs=1e-6)
+        assert found[name] == pytest.approx(expected[name], abs=1e-6)
     np.testing.assert_allclose(
         sideways.candidate.prediction.wheel_loads,
         straight.candidate.prediction.wheel_loads,
@@ -214,11 +222,12 @@ def test_terrain_and_request_turned_together_give_the_same_answer():
 
 @pytest.mark.parametrize(("ground", "opening"), [(rocky, "chose"), (wall_at(0.5), "number")])
 def test_candidates_are_counted_from_one_in_words_and_numbers(ground, opening):
-    verdict = make_service(make_terrain(ground)).answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)).verdict
-    assert 1 <= verdict["chosen_candidate"] <= verdict["candidates"]
-    found = re.search(rf"\b{opening} (\d+)", verdict["explanation"])
-    assert found is not None, verdict["explanation"]
-    assert int(found[1]) == verdict["chosen_candidate"]
+    service = make_service(make_terrain(ground))
+    search = service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)).report.search
+    assert 1 <= search.chosen_candidate <= search.candidates
+    found = re.search(rf"\b{opening} (\d+)", search.explanation)
+    assert found is not None, search.explanation
+    assert int(found[1]) == search.chosen_candidate
 
 
 def test_mirrored_terrain_and_request_swap_right_and_left():
@@ -286,19 +295,19 @@ def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
     codes,
 ):
     service = make_service(real_map("erc_marsyard2021_9cm"))
-    verdict = service.answer(start, goal).verdict
-    assert verdict["code"] in codes, verdict["reason"]
-    assert verdict["traversable"] == (not verdict["reason"]) == (codes == {""})
+    judgement = service.answer(start, goal)
+    assert judgement.code in codes, judgement.reason
+    assert judgement.traversable == (not judgement.reason) == (codes == {""})
 
 
 def test_the_real_martian_ground_is_passed_where_it_is_known():
     terrain = load_terrain("spirit")
     north = math.pi / 2
     start, goal = (-48.5, -20.5, north), (-48.5, -18.0, north)
-    strict = make_service(terrain).answer(start, goal).verdict
-    assert not strict["traversable"] and strict["code"] == "unknown_ground"
+    strict = make_service(terrain).answer(start, goal)
+    assert not strict.traversable and strict.code == "unknown_ground"
     lenient = make_service(terrain, unknown_cells="interpolate", max_gap=0.3)
     assert lenient.answer(start, goal).traversable
-    shadow = lenient.answer((-48.0, -20.0, 0.0), (-40.0, -20.0, 0.0)).verdict
-    assert shadow["code"] == "unknown_ground"
-    assert -46.0 < shadow["failure_pose"][0] < -42.0
+    shadow = lenient.answer((-48.0, -20.0, 0.0), (-40.0, -20.0, 0.0)).report
+    assert shadow.code == "unknown_ground"
+    assert -46.0 < shadow.failure.failure_pose[0] < -42.0

@@ -100,7 +100,8 @@ def test_every_console_script_is_a_function_that_exists(setup_arguments):
 
 
 def test_the_launch_file_starts_nodes_and_sets_parameters_that_exist(setup_arguments):
-    from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
+    from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+    from rover_planner.parameters.table import specs_of
 
     text = (TOP / "launch" / "simulation.launch.py").read_text(encoding="utf-8")
     tree = ast.parse(text)
@@ -110,7 +111,7 @@ def test_the_launch_file_starts_nodes_and_sets_parameters_that_exist(setup_argum
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
     }
     arguments = ast.literal_eval(values["ARGUMENTS"])
-    specs = {spec.name: spec for spec in ROVER_SIMULATOR}
+    specs = {spec.name: spec for spec in specs_of(RoverSimulatorParameters)}
     for name, (default, meaning) in arguments.items():
         assert type(specs[name].default)(default) == specs[name].default
         assert meaning

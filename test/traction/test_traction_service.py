@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
-from rover_planner.traction.traction_service import TractionService, settings_from_parameters
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.traction.traction_service import TractionService, load_traction_settings
 from support.rough_grounds import plane
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
@@ -15,8 +15,7 @@ PERIOD = 0.02
 
 
 def settings(**values):
-    defaults = {spec.name: spec.default for spec in TRACTION_CONTROLLER}
-    return settings_from_parameters(defaults | values)
+    return load_traction_settings(TractionControllerParameters(**values))
 
 
 class Rig:

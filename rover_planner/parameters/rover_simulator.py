@@ -1,0 +1,111 @@
+"""Parameters of `/rover_simulator`."""
+
+from dataclasses import dataclass
+
+from rover_physics.names import EQUAL, TORQUE_POLICIES, WHEEL_JOINTS
+from rover_planner.parameters.table import ParameterTable, parameter
+
+QUASI_STATIC, MUJOCO = "quasi_static", "mujoco"
+ENGINES = (QUASI_STATIC, MUJOCO)
+"""Values of the parameter engine."""
+
+
+@dataclass(frozen=True)
+class RoverSimulatorParameters(ParameterTable):
+    """Parameters of `/rover_simulator`; each field says what it means."""
+
+    rover: str = parameter(
+        "lsr1", "Rover that is simulated: a preset's name or a rover file.", read_only=True
+    )
+    terrain_file: str = parameter(
+        "",
+        "Terrain to drive on: a preset's name or a terrain file; empty makes a Mars-like one.",
+        read_only=True,
+    )
+    start_x: float = parameter(
+        0.0, "Start of the rover, x.", unit="m", bounds=(-1e6, 1e6), read_only=True
+    )
+    start_y: float = parameter(
+        0.0, "Start of the rover, y.", unit="m", bounds=(-1e6, 1e6), read_only=True
+    )
+    start_yaw: float = parameter(
+        0.0, "Heading at the start.", unit="rad", bounds=(-6.3, 6.3), read_only=True
+    )
+    engine: str = parameter(
+        QUASI_STATIC,
+        "What moves the rover: the quasi-static model, or MuJoCo (extra bench).",
+        choices=ENGINES,
+        read_only=True,
+    )
+    friction: float = parameter(
+        0.0,
+        "Coulomb friction of the ground; 0 takes the terrain's or the rover file's.",
+        bounds=(0.0, 10.0),
+        read_only=True,
+    )
+    soil: str = parameter(
+        "",
+        "Soil of config/soils.yaml where the terrain names none; empty is Coulomb friction. "
+        "Quasi-static engine only.",
+        read_only=True,
+    )
+    policy: str = parameter(
+        EQUAL,
+        "How the rover's own servos share the traction: equal torques, or optimal. Quasi-static "
+        "engine only, and not with follow_commands.",
+        choices=TORQUE_POLICIES,
+        read_only=True,
+    )
+    speed: float = parameter(
+        0.0,
+        "Speed along a path; 0 takes the rover's nominal speed.",
+        unit="m/s",
+        bounds=(0.0, 10.0),
+        read_only=True,
+    )
+    follow_commands: bool = parameter(
+        False,
+        "Whether torques from /traction_controller/commands drive the rover; the simulator then "
+        "publishes cmd_vel, except while it comes from elsewhere.",
+        read_only=True,
+    )
+    joints: tuple[str, ...] = parameter(
+        WHEEL_JOINTS, "Wheel joints in the order of the values of the torques.", read_only=True
+    )
+    timeout: float = parameter(
+        0.5,
+        "Age from which cmd_vel and torques are ignored.",
+        unit="s",
+        bounds=(0.01, 10.0),
+        read_only=True,
+    )
+    rate: float = parameter(
+        50.0, "Steps per second.", unit="1/s", bounds=(5.0, 500.0), read_only=True
+    )
+    map_rate: float = parameter(
+        0.5, "Maps per second.", unit="1/s", bounds=(0.01, 20.0), read_only=True
+    )
+    sensor_range: float = parameter(
+        6.0, "Range of the terrain sensor.", unit="m", bounds=(0.5, 1e3), read_only=True
+    )
+    sensor_noise: float = parameter(
+        0.0,
+        "Standard deviation of the measured heights; it is published with them as elevation_std.",
+        unit="m",
+        bounds=(0.0, 1.0),
+        read_only=True,
+    )
+    sensor_height: float = parameter(
+        0.8,
+        "Height of the sensor over the body's origin.",
+        unit="m",
+        bounds=(0.0, 10.0),
+        read_only=True,
+    )
+    sensor_occlusion: bool = parameter(
+        True, "Whether ground hides what is behind it.", read_only=True
+    )
+    seed: int = parameter(
+        1, "Seed of noise and of a made terrain.", bounds=(0, 2**31 - 1), read_only=True
+    )
+    map_frame: str = parameter("map", "Frame of map, path and odometry.", read_only=True)

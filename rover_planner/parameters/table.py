@@ -1,0 +1,124 @@
+"""Tables of node parameters: dataclasses whose fields have a meaning, a unit and bounds."""
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar, get_type_hints
+
+from rover_planner.errors import PlanningError
+
+Value = TypeVar("Value")
+
+_ROS_TYPES: dict[Any, str] = {
+    str: "string",
+    float: "double",
+    int: "integer",
+    bool: "bool",
+    tuple[str, ...]: "string array",
+}
+
+
+class ParameterError(PlanningError):
+    """A parameter with a value that is not allowed; names it, the value and what is allowed."""
+
+
+def parameter(
+    default: Value,
+    meaning: str,
+    *,
+    unit: str = "",
+    bounds: tuple[float, float] | None = None,
+    choices: tuple[str, ...] = (),
+    read_only: bool = False,
+) -> Value:
+    """Make a field of a `ParameterTable`; `ParameterSpec` says what the arguments are."""
+    made: Any = field(
+        default=default,
+        metadata={
+            "meaning": meaning,
+            "unit": unit,
+            "bounds": bounds,
+            "choices": choices,
+            "read_only": read_only,
+        },
+    )
+    return made  # a field to the dataclass, the type of its value to a type checker
+
+
+@dataclass(frozen=True)
+class ParameterSpec:
+    """One row of a table: what is allowed for a parameter and what it means."""
+
+    name: str
+    """Name of the parameter, and of the field."""
+    type_name: str
+    """Type as ROS calls it."""
+    default: Any
+    """Default value."""
+    meaning: str
+    """One sentence for `ros2 param describe` and the docs."""
+    unit: str
+    """Unit, empty where there is none."""
+    bounds: tuple[float, float] | None
+    """Smallest and largest allowed number; None for any."""
+    choices: tuple[str, ...]
+    """Allowed texts; empty for any."""
+    read_only: bool
+    """Whether the value is fixed once the node runs."""
+
+    @property
+    def ros_default(self) -> Any:
+        """Default value as ROS takes it: a list for a tuple."""
+        return list(self.default) if isinstance(self.default, tuple) else self.default
+
+    def check(self, value: Any) -> None:
+        """Refuse a value of the wrong type, NaN, empty, out of bounds or not among the choices.
+
+        Raises:
+            ParameterError: Names the parameter, the value and what is allowed.
+        """
+        if type(value) is not type(self.default):
+            raise ParameterError(
+                f"parameter {self.name} is {value!r}; it must be of "
+                f"type {self.type_name}, such as {self.ros_default!r}"
+            )
+        if isinstance(value, tuple) and not all(isinstance(text, str) and text for text in value):
+            raise ParameterError(
+                f"parameter {self.name} is {list(value)!r}; it must hold texts, none of them empty"
+            )
+        if value == "" != self.default:
+            raise ParameterError(
+                f"parameter {self.name} is empty; it must be a text such as {self.default!r}"
+            )
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ParameterError(f"parameter {self.name} is {value}; it must be a finite number")
+        if self.bounds is not None and not self.bounds[0] <= value <= self.bounds[1]:
+            raise ParameterError(
+                f"parameter {self.name} is {value}; it must be in "
+                f"{self.bounds[0]:g} to {self.bounds[1]:g} {self.unit}".rstrip()
+            )
+        if self.choices and value not in self.choices:
+            raise ParameterError(
+                f"parameter {self.name} is {value!r}; it must be one of {', '.join(self.choices)}"
+            )
+
+
+@dataclass(frozen=True)
+class ParameterTable:
+    """Base of the parameters of a node: all values of a table are checked when it is made.
+
+    Raises:
+        ParameterError: A value that `ParameterSpec.check` refuses.
+    """
+
+    def __post_init__(self) -> None:
+        for spec in specs_of(type(self)):
+            spec.check(getattr(self, spec.name))
+
+
+def specs_of(table: type[ParameterTable]) -> tuple[ParameterSpec, ...]:
+    """Return the rows of a table in the order of its fields."""
+    types = get_type_hints(table)
+    return tuple(
+        ParameterSpec(row.name, _ROS_TYPES[types[row.name]], row.default, **row.metadata)
+        for row in fields(table)
+    )

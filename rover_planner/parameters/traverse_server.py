@@ -1,0 +1,90 @@
+"""Parameters of `/traverse_server`."""
+
+from dataclasses import dataclass
+
+from rover_physics.bounds.path import SIGMAS
+from rover_physics.names import EQUAL, TORQUE_POLICIES
+from rover_planner.parameters.shared import (
+    cell_height_parameter,
+    map_durability_parameter,
+    map_resolution_parameter,
+    max_torque_parameter,
+    payload_parameter,
+)
+from rover_planner.parameters.table import ParameterTable, parameter
+
+REFUSE, INTERPOLATE = "refuse", "interpolate"
+"""Values of the parameter unknown_cells."""
+
+
+@dataclass(frozen=True)
+class TraverseServerParameters(ParameterTable):
+    """Parameters of `/traverse_server`; each field says what it means."""
+
+    rover: str = parameter("lsr1", "Rover to ask about: a preset's name or a rover file.")
+    friction: float = parameter(
+        0.0,
+        "Coulomb friction where the map has none; 0 takes the rover file's.",
+        bounds=(0.0, 10.0),
+    )
+    max_torque: float = max_torque_parameter()
+    soil: str = parameter(
+        "",
+        "Soil of config/soils.yaml where the map names none; empty is Coulomb friction.",
+    )
+    payload: float = payload_parameter()
+    policy: str = parameter(
+        EQUAL,
+        "How the wheels share the traction: equal torques, or optimal with traction control.",
+        choices=TORQUE_POLICIES,
+    )
+    candidate_count: int = parameter(
+        9, "Largest number of candidate paths between start and goal.", bounds=(1, 99)
+    )
+    candidate_spacing: float = parameter(
+        0.3,
+        "Distance between neighbouring candidates half-way.",
+        unit="m",
+        bounds=(0.01, 10.0),
+    )
+    waypoint_spacing: float = parameter(
+        0.02, "Largest distance between judged waypoints.", unit="m", bounds=(0.001, 1.0)
+    )
+    plan_spacing: float = parameter(
+        0.1,
+        "Distance between poses of a plan, which also has those where the class changes; "
+        "0 returns every waypoint.",
+        unit="m",
+        bounds=(0.0, 100.0),
+    )
+    map_frame: str = parameter(
+        "map", "Frame of the map; requests in another frame are refused.", read_only=True
+    )
+    map_resolution: float = map_resolution_parameter()
+    cell_height: str = cell_height_parameter()
+    map_durability: str = map_durability_parameter()
+    unknown_cells: str = parameter(
+        REFUSE,
+        "Unknown cells: refuse paths over them, or interpolate small gaps.",
+        choices=(REFUSE, INTERPOLATE),
+    )
+    max_gap: float = parameter(
+        0.2, "Widest unknown region that is interpolated.", unit="m", bounds=(0.0, 100.0)
+    )
+    map_sigmas: float = parameter(
+        SIGMAS,
+        "Standard deviations by which heights may be wrong where the map has elevation_std; "
+        "0 takes them as exact.",
+        bounds=(0.0, 10.0),
+    )
+    terrain_file: str = parameter(
+        "",
+        "Map to start with: a preset's name or a terrain file; empty waits for a map.",
+        read_only=True,
+    )
+    suspension_tolerance: float = parameter(
+        0.1,
+        "Difference of measured and predicted suspension angles that raises a warning.",
+        unit="rad",
+        bounds=(0.0, 3.2),
+    )

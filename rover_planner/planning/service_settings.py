@@ -1,0 +1,59 @@
+"""Settings of a traverse server: its parameters with the rover loaded."""
+
+from dataclasses import dataclass
+
+from rover_physics.rover.manipulator import body_mass_and_com
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.soil_file import soil_named
+from rover_planner.parameters.shared import payload_or_none
+from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
+from rover_planner.planning.path_query import PathQueryOptions
+
+
+@dataclass(frozen=True)
+class ServiceSettings:
+    """The parameters of a traverse server, loaded and ready to use."""
+
+    rover: Rover
+    """The rover that is asked about."""
+    query: PathQueryOptions
+    """How candidates are made and judged."""
+    interpolate: bool
+    """Whether small unknown regions of a map are interpolated."""
+    max_gap: float
+    """Widest unknown region that is interpolated [m]."""
+    suspension_tolerance: float
+    """Difference of measured and predicted suspension angles that is still agreement [rad]."""
+
+
+def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettings:
+    """Load the rover that the parameters name, and check what depends on it.
+
+    Raises:
+        RoverError: The rover cannot be loaded, the soil is not among the presets, or the rover
+            cannot carry the payload.
+        ParameterError: The payload is below 0 and not OWN_PAYLOAD.
+    """
+    rover, payload = load_rover(parameters.rover), payload_or_none(parameters.payload)
+    if payload is not None:
+        body_mass_and_com(rover, payload=payload)
+    if parameters.soil:
+        soil_named(parameters.soil)
+    return ServiceSettings(
+        rover=rover,
+        query=PathQueryOptions(
+            count=parameters.candidate_count,
+            spacing=parameters.candidate_spacing,
+            waypoint_spacing=parameters.waypoint_spacing,
+            policy=parameters.policy,
+            friction=parameters.friction or None,
+            max_torque=parameters.max_torque or None,
+            soil=parameters.soil or None,
+            payload=payload,
+            map_sigmas=parameters.map_sigmas,
+        ),
+        interpolate=parameters.unknown_cells == INTERPOLATE,
+        max_gap=parameters.max_gap,
+        suspension_tolerance=parameters.suspension_tolerance,
+    )

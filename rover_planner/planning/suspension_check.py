@@ -1,0 +1,34 @@
+"""Compares measured suspension angles with those predicted where a path starts."""
+
+from collections.abc import Mapping
+
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_planner.planning.verdict_report import SuspensionReport
+
+
+def compare_suspension(
+    prediction: PathPrediction, measured: Mapping[str, float], tolerance: float
+) -> SuspensionReport | None:
+    """Compare measured with predicted suspension angles.
+
+    Args:
+        prediction: Of the path; the rover is taken to stand at its first waypoint.
+        measured: Joint angles [rad] by name; joints that are none of the suspension are ignored.
+        tolerance: Largest difference that is still agreement [rad].
+
+    Returns:
+        The comparison, None where nothing was measured or the first waypoint did not settle.
+    """
+    if not (measured and prediction.settled[0]):
+        return None
+    predicted = (*prediction.rocker_angle[0].tolist(), *prediction.bogie_angle[0].tolist())
+    mismatch = {
+        name: measured[name] - angle
+        for name, angle in zip(SUSPENSION_JOINTS, predicted, strict=True)
+        if name in measured
+    }
+    if not mismatch:
+        return None
+    agrees = max(abs(difference) for difference in mismatch.values()) <= tolerance
+    return SuspensionReport(mismatch, agrees)

@@ -1,0 +1,178 @@
+"""All that is said about a request: the verdict and its details, typed, and as flat JSON."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+from rover_physics.numerics.plain_values import to_plain
+
+
+@dataclass(frozen=True)
+class FailureReport:
+    """Where a path fails first."""
+
+    failure_pose: tuple[float, ...]
+    """x, y [m] and yaw [rad] of the first waypoint that is not passable, map frame."""
+    failure_distance: float
+    """Distance along the path from its start to there [m]."""
+
+
+@dataclass(frozen=True)
+class PathReport:
+    """Size of a judged path, and the extremes predicted on the part of it that settled."""
+
+    policy: str
+    """Torque policy that was assumed."""
+    min_tip_over_ratio: float
+    """Smallest tip-over ratio, NaN if no waypoint settled."""
+    max_friction_utilisation: float
+    """Largest friction utilisation."""
+    max_torque_saturation: float
+    """Largest torque saturation."""
+    max_tilt: float
+    """Largest tilt of the body [rad]."""
+    min_belly_clearance: float
+    """Smallest belly clearance [m]."""
+    max_wheel_drop: float
+    """Largest drop of a wheel that rolled off an edge [m]."""
+    max_sinkage: float
+    """Largest sinkage of a wheel into soil [m]."""
+    map_sigmas: float
+    """Standard deviations of the map that were allowed for; 0 where it has no elevation_std."""
+    tip_over_ratio_bound: float
+    """Smallest possible tip-over ratio within these; NaN where the map is exact."""
+    friction_utilisation_bound: float
+    """Largest possible friction utilisation."""
+    torque_saturation_bound: float
+    """Largest possible torque saturation."""
+    tilt_bound: float
+    """Largest possible tilt [rad]."""
+    belly_clearance_bound: float
+    """Smallest possible belly clearance [m]."""
+    waypoints: int
+    """Number of waypoints."""
+    length: float
+    """Length of the path [m]."""
+    time: float
+    """Driving time [s], NaN where the last waypoint did not settle."""
+    energy: float
+    """Energy of the wheel motors [J], NaN where the last waypoint did not settle."""
+
+
+@dataclass(frozen=True)
+class ClassReport:
+    """Traversability class of a path, and the waypoint that decides it."""
+
+    traversability_class: str
+    """One of `TRAVERSABILITY_CLASSES`: that of the worst waypoint, whatever `policy` is."""
+    class_waypoint: int
+    """Index of the waypoint that decides the class."""
+    class_constraint: str
+    """Code of the limit that is broken there, else of the tightest one."""
+    class_wheel: str
+    """Name of its wheel, empty where it is about no single wheel."""
+    class_margin: float
+    """Share of that limit that is left, negative where broken; NaN where there is no amount."""
+    class_reason: str
+    """Why the waypoint is not passable with equal torques, or at all; empty where passable."""
+
+
+@dataclass(frozen=True)
+class SuspensionReport:
+    """Comparison of the measured suspension angles with those predicted at the path's start."""
+
+    suspension_mismatch: Mapping[str, float]
+    """Measured minus predicted angle [rad] by joint, for the joints that were measured."""
+    suspension_agrees: bool
+    """Whether all of them are within the tolerance."""
+
+
+@dataclass(frozen=True)
+class SearchReport:
+    """What was tried to find a path to the goal."""
+
+    goal: tuple[float, ...]
+    """x, y [m] and yaw [rad] of the goal of the judged path, map frame."""
+    goal_offset: float
+    """Distance of that goal from the one asked for [m]."""
+    alternative_goals_tried: int
+    """Number of other goals that were tried."""
+    candidates: int
+    """Number of candidate paths to that goal."""
+    traversable_candidates: int
+    """Number of them that are traversable."""
+    chosen_candidate: int
+    """Number of the judged candidate, from 1: the best, or the one that gets furthest."""
+    explanation: str
+    """One sentence on the choice."""
+
+
+@dataclass(frozen=True)
+class WaypointLists:
+    """Verdict and class of each waypoint; in the JSON only, as they are long."""
+
+    codes: tuple[str, ...]
+    """Code of the limit that is broken, empty where passable under `policy`."""
+    reasons: tuple[str, ...]
+    """The reason in words, empty where passable."""
+    traversability_classes: tuple[str, ...]
+    """Traversability class."""
+    class_constraints: tuple[str, ...]
+    """As `class_constraint`."""
+    class_wheels: tuple[str, ...]
+    """As `class_wheel`."""
+    class_margins: tuple[float, ...]
+    """As `class_margin`."""
+
+
+@dataclass(frozen=True)
+class VerdictReport:
+    """The answer to a request with all its details; a part that does not apply is None.
+
+    Order and names of the fields, those of the parts included, are order and names of the keys in
+    JSON, where no part has a level of its own.
+    """
+
+    traversable: bool
+    """Whether the rover may drive the path."""
+    code: str
+    """Why not, as one of the codes of a verdict or of a refusal; empty if traversable."""
+    reason: str
+    """Why not, in words; empty if traversable."""
+    first_failure: int = -1
+    """Index of the first waypoint that is not passable, -1 if none."""
+    failure: FailureReport | None = None
+    """Where the path fails."""
+    path: PathReport | None = None
+    """The judged path; this and all below are None where no path was judged."""
+    classes: ClassReport | None = None
+    """Traversability class of the path."""
+    suspension: SuspensionReport | None = None
+    """Comparison with the measured suspension, where joints were measured."""
+    search: SearchReport | None = None
+    """The search for the path, where one was asked for."""
+    waypoint_lists: WaypointLists | None = None
+    """Values per waypoint."""
+
+    @property
+    def has_warning(self) -> bool:
+        """Whether the measured suspension disagrees with the prediction."""
+        return self.suspension is not None and not self.suspension.suspension_agrees
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all entries as JSON can hold them: one level, None for NaN and infinity."""
+        return to_plain(dict(_entries(self)))
+
+    def summary(self) -> dict[str, Any]:
+        """Return the entries of `to_dict` but for those with a value per waypoint."""
+        return replace(self, waypoint_lists=None).to_dict()
+
+
+def _entries(part: Any) -> Iterator[tuple[str, Any]]:
+    """Yield names and values of the fields of a part, those of its own parts in their place."""
+    for field in fields(part):
+        value = getattr(part, field.name)
+        if is_dataclass(value):
+            yield from _entries(value)
+        elif value is not None:
+            yield field.name, value
