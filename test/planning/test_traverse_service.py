@@ -83,8 +83,9 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     terrain = make_terrain(waves)
-    terrain.elevation[80, 80] = np.nan
-    service = make_service(terrain)
+    elevation = terrain.elevation.copy()
+    elevation[80, 80] = np.nan
+    service = make_service(replace(terrain, elevation=elevation))
     assert np.isnan(service.terrain.elevation[80, 80])
     service.settings = load(unknown_cells="interpolate")
     assert np.isfinite(service.terrain.elevation[80, 80])
