@@ -9,13 +9,13 @@ from typing import Annotated, Any
 
 import typer
 
-from rover_planner.command.run_app import run_app
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission_options import read_mission
 from rover_planner.parameters.of_rover_simulator import ROVER_SIMULATOR
 from rover_planner.parameters.of_traction_controller import TRACTION_CONTROLLER
 from rover_planner.parameters.of_traverse_server import TRAVERSE_SERVER
 from rover_planner.parameters.spec import ParameterSpec
+from rover_planner.shell.run_app import run_app
 
 HELP_WORDS = ("-h", "--help")
 _EXIT_CODES = "Exit code 0 when it was told to stop; 2 for a wrong parameter or missing library."
