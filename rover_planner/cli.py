@@ -7,15 +7,15 @@ import typer
 
 from rover_physics.errors import RoverError
 from rover_planner.command.demo import demo
-from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED
 from rover_planner.command.figure4 import figure4
 from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
-from rover_planner.command.run_app import run_app
 from rover_planner.command.study import study
 from rover_planner.command.terrain import terrain
 from rover_planner.command.view import view
 from rover_planner.errors import DemoError, PlanningError
+from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED
+from rover_planner.shell.run_app import run_app
 
 app = typer.Typer(
     help="Can a rocker-bogie rover traverse this path?",

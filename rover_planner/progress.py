@@ -6,7 +6,14 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 
 @contextmanager
@@ -17,12 +24,30 @@ def show_progress() -> Iterator[Callable[[str], None]]:
         A function that is told the next step.
     """
     console = Console(stderr=True)
+    if not console.is_terminal:  # even a disabled bar of rich 13.7 prints an empty line
+        yield lambda step: None
+        return
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("start")
         yield lambda step: progress.update(task, description=step)
+
+
+@contextmanager
+def show_bar(name: str, total: int) -> Iterator[Callable[[], None]]:
+    """Show a bar with the work that is done and left; nothing where stderr is not a terminal.
+
+    Yields:
+        A function to call once for each piece of work that is done.
+    """
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda: None
+        return
+    columns = (*Progress.get_default_columns(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(name, total=total)
+        yield lambda: progress.advance(task)
 
 
 class Steps:

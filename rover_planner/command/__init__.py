@@ -1,1 +1,1 @@
-"""The command line: one file a subcommand, and what they share."""
+"""The command line: one file a subcommand, and the options they share."""

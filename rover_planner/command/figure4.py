@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.extras import need
 from rover_planner.command.options import RoverOption
+from rover_planner.shell.extras import need
 
 
 def figure4(

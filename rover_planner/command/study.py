@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.extras import need
 from rover_planner.errors import PlanningError
+from rover_planner.shell.extras import need
 
 if TYPE_CHECKING:
     from rover_planner.studies.runner import StudyResult, Trial
@@ -22,22 +22,15 @@ def study(
     Exit code 0 when it ran; 2 for bad input.
     """
     need("matplotlib", "the picture of a study")
-    from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
-
+    from rover_planner.progress import show_bar
     from rover_planner.studies.runner import count_trials, run_study
     from rover_planner.studies.study_file import load_study
     from rover_planner.studies.study_plot import draw_study
 
     task = load_study(file)
     _print_question(task, count_trials(task))
-    console = Console(stderr=True)
-    with Progress(
-        *Progress.get_default_columns(), MofNCompleteColumn(), TimeRemainingColumn(),
-        console=console, disable=not console.is_terminal,
-    ) as progress:  # fmt: skip
-        bar = progress.add_task(file.stem, total=count_trials(task))
-        result = run_study(task, lambda trial: progress.advance(bar))
+    with show_bar(file.stem, count_trials(task)) as advance:
+        result = run_study(task, lambda trial: advance())
     try:
         output.mkdir(parents=True, exist_ok=True)
         result.write_csv(output / f"{file.stem}.csv")

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.extras import need
 from rover_planner.command.options import MaxGap, RoverName, Vector
 from rover_planner.errors import PlanningError
+from rover_planner.shell.extras import need
 
 if TYPE_CHECKING:
     from rover_physics.rover.model import Rover

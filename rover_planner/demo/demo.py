@@ -22,12 +22,12 @@ from rich.markup import escape
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
-from rover_planner.command.exit_codes import EXIT_NOT_TRAVERSABLE, EXIT_OK
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.demo.mission_report import answer_table
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.planning.goals import Mission, choose_mission
 from rover_planner.progress import Steps
+from rover_planner.shell.exit_codes import EXIT_NOT_TRAVERSABLE, EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 TERRAIN_SIZE = 24.0

@@ -27,7 +27,11 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
 from msg_adapters.predictions import array_values
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.command.exit_codes import (
+from rover_planner.nodes.mission_options import MissionOptions
+from rover_planner.nodes.programs import read_words
+from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.shell.exit_codes import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
     EXIT_INTERRUPTED,
@@ -35,10 +39,6 @@ from rover_planner.command.exit_codes import (
     EXIT_NOT_TRAVERSABLE,
     EXIT_OK,
 )
-from rover_planner.nodes.mission_options import MissionOptions
-from rover_planner.nodes.programs import read_words
-from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
 
 NODE_NAME = "mission_planner"
 SERVER = "/traverse_server"

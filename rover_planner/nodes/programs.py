@@ -9,13 +9,13 @@ from typing import Annotated, Any
 
 import typer
 
-from rover_planner.command.run_app import run_app
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission_options import read_mission
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.table import ParameterSpec, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.shell.run_app import run_app
 
 HELP_WORDS = ("-h", "--help")
 _EXIT_CODES = "Exit code 0 when it was told to stop; 2 for a wrong parameter or missing library."

@@ -26,13 +26,13 @@ from msg_adapters.errors import MessageError
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
-from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.nodes.programs import read_words
 from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 from rover_planner.worlds.summary import describe_terrain

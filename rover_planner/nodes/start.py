@@ -3,10 +3,10 @@
 import importlib
 import sys
 
-from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
-from rover_planner.command.extras import need
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.programs import HELP_WORDS, print_help
+from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.shell.extras import need
 
 
 def start_traverse_server() -> int:

@@ -38,7 +38,6 @@ from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.traction_status import traction_diagnostics
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
-from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.nodes.programs import read_words
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -47,6 +46,7 @@ from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
 from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.traction_service import (

@@ -30,7 +30,6 @@ from msg_adapters.paths import (
 from msg_adapters.verdicts import report_to_json
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.warm_up import warm_up
-from rover_planner.command.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
@@ -43,6 +42,7 @@ from rover_planner.planning.traverse_service import TraverseService
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS, answer_or_refuse
+from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "traverse_server"

@@ -1,0 +1,1 @@
+"""What the programs share towards the shell: exit codes, words, missing libraries."""
