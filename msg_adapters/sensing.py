@@ -5,12 +5,11 @@ from collections.abc import Mapping
 
 import numpy as np
 from nav_msgs.msg import Odometry
-from numpy.typing import NDArray
 from sensor_msgs.msg import Imu, JointState
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw
 
-Floats = NDArray[np.float64]
 BASE_FRAME = "base_link"
 
 

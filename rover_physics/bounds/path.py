@@ -13,9 +13,10 @@ import numpy as np
 from rover_physics.bounds.forces import MAX_SOILS
 from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
 from rover_physics.errors import ModelError
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_bounds import PathBounds
-from rover_physics.prediction.path_prediction import Floats, PathPrediction
+from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import check_poses, sweep_lock
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover

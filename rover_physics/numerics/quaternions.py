@@ -9,9 +9,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from rover_physics.numerics.arrays import Floats
+
 Quaternion = Sequence[float] | Floats
 """Four numbers in the order that the function's name says."""
 

@@ -12,6 +12,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
+from rover_physics.numerics.arrays import SingleFloats
 from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.numerics.threads import limit_threads
@@ -27,8 +28,6 @@ BATCH = 32_768
 """About how many poses of a map are scored at a time."""
 NUMBERS = 6
 """Numbers that a score has beside the status."""
-
-SingleFloats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)

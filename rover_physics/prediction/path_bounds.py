@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.status import BoundStatus
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

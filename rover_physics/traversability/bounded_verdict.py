@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.path_bounds import PathBounds
-from rover_physics.prediction.path_prediction import Floats, PathPrediction
+from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus
 from rover_physics.traversability.verdict import Verdict, find_reasons

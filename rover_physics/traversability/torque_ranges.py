@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.path_prediction import Floats
 from rover_physics.prediction.sweep import check_poses, sweep_lock
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
 from rover_physics.names import SIDES, WHEEL_COUNT, WHEELS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.layout import LATERAL_SHARE, LATERAL_SLOPE, LOADS, TRACTIONS
 
-Floats = NDArray[np.float64]
 ROUNDS = 6
 """Rounds in which loads and tractions are found from each other: friction links them."""
 MIN_CAPACITY = 1e-9

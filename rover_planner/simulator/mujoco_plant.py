@@ -1,15 +1,14 @@
 """A rover in MuJoCo as a plant: rigid bodies with inertia, wheels that slip."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.plant import PlantState
 
-Floats = NDArray[np.float64]
 MAX_TILT = 1.2
 """Tilt from which a rover counts as tipped over [rad]."""
 

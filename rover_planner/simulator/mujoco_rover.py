@@ -10,15 +10,14 @@ from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.names import SIDES, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_wxyz
 from rover_physics.rover.model import Part, Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 
-Floats = NDArray[np.float64]
 TIMESTEP = 0.004
 """Time step of the simulation [s]."""
 DROP_HEIGHT = 0.02

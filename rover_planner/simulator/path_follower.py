@@ -1,9 +1,9 @@
 """Follows a path: the speed and the yaw rate that bring the rover along it (pure pursuit)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rover_physics.numerics.arrays import Floats
+
 ARRIVED = 0.25
 """Distance from the end, in look-aheads, at which the path is done."""
 

@@ -9,10 +9,10 @@ is the only thing that has inertia here. Limits of attitude, suspension, clearan
 from dataclasses import fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.forces.soil import coulomb_slip
 from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
@@ -25,7 +25,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.simulator.driving_forces import DrivingForces, find_driving_forces
 from rover_planner.simulator.plant import PlantState
 
-Floats = NDArray[np.float64]
 DRAG = 0.5
 """Share of its speed that a rover without torque loses each second beyond rolling: gears [1/s]."""
 MAX_SLIP = 0.95

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 
-Floats = NDArray[np.float64]
 RAYS = 1440
 
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.names import EQUAL
+from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
@@ -17,7 +17,6 @@ from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-Floats = NDArray[np.float64]
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
 """Side and cell size of the terrain that is made where none is given [m]."""
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -15,7 +15,6 @@ from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.verdict import judge
 from rover_planner.studies.study_file import Study, StudyDrive
 
-Floats = NDArray[np.float64]
 SPACING = 0.02
 """Distance between waypoints [m]."""
 NO_LIMIT = 1e9

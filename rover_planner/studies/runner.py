@@ -8,16 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.names import WHEELS
+from rover_physics.numerics.arrays import Floats
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import evaluate, load_shares
 from rover_planner.studies.rover_keys import vary
 from rover_planner.studies.study_file import OBJECTIVES, Study
 
-Floats = NDArray[np.float64]
 SEED = 1
 ALL_OVER = 0.6
 """Share of an optimisation's evaluations that looks all over the bounds; the rest looks nearby."""

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 
-Floats = NDArray[np.float64]
 MAX_RATE_RATIO = 1.3
 """Largest median rate of the wheels, over the wanted one, that counts as rolling without slip."""
 MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.2, 2.0

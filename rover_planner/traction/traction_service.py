@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
 from rover_physics.names import OPTIMAL, SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -40,7 +40,6 @@ from rover_planner.traction.loops import (
 )
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 
-Floats = NDArray[np.float64]
 INPUTS = ("joint_states", "imu", "cmd_vel")
 ODOMETRY = "odometry"
 MAX_PUSH = 0.6

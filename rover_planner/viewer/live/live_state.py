@@ -4,16 +4,14 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.state.trajectory import RoverState
-
-Floats = NDArray[np.float64]
 
 
 def _unknown() -> Floats:

@@ -1,12 +1,11 @@
 """The values of a live rover since it is followed, for the plots."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.panel.plots import PLOTS
 from rover_planner.viewer.state.trajectory import RoverState
 
-Floats = NDArray[np.float64]
 SPACING = 0.01
 """Distance between two entries [m]."""
 MAX_ENTRIES = 20_000

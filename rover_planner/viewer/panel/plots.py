@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.names import WHEELS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.state.colours import REFUSED, SIDE_DASHES, WHEEL_COLOURS, to_css
 
-Floats = NDArray[np.float64]
 MAX_POINTS = 160
 """Most points of a curve that are sent to the page."""
 HEIGHT = 146

@@ -10,6 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -22,7 +23,6 @@ from rover_planner.viewer.state.layers import (
     predict_layer,
 )
 
-Floats = NDArray[np.float64]
 MAX_CELLS = 250
 """Most cells along a side of the mesh; of more, every second, third, ... is drawn."""
 MAX_PREDICTED = 100

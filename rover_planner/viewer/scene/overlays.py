@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import wxyz_from_rpy
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -14,7 +15,6 @@ from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.rover_visual import make_ghost
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
 
-Floats = NDArray[np.float64]
 MAX_GHOSTS = 4
 """Most ghosts at a time; more of them hide the ground."""
 MAX_POINTS = 250

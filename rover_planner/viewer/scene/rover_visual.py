@@ -6,16 +6,15 @@ from typing import Any, cast
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
 from rover_planner.viewer.state.colours import BODY, DARK, METAL, colour_utilisation
 from rover_planner.viewer.state.trajectory import RoverState
 
-Floats = NDArray[np.float64]
 GROUSERS = 16
 """Grousers of a wheel as it is drawn."""
 

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.map_sweep import PoseScores, score_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 
-Floats = NDArray[np.float64]
 STEEP = 35.0
 """Slope of the last colour [deg]."""
 

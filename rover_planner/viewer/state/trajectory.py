@@ -4,13 +4,12 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
 
-Floats = NDArray[np.float64]
 MAX_SLIP = 0.95
 """Slip ratio at which the shown rate of a wheel is limited."""
 MAX_VALUE = 1e6

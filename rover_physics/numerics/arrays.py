@@ -1,0 +1,9 @@
+"""Types of arrays, as annotations name them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+"""Array of double precision numbers."""
+SingleFloats = NDArray[np.float32]
+"""Array of single precision numbers, where there are many and three digits do."""
