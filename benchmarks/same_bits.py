@@ -35,7 +35,7 @@ PLACES = {
     "SweepOptions": ("rover_physics.prediction.sweep_options",),
     "BalanceWriter": ("rover_physics.traction.balance", "rover_physics.traction_rows"),
     "MeasuredState": ("rover_physics.traction.balance", "rover_physics.traction_rows"),
-    "WheelLimits": ("rover_physics.traction.wheel_limits",),
+    "ProgramInputs": ("rover_physics.traction.program_inputs",),
     "TractionWorkspace": ("rover_physics.traction.solver", "rover_physics.traction_solver"),
     "solve_traction": ("rover_physics.traction.solver", "rover_physics.traction_solver"),
 }
@@ -192,10 +192,10 @@ def note_programs(found: dict[str, np.ndarray], name: str, rover: Any) -> None:
             *rng.uniform(-0.2, 0.2, 3), rng.uniform(-0.3, 0.3, 2), rng.uniform(-0.4, 0.4, 6)
         )
         rows = writer.write(state, float(rng.uniform(-0.1, 0.2) * writer.weight))
-        limits = rng.uniform(0.4, 1.0, 6), rover.wheel.max_torque, rover.wheel.radius
-        kind = find("WheelLimits")
-        limits = limits if kind is None else (kind(*limits),)
-        answer = find("solve_traction")(workspace, rows, *limits)
+        inputs = rng.uniform(0.4, 1.0, 6), rover.wheel.max_torque, rover.wheel.radius
+        kind = find("ProgramInputs")
+        inputs = inputs if kind is None else (kind(*inputs),)
+        answer = find("solve_traction")(workspace, rows, *inputs)
         numbers.append(
             [*rows.A.ravel(), *rows.b, *answer.torques, *answer.loads, *answer.utilisation,
              answer.friction_slack, answer.load_slack, answer.torque_slack, answer.iterations]

@@ -29,8 +29,7 @@ Journal of Optimization Theory and Applications 47, 1985; Rockafellar, "Monotone
 proximal point algorithm", SIAM Journal on Control and Optimization 14, 1976.
 """
 
-from dataclasses import astuple, dataclass
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,7 +59,7 @@ from rover_physics.traction.layout import (
     TRACTION,
     VARIABLES,
 )
-from rover_physics.traction.wheel_limits import WheelLimits, max_pull_of
+from rover_physics.traction.program_inputs import ProgramInputs, max_pull_of
 
 MIN_LOAD = 0.05
 """Smallest load that a cone is expanded about, in sixths of the weight."""
@@ -71,38 +70,6 @@ REGULARISATION = 1e-2
 SLACK_CURVATURE = 0.1
 """Curvature of a slack, as a share of its price."""
 
-WEIGHTS = record_type(("peak", float), ("effort", float), ("change", float), ("slack", float))
-"""`TractionWeights` as the kernels read them."""
-
-
-@dataclass(frozen=True)
-class TractionWeights:
-    """Weights of the objective, for scaled variables: tractions and peak are of order one.
-
-    1/2 peak u^2 + 1/2 effort |T|^2 + 1/2 change |(T, s0, s1) - last|^2 + slack * (slacks).
-    """
-
-    peak: float = 10.0
-    """Weight of the squared peak utilisation. It comes first: 1,000 times the effort."""
-    effort: float = 0.01
-    """Weight of the squared tractions: it decides where several sets have the smallest peak."""
-    change: float = 3.0
-    """Weight of the squared change since the last answer; smaller ones take OSQP longer."""
-    slack: float = 100.0
-    """Price of a slack: more than a peak can be worth, so that no limit gives way to another."""
-
-    @cached_property
-    def packed(self) -> np.ndarray:
-        """Array (1,) of WEIGHTS, made once."""
-        return np.array([astuple(self)], WEIGHTS)
-
-
-DEFAULT_WEIGHTS = TractionWeights()
-"""Weights where none are given."""
-
-REFERENCE = record_type(("x", float, (FORCES,)), ("peak", float))
-"""`Reference` as the kernels read it."""
-
 
 @dataclass(frozen=True, eq=False)
 class Reference:
@@ -112,13 +79,6 @@ class Reference:
     """(14,) tractions, loads and lateral terms in force units."""
     peak: float
     """Its peak friction utilisation, or the one to expand about."""
-
-    @property
-    def packed(self) -> np.ndarray:
-        """Array (1,) of REFERENCE."""
-        packed = np.empty(1, REFERENCE)
-        packed["x"], packed["peak"] = self.x, self.peak
-        return packed
 
 
 QP = record_type(
@@ -139,85 +99,67 @@ class TractionQP:
     """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; `layout` names y and the rows."""
 
     packed: np.ndarray
-    """Array (1,) of QP."""
+    """Array (1,) of QP, which holds all that follows."""
+    P: np.ndarray
+    """(18,) diagonal of the cost's matrix."""
+    q: np.ndarray
+    """(18,) linear cost."""
+    A: np.ndarray
+    """(ROWS, 18) rows."""
+    lower: np.ndarray
+    """(ROWS,) lower bounds."""
+    upper: np.ndarray
+    """(ROWS,) upper bounds."""
+    scale: np.ndarray
+    """(18,) x = scale * y + shift in force units, and in units of one for the peak."""
+    shift: np.ndarray
+    """(18,) see scale."""
+    start: np.ndarray
+    """(18,) y of the reference."""
 
-    @property
-    def P(self) -> np.ndarray:  # noqa: N802
-        """Diagonal (18,) of the cost's matrix."""
-        return self.packed["P"][0]
 
-    @property
-    def q(self) -> np.ndarray:
-        """Linear cost (18,)."""
-        return self.packed["q"][0]
-
-    @property
-    def A(self) -> np.ndarray:  # noqa: N802
-        """Rows (ROWS, 18)."""
-        return self.packed["A"][0]
-
-    @property
-    def lower(self) -> np.ndarray:
-        """Lower bounds (ROWS,)."""
-        return self.packed["lower"][0]
-
-    @property
-    def upper(self) -> np.ndarray:
-        """Upper bounds (ROWS,)."""
-        return self.packed["upper"][0]
-
-    @property
-    def scale(self) -> np.ndarray:
-        """Scale (18,): x = scale * y + shift in force units, and in units of one for the peak."""
-        return self.packed["scale"][0]
-
-    @property
-    def shift(self) -> np.ndarray:
-        """Shift (18,), see `scale`."""
-        return self.packed["shift"][0]
-
-    @property
-    def start(self) -> np.ndarray:
-        """Variables y (18,) of the reference."""
-        return self.packed["start"][0]
+def new_traction_qp() -> TractionQP:
+    """Return a program of zeros, to be written again and again by `build_traction_qp`."""
+    packed = np.zeros(1, QP)
+    return TractionQP(packed, *(packed[name][0] for name in QP.names or ()))
 
 
 def build_traction_qp(
-    rows: BalanceRows,
-    limits: WheelLimits,
-    reference: Reference,
-    weights: TractionWeights = DEFAULT_WEIGHTS,
+    rows: BalanceRows, inputs: ProgramInputs, reference: Reference, qp: TractionQP | None = None
 ) -> TractionQP:
     """Write the program for one state of the rover.
 
     Args:
         rows: Balance at that state, with the wanted net traction.
-        limits: Friction and torque of the wheels.
+        inputs: Friction and torque of the wheels, weights of the objective.
         reference: The last answer; at first that of equal torques.
-        weights: Weights of the objective.
+        qp: A program to write over, a new one by default.
     """
-    packed = np.zeros(1, QP)
-    _write_program(rows.packed, limits.packed, weights.packed, reference.packed, packed)
-    return TractionQP(packed)
+    qp = new_traction_qp() if qp is None else qp
+    _write_program(rows.packed, inputs.packed, reference.x, reference.peak, qp.packed)
+    return qp
 
 
 @kernel
-def _write_program(balances, all_limits, all_weights, references, programs):
-    """Write a record QP of zeros from MEASURED_BALANCE, WHEEL_LIMITS, WEIGHTS and REFERENCE."""
-    balance, limits, last, qp = balances[0], all_limits[0], references[0].x, programs[0]
-    peak = min(max(references[0].peak, MIN_PEAK), MAX_PEAK)
+def _write_program(balances, all_inputs, last, last_peak, programs):
+    """Write a record QP about the last forces (14,) and their peak utilisation.
+
+    The same entries are written for every state, so that a program can be written over.
+    """
+    balance, inputs, qp = balances[0], all_inputs[0], programs[0]
+    peak = min(max(last_peak, MIN_PEAK), MAX_PEAK)
     friction = 0.0
     for wheel in range(WHEEL_COUNT):
-        friction += limits.friction[wheel]
+        friction += inputs.friction[wheel]
     unit = peak * friction / WHEEL_COUNT
     _write_units(last, peak, unit, qp)
-    _write_costs(all_weights[0], qp)
+    _write_costs(inputs.weights, qp)
     for row in range(ROWS):
         qp.lower[row], qp.upper[row] = -np.inf, np.inf
     _write_balance_rows(balance, unit, qp)
     for wheel in range(WHEEL_COUNT):
-        _write_cone(balance.along[wheel], limits.friction[wheel], last, wheel, qp)
-    _write_limit_rows(max_pull_of(limits, balance.force_unit), qp)
+        _write_cone(balance.along[wheel], inputs.friction[wheel], last, wheel, qp)
+    _write_limit_rows(max_pull_of(inputs, balance.force_unit), qp)
 
 
 @kernel

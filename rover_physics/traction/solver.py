@@ -14,14 +14,13 @@ from rover_physics.traction.fallback import fall_back_to_equal_torques
 from rover_physics.traction.layout import FORCES, ROWS, TRACTION, TRACTIONS, VARIABLES
 from rover_physics.traction.line_search import find_best_between, measure_peak
 from rover_physics.traction.program import (
-    DEFAULT_WEIGHTS,
     Reference,
     TractionQP,
-    TractionWeights,
     build_traction_qp,
+    new_traction_qp,
 )
+from rover_physics.traction.program_inputs import ProgramInputs
 from rover_physics.traction.wheel_forces import WHEEL_FORCES, write_wheel_forces
-from rover_physics.traction.wheel_limits import WheelLimits
 
 OSQP_SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
@@ -82,6 +81,8 @@ class TractionWorkspace:
 
     def __init__(self, max_iterations: int = MAX_ITERATIONS):
         """Set up the problem; OSQP gives up after `max_iterations`."""
+        self.qp = new_traction_qp()
+        """The program that is written anew each time."""
         self._cells, pattern = _find_pattern()
         self._solver = osqp.OSQP()
         unbounded = np.full(ROWS, np.inf)
@@ -107,9 +108,9 @@ class TractionWorkspace:
 def _find_pattern() -> tuple[np.ndarray, sparse.csc_matrix]:
     """Return where the entries of a sparse A are in a full one, and a sparse A."""
     ones = new_record(MEASURED_BALANCE, A=1.0, b=1.0, along=1.0, force_unit=1.0)
-    limits = WheelLimits(np.ones(WHEEL_COUNT), 1.0, 1.0)
+    inputs = ProgramInputs(np.ones(WHEEL_COUNT), 1.0, 1.0)
     reference = Reference(np.full(FORCES, 0.5), 0.5)
-    A = build_traction_qp(BalanceRows(array_of(ones)), limits, reference).A
+    A = build_traction_qp(BalanceRows(array_of(ones)), inputs, reference).A
     columns, rows = np.nonzero(A.T)
     return rows * VARIABLES + columns, sparse.csc_matrix(A != 0.0).astype(float)
 
@@ -117,33 +118,31 @@ def _find_pattern() -> tuple[np.ndarray, sparse.csc_matrix]:
 def solve_traction(
     workspace: TractionWorkspace,
     rows: BalanceRows,
-    limits: WheelLimits,
+    inputs: ProgramInputs,
     last: np.ndarray | None = None,
     max_programs: int = MAX_PROGRAMS,
-    weights: TractionWeights = DEFAULT_WEIGHTS,
 ) -> TractionAnswer:
     """Find the torques with the smallest peak friction utilisation.
 
     Args:
         workspace: OSQP's problem, kept from one call to the next.
         rows: Balance with the wanted net traction.
-        limits: Friction and torque of the wheels.
+        inputs: Friction and torque of the wheels, weights of the objective.
         last: (6,) tractions of the last answer [N], near which the search starts; None starts
             from equal torques.
         max_programs: Largest number of programs, fewer where they converge before; 0 asks for
             equal torques.
-        weights: Weights of the objective.
 
     Returns:
         The answer; equal torques, marked as fallback, where OSQP does not solve the first.
     """
     if max_programs == 0:
-        return _describe_answer(rows, limits, Run(rows.pull_equally(), 0, 0, ""))
-    run = _run_programs(workspace, rows, limits, last, max_programs, weights)
+        return _describe_answer(rows, inputs, Run(rows.pull_equally(), 0, 0, ""))
+    run = _run_programs(workspace, rows, inputs, last, max_programs)
     if run.programs > 0:
-        return _describe_answer(rows, limits, run)
+        return _describe_answer(rows, inputs, run)
     equal = run._replace(x=fall_back_to_equal_torques(rows))
-    return _describe_answer(rows, limits, equal, fallback=True)
+    return _describe_answer(rows, inputs, equal, fallback=True)
 
 
 class Run(NamedTuple):
@@ -162,17 +161,16 @@ class Run(NamedTuple):
 def _run_programs(
     workspace: TractionWorkspace,
     rows: BalanceRows,
-    limits: WheelLimits,
+    inputs: ProgramInputs,
     last: np.ndarray | None,
     max_programs: int,
-    weights: TractionWeights,
 ) -> Run:
     """Solve one program about the answer of another until they converge, or OSQP fails."""
     x = rows.pull_equally() if last is None else rows.complete(last / rows.force_unit)
-    forces = Reference(x, measure_peak(rows, limits, x))
+    forces = Reference(x, measure_peak(rows, inputs, x))
     status, iterations, programs = "", 0, 0
     while programs < max_programs:
-        qp = build_traction_qp(rows, limits, forces, weights)
+        qp = build_traction_qp(rows, inputs, forces, workspace.qp)
         y, count, status, solved = workspace.solve(qp)
         iterations += count
         if not solved:
@@ -180,27 +178,28 @@ def _run_programs(
         programs += 1
         unit = float(qp.scale[TRACTION])
         aim = rows.complete(unit * y[TRACTIONS])
-        forces, moved = find_best_between(rows, limits, weights, forces, aim)
+        forces, moved = find_best_between(rows, inputs, forces, aim)
         if moved <= CONVERGED_SHARE * unit:
             break
     return Run(forces.x, iterations, programs, status)
 
 
 def _describe_answer(
-    rows: BalanceRows, limits: WheelLimits, run: Run, fallback: bool = False
+    rows: BalanceRows, inputs: ProgramInputs, run: Run, fallback: bool = False
 ) -> TractionAnswer:
     """Return the answer of a run in SI units."""
-    found = np.empty(1, WHEEL_FORCES)
-    peak, min_load, max_traction = write_wheel_forces(rows.packed, limits.packed, run.x, found)
+    table = np.empty((len(WHEEL_FORCES), WHEEL_COUNT))
+    torques, loads, tractions, lateral, utilisation = table
+    peak, min_load, max_traction = write_wheel_forces(rows.packed, inputs.packed, run.x, table)
     return TractionAnswer(
-        torques=found["torques"][0],
-        loads=found["loads"][0],
-        tractions=found["tractions"][0],
-        lateral=found["lateral"][0],
-        utilisation=found["utilisation"][0],
+        torques=torques,
+        loads=loads,
+        tractions=tractions,
+        lateral=lateral,
+        utilisation=utilisation,
         friction_slack=max(peak - 1.0, 0.0),
         load_slack=max(-min_load, 0.0),
-        torque_slack=max(limits.radius * max_traction - limits.max_torque, 0.0),
+        torque_slack=max(inputs.radius * max_traction - inputs.max_torque, 0.0),
         iterations=run.iterations,
         programs=run.programs,
         fallback=fallback,

@@ -21,13 +21,13 @@ from rover_physics.traction.contact_ekf import (
     level_estimate,
 )
 from rover_physics.traction.map_contacts import MapContactFinder
+from rover_physics.traction.program_inputs import ProgramInputs
 from rover_physics.traction.solver import (
     MAX_PROGRAMS,
     TractionAnswer,
     TractionWorkspace,
     solve_traction,
 )
-from rover_physics.traction.wheel_limits import WheelLimits
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.traction.input_monitor import InputMonitor
@@ -158,7 +158,7 @@ class TractionService:
         self._estimator = MotionContactEstimator(rover)
         self._optimal = settings.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
-        self._limits = WheelLimits(friction, settings.max_torque, rover.wheel.radius)
+        self._inputs = ProgramInputs(friction, settings.max_torque, rover.wheel.radius)
         self._create_loops()
         if self._terrain is not None:
             self.take_terrain(self._terrain)
@@ -319,7 +319,7 @@ class TractionService:
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
         """Return the torques by the policy, and note whether a limit holds them back."""
         answer = solve_traction(
-            self._workspace, rows, self._limits, self._last,
+            self._workspace, rows, self._inputs, self._last,
             max_programs=MAX_PROGRAMS if self._optimal else 0,
         )  # fmt: skip
         self._last = answer.tractions

@@ -10,10 +10,10 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction import layout
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.program import Reference, build_traction_qp
-from rover_physics.traction.wheel_limits import WheelLimits
+from rover_physics.traction.program_inputs import ProgramInputs
 
 LSR1 = load_rover("lsr1")
-LIMITS = WheelLimits(np.full(6, 0.7), LSR1.wheel.max_torque, LSR1.wheel.radius)
+INPUTS = ProgramInputs(np.full(6, 0.7), LSR1.wheel.max_torque, LSR1.wheel.radius)
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def program():
     state = MeasuredState(0.1, -0.2, 0.05, np.array([0.1, -0.1]), np.linspace(-0.3, 0.3, 6))
     rows = BalanceWriter(LSR1).write(state, 4.0)
     x = rows.complete(np.linspace(-0.1, 0.1, 6))
-    return build_traction_qp(rows, LIMITS, Reference(x, 0.4))
+    return build_traction_qp(rows, INPUTS, Reference(x, 0.4))
 
 
 def variables_of(program, row):

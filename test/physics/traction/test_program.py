@@ -24,9 +24,9 @@ from rover_physics.traction.layout import (
     VARIABLES,
 )
 from rover_physics.traction.line_search import find_best_between, measure_peak
-from rover_physics.traction.program import Reference, TractionWeights, build_traction_qp
+from rover_physics.traction.program import Reference, build_traction_qp, new_traction_qp
+from rover_physics.traction.program_inputs import ProgramInputs, TractionWeights
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
-from rover_physics.traction.wheel_limits import WheelLimits
 from support.best_torques import can_stand
 from support.rough_grounds import plane
 from support.rover_geometry import balance_matrix
@@ -34,7 +34,7 @@ from support.traction_states import rough_states, state_of
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FRICTION = np.full(6, 0.8)
-LIMITS = WheelLimits(FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius)
+INPUTS = ProgramInputs(FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius)
 CONES = slice(CONE_ROWS, PEAK_LIMIT_ROW)
 
 
@@ -44,9 +44,9 @@ def level(angles=(0.0,) * 6):
 
 def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **more):
     rows = BalanceWriter(rover).write(state, net)
-    limits = WheelLimits(friction, torque or rover.wheel.max_torque, rover.wheel.radius)
+    inputs = ProgramInputs(friction, torque or rover.wheel.max_torque, rover.wheel.radius)
     workspace = more.pop("workspace", None) or TractionWorkspace()
-    return solve_traction(workspace, rows, limits, max_programs=programs, **more)
+    return solve_traction(workspace, rows, inputs, max_programs=programs, **more)
 
 
 def test_equal_torques_are_those_of_the_sweep():
@@ -66,7 +66,7 @@ def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_opti
     workspace, writer, short = TractionWorkspace(), BalanceWriter(LSR1), []
     for prediction, i in rough_states(LSR1, 1000):
         rows = writer.write(state_of(prediction, i), 0.0)
-        answer = solve_traction(workspace, rows, LIMITS, max_programs=12)
+        answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
         assert not answer.fallback and answer.load_slack == answer.torque_slack == 0.0
         A, b, along = balance_matrix(LSR1, prediction, i)
         forces = np.concatenate([answer.loads, answer.tractions])
@@ -83,7 +83,7 @@ def test_rows_of_the_program_hold_to_a_ten_thousandth_of_the_weight():
     for prediction, i in rough_states(LSR1, 100):
         rows = writer.write(state_of(prediction, i), 0.0)
         x = rows.complete(np.zeros(6))
-        qp = build_traction_qp(rows, LIMITS, Reference(x, measure_peak(rows, LIMITS, x)))
+        qp = build_traction_qp(rows, INPUTS, Reference(x, measure_peak(rows, INPUTS, x)))
         y, _, status, solved = workspace.solve(qp)
         assert solved, status
         unit = qp.scale[TRACTION] / 6.0
@@ -93,12 +93,22 @@ def test_rows_of_the_program_hold_to_a_ten_thousandth_of_the_weight():
         assert outside[CONES].max() * unit < 1e-4
 
 
+def test_a_program_that_is_written_over_is_like_a_new_one():
+    writer, qp = BalanceWriter(LSR1), new_traction_qp()
+    for prediction, i in rough_states(LSR1, 20):
+        rows = writer.write(state_of(prediction, i), 5.0)
+        reference = Reference(rows.complete(np.zeros(6)), 0.1 * (1 + i % 9))
+        fresh = build_traction_qp(rows, INPUTS, reference)
+        assert build_traction_qp(rows, INPUTS, reference, qp) is qp
+        assert qp.packed.tobytes() == fresh.packed.tobytes()
+
+
 def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
     prediction, i = next(rough_states(LSR1, 1))
     rows = BalanceWriter(LSR1).write(state_of(prediction, i), 5.0)
     x = rows.complete(np.array([0.1, -0.05, 0.0, 0.05, 0.1, 0.2]))
     reference = Reference(x, 0.4)
-    qp = build_traction_qp(rows, LIMITS, reference)
+    qp = build_traction_qp(rows, INPUTS, reference)
 
     def rounded(x, peak):
         across = np.hypot(x[TRACTIONS], x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along)
@@ -133,7 +143,7 @@ def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
 def test_the_rows_of_the_program_have_the_slopes_of_figure_4(torques, changes):
     rows = BalanceWriter(LSR1).write(level(), 0.0)
     reference = Reference(rows.complete(np.zeros(6)), 0.1)
-    qp = build_traction_qp(rows, LIMITS, reference)
+    qp = build_traction_qp(rows, INPUTS, reference)
     balance = qp.A[:EQUATIONS]
     determined, pulls = balance[:, TRACTIONS.stop : FORCES], balance[:, TRACTIONS]
     tractions = np.tile(torques, 2) / LSR1.wheel.radius
@@ -215,26 +225,27 @@ def test_the_peak_never_rises_from_one_program_to_the_next():
     writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
     for prediction, i in rough_states(LSR1, 50):
         rows = writer.write(state_of(prediction, i), 0.0)
-        last, peak = None, measure_peak(rows, LIMITS, rows.complete(np.zeros(6)))
+        last, peak = None, measure_peak(rows, INPUTS, rows.complete(np.zeros(6)))
         for _ in range(6):
-            answer = solve_traction(workspace, rows, LIMITS, last=last, max_programs=1)
+            answer = solve_traction(workspace, rows, INPUTS, last=last, max_programs=1)
             assert not answer.fallback
             assert answer.utilisation.max() <= peak * (1.0 + 1e-3)
             last, peak = answer.tractions, answer.utilisation.max()
 
 
 def test_the_best_place_on_the_line_is_no_worse_than_any_other_and_keeps_the_balance():
-    rng, weights = np.random.default_rng(5), TractionWeights(effort=0.0)
+    rng = np.random.default_rng(5)
+    inputs = replace(INPUTS, weights=TractionWeights(effort=0.0))
     for prediction, i in rough_states(LSR1, 30):
         rows = BalanceWriter(LSR1).write(state_of(prediction, i), 0.0)
         start, aim = (rows.complete(0.1 * rng.standard_normal(6)) for _ in range(2))
-        found, _ = find_best_between(rows, LIMITS, weights, Reference(start, np.nan), aim)
+        found, _ = find_best_between(rows, inputs, Reference(start, np.nan), aim)
         assert rows.A @ found.x == pytest.approx(rows.b, abs=1e-12)
-        assert found.peak == measure_peak(rows, LIMITS, found.x)
+        assert found.peak == measure_peak(rows, INPUTS, found.x)
         places = [start + t * (aim - start) for t in np.linspace(0.0, 1.5, 301)]
         lifted = [min(place[LOADS].min(), 0.0) for place in places]
         least = min(
-            measure_peak(rows, LIMITS, place)
+            measure_peak(rows, INPUTS, place)
             for place, lift in zip(places, lifted, strict=True)
             if lift == 0.0
         )
