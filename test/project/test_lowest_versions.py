@@ -16,8 +16,8 @@ import numpy as np
 from rover_physics import SweepOptions, classify_path, find_torque_ranges, judge_path
 from rover_physics import judge_reach, load_rover, load_terrain, score_poses
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
+from rover_physics.traction.program_inputs import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
-from rover_physics.traction.wheel_limits import WheelLimits
 
 rover, ground = load_rover("lsr1"), load_terrain("spirit")
 poses = np.array([[-44.684, -19.499, 3.41], [-44.78, -19.53, 3.41]])
@@ -29,8 +29,8 @@ assert len(classify_path(rover, ground, poses)) == 2
 assert (find_torque_ranges(rover, ground, poses).lowest < 0.0).all()
 assert not judge_reach(rover, ground, poses[0], (-40.0, -19.5, -2.0)).possible
 level = MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.zeros(6))
-limits = WheelLimits(np.full(6, 0.8), rover.wheel.max_torque, rover.wheel.radius)
-answer = solve_traction(TractionWorkspace(), BalanceWriter(rover).write(level, 5.0), limits)
+inputs = ProgramInputs(np.full(6, 0.8), rover.wheel.max_torque, rover.wheel.radius)
+answer = solve_traction(TractionWorkspace(), BalanceWriter(rover).write(level, 5.0), inputs)
 assert not answer.fallback and abs(answer.tractions.sum() - 5.0) < 1e-6, answer
 """
 
