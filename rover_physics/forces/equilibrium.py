@@ -125,13 +125,14 @@ def write_equations(linkage, placement, contacts, columns, balance):
                     linkage, placement, bogie_pivots[side], force
                 )
             wrench = fx, fy, fz, mx, my, mz, about_bogie, sign * about_rocker
-            if kind == 0:
-                _add_column(A, wheel, 1.0, wrench, side)
-            elif kind == 1:
-                _add_column(A, 8, 1.0, wrench, side)
-            else:
-                _add_column(A, 6, 1.0, wrench, side)
-                _add_column(A, 7, axle, wrench, side)
+            column = wheel  # a variable: a literal would be compiled as a type of its own
+            if kind == 1:
+                column = 8
+            elif kind == 2:
+                column = 6
+            _add_column(A, column, 1.0, wrench, side)
+            if kind == 2:
+                _add_column(A, column + 1, axle, wrench, side)
             own = 0
             if kind == 1 and wheel < FREE_TORQUES:
                 own = 1 + wheel
