@@ -1,10 +1,10 @@
-"""What becomes of a pose, a contact or a bound: one code each, the same in kernels and results."""
+"""Status codes of contacts, poses and bounds, and torque policies, for kernels and results."""
 
 from enum import IntEnum
 
 
 class ContactStatus(IntEnum):
-    """What was found below a wheel; the numbers are those of `PoseStatus`."""
+    """Ground below the samples of a wheel; the numbers are those of `PoseStatus`."""
 
     IN_CONTACT = 0
     """All samples of the wheel are over known ground."""
@@ -15,7 +15,7 @@ class ContactStatus(IntEnum):
 
 
 class PoseStatus(IntEnum):
-    """What became of a pose."""
+    """Result of evaluating a pose."""
 
     SETTLED = 0
     """All six wheels touch the ground, and the forces balance."""
@@ -26,11 +26,11 @@ class PoseStatus(IntEnum):
     NOT_SETTLED = 3
     """No configuration was found in which all six wheels touch the ground."""
     NO_EQUILIBRIUM = 4
-    """The equations of the balance are singular."""
+    """The equilibrium equations are singular."""
 
 
 class BoundStatus(IntEnum):
-    """What became of the bounds of a pose on an uncertain map."""
+    """Result of bounding a pose on an uncertain map."""
 
     BOUNDED = 0
     """Bounds were found."""
@@ -39,7 +39,7 @@ class BoundStatus(IntEnum):
     UNKNOWN_NEAR = 2
     """Unknown ground is within reach of a wheel."""
     NOT_SETTLED = 3
-    """The pose was not settled to begin with."""
+    """The pose itself is not settled."""
     SINGULAR = 4
     """The forces are not determined."""
     ON_EDGE = 5
@@ -50,6 +50,6 @@ class TorquePolicy(IntEnum):
     """How the wheels share the traction."""
 
     EQUAL = 0
-    """All wheels pull alike."""
+    """Equal traction on all wheels."""
     OPTIMAL = 1
-    """The torques that need the least friction, as traction control can give them."""
+    """The torques that need the least friction, as traction control can apply them."""

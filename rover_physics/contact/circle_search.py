@@ -1,4 +1,4 @@
-"""The place of a circle of a wheel that is nearest to the ground, between the samples."""
+"""Search for the point of a wheel circle that is nearest to the ground, between the samples."""
 
 import numpy as np
 
@@ -7,34 +7,35 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import look_up, look_up_cell
 
 REFINEMENTS = 9
+"""Largest number of trials of a search."""
 GAP_PRECISION = 1e-5
-"""How far the gap of a circle may be from its smallest, in wheel radii."""
+"""Largest error of a circle's smallest gap [wheel radii]."""
 TURN_TOLERANCE = 3e-3
-"""Error of the contact angle [rad] at which the search along the circle stops."""
+"""Error of the contact angle [rad] at which a search stops."""
 BESIDE_REACH = 5e-3
-"""How far above the nearest circle, in wheel radii, another is looked at between its samples."""
+"""Gap above the nearest circle [wheel radii] up to which a circle is searched between samples."""
 BESIDE_SHARE = 0.8
-"""Share of the circle's own rise from which on the ground counts as no plane."""
+"""Fraction of the circle's own rise: where the gap grows less, the ground is not a plane."""
 
 
 @kernel
 def search_circle(model, work, circle, turn):
-    """Return the smallest gap [m] of a circle near an angle, and where.
+    """Return the smallest gap of a circle near an angle, and its place.
 
-    On a plane the circle touches in the direction of the plane's normal, so the first trials look
-    in the direction of the normal found last. On an edge that leads to and fro: then the next
-    trial is where the tangents of the gap from both sides meet, which is also where the gap can't
-    be smaller.
+    On a plane, the circle touches in the direction of the plane's normal. The first two trials
+    therefore take the direction of the normal found last. On an edge this would oscillate, so the
+    later trials take the intersection of the gap's tangents from both sides. The gap cannot be
+    smaller than at this intersection, which gives the error bound for the stop.
 
     Args:
         model: A record with `ground` and `samples`.
         work: A record with `placement`.
-        circle: (index of the wheel, distance of the circle from its middle plane [m]).
-        turn: (sine, cosine) of the angle to begin with.
+        circle: Index of the wheel, and distance of the circle from its middle plane [m].
+        turn: (sine, cosine) of the first angle.
 
     Returns:
         Gap [m], infinite over unknown ground; (sine, cosine) of the contact angle; slope of the
-        ground there (along x, along y).
+        ground there along x and y.
     """
     ground, samples, placement = model.ground, model.samples, work.placement
     wheel, across = circle
@@ -99,7 +100,7 @@ def search_circle(model, work, circle, turn):
 
 @kernel
 def refine_from(model, work, wheel, m, turn):
-    """Search circle m near `turn`, keep what is nearer than before, and return the gap found."""
+    """Search circle m near `turn`, keep the result if it is nearer, and return its gap [m]."""
     contacts = work.contacts
     gap, turn, slope = search_circle(model, work, (wheel, model.samples.laterals[m]), turn)
     if gap < contacts.circle_gap[wheel, m]:
@@ -111,7 +112,7 @@ def refine_from(model, work, wheel, m, turn):
 
 @kernel
 def refine_circle(model, work, wheel, m):
-    """Search circle m anew from where it was nearest."""
+    """Search circle m again from its nearest point; the gap is NaN if none is found."""
     contacts = work.contacts
     turn = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
     contacts.circle_gap[wheel, m] = np.inf
@@ -122,7 +123,7 @@ def refine_circle(model, work, wheel, m):
 
 @kernel
 def refine_others(model, work, wheel):
-    """Look closer at the circles with samples that come near to the smallest gap."""
+    """Search the circles with samples whose gap is close to the smallest one."""
     samples, contacts = model.samples, work.contacts
     reach = contacts.noted_gap[wheel] + CIRCLE_REACH * samples.radius
     nearest = contacts.nearest[wheel]
@@ -154,10 +155,10 @@ def refine_others(model, work, wheel):
 
 @kernel
 def _look_beside(model, work, wheel, m):
-    """Search circle m from between the samples, too, where the ground comes nearer there.
+    """Search circle m also from halfway between samples if the ground is nearer there.
 
-    Over a plane the gap grows away from the smallest with the rise of the circle; where it grows
-    less, a wheel that bridges a hollow may come nearer to the hollow's other side.
+    Over a plane, the gap grows with the rise of the circle on both sides of the contact. If it
+    grows less, the wheel bridges a hollow and may be nearer to the hollow's other side.
     """
     ground, samples = model.ground, model.samples
     placement, contacts = work.placement, work.contacts

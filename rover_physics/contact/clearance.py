@@ -1,4 +1,4 @@
-"""How far the belly of the body stays above the ground."""
+"""Belly clearance: the smallest height of the body's underside above the ground."""
 
 from typing import NamedTuple
 
@@ -8,42 +8,48 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import BLOCK, elevation_of, known_max_of_block, look_up
 
 HALF = 0.5 * (BLOCK - 1)
-"""Distance of a block's outer rows and columns from its middle, in cells."""
+"""Distance of a block's outer rows and columns from its middle [cells]."""
 POINTS = 9
-"""Corners, middles of edges and middle of the underside."""
+"""Number of points of the underside: corners, middles of edges and centre."""
 
 
 class Underside(NamedTuple):
-    """The underside's plane above the cells of a map; all linear in row i and column j."""
+    """The underside's plane above the cells of a map, linear in row i and column j."""
 
     z: float
-    """Height of the plane above cell [0, 0] [m]."""
+    """Height of the plane at cell [0, 0], map frame [m]."""
     z_i: float
-    """Its rise per row."""
+    """Change of z per row [m]."""
     z_j: float
-    """Its rise per column."""
+    """Change of z per column [m]."""
     along: float
-    """Place of the plane's point above cell [0, 0] along the body [m]."""
+    """Body x of the plane's point above cell [0, 0] [m]."""
     along_i: float
-    """Its change per row."""
+    """Change of `along` per row [m]."""
     along_j: float
-    """Its change per column."""
+    """Change of `along` per column [m]."""
     across: float
-    """The same across the body."""
+    """Body y of the plane's point above cell [0, 0] [m]."""
     across_i: float
-    """Its change per row."""
+    """Change of `across` per row [m]."""
     across_j: float
-    """Its change per column."""
+    """Change of `across` per column [m]."""
 
 
 @kernel
 def belly_clearance(ground, linkage, placement):
     """Return the smallest height [m] of the underside above the known ground below it.
 
-    Looked up at all cell centres within the outline of the underside; where none is known there,
-    as between large cells, at nine points of it, and NaN where they too are unknown. The block of
-    cells that may come nearest is looked at first; others are passed over whose highest ground,
-    stays farther below than what is found already.
+    The heights are those of all cell centres within the outline of the underside. If none of them
+    is known, as with large cells, nine points of the underside are used; NaN if their ground is
+    unknown, too, or if the body is upside down. The block of cells that may be nearest is searched
+    first. Blocks whose highest ground is farther below than the result so far are skipped.
+
+    Args:
+        ground: GROUND.
+        linkage: LINKAGE; `belly` is (height, rear, front, right, left) of the underside [m], body
+            frame.
+        placement: PLACEMENT of the settled rover.
     """
     R, origin, belly = placement.R, placement.origin, linkage.belly
     if not R[2, 2] > 0.0:
@@ -70,7 +76,7 @@ def belly_clearance(ground, linkage, placement):
 
 @kernel
 def _clear_points(ground, R, origin, belly):
-    """Return the smallest clearance [m] below POINTS of the underside, NaN if none is known."""
+    """Return the smallest clearance [m] at the points of the underside, NaN if none is known."""
     smallest = np.inf
     for k in range(POINTS):
         x, y, z = point_of_underside(R, origin, belly, k)
@@ -82,7 +88,7 @@ def _clear_points(ground, R, origin, belly):
 
 @kernel
 def point_of_underside(R, origin, belly, k):
-    """Return x, y, z [m] of one of POINTS of the underside."""
+    """Return x, y, z [m] of point k of POINTS on the underside, map frame."""
     along = belly[1] + 0.5 * (k % 3) * (belly[2] - belly[1])
     across = belly[3] + 0.5 * (k // 3) * (belly[4] - belly[3])
     return (
@@ -122,7 +128,7 @@ def _lowest_above(plane, bi, bj):
 
 @kernel
 def _is_below(plane, belly, bi, bj):
-    """Tell whether any cell of a block may be below the underside."""
+    """Return whether any cell of a block may be below the underside."""
     i, j = BLOCK * bi + HALF, BLOCK * bj + HALF
     along = plane.along + plane.along_i * i + plane.along_j * j
     across = plane.across + plane.across_i * i + plane.across_j * j
@@ -136,7 +142,7 @@ def _is_below(plane, belly, bi, bj):
 
 @kernel
 def _clear_block(ground, plane, belly, block, smallest):
-    """Return the smaller of `smallest` and the clearance [m] above the cells of a block."""
+    """Return the smaller of `smallest` and the clearance above a block (row, column) [m]."""
     bi, bj = block
     for i in range(BLOCK * bi, min(BLOCK * (bi + 1), ground.rows)):
         z = plane.z + plane.z_i * i
@@ -152,7 +158,7 @@ def _clear_block(ground, plane, belly, block, smallest):
 
 @kernel
 def _blocks_below(ground, R, origin, belly):
-    """Return the smallest and largest row and column of the blocks around the underside."""
+    """Return first and last row, first and last column of the blocks below the underside."""
     low_x = low_y = np.inf
     high_x = high_y = -np.inf
     for corner in range(4):

@@ -1,4 +1,4 @@
-"""All samples of a wheel's rim held against the ground: which of them are near."""
+"""Scan of a wheel's rim: the vertical gaps of its samples to the ground, and the nearest ones."""
 
 import numpy as np
 
@@ -15,13 +15,23 @@ from rover_physics.terrain.ground import (
 )
 
 EXACT_REACH = 0.5
-"""How far above the nearest sample, in wheel radii, an exact search still refines others: beside
-a face much can lie between two samples."""
+"""Gap above the smallest one [wheel radii] up to which an EXACT search refines a sample. It is
+large because next to a face the gap changes much between two samples."""
 
 
 @kernel
 def scan_rim(model, work, wheel, scope):
-    """Sample the rim; write the nearest samples into `touch` and return the worst status."""
+    """Sample the rim of a wheel and write its nearest samples into `work.contacts`.
+
+    Args:
+        model: A record with `ground` GROUND and `samples` WHEEL_SAMPLES.
+        work: A record with `placement` PLACEMENT and `contacts` CONTACTS.
+        wheel: Index of the wheel.
+        scope: A SearchScope.
+
+    Returns:
+        The worst ContactStatus of the samples.
+    """
     samples, contacts = model.samples, work.contacts
     start = samples.rows // 2
     if scope == SearchScope.FULL:
@@ -52,7 +62,7 @@ def _find_max_below_half(model, work, wheel, half):
     forward, up, centres = placement.forward, placement.up, placement.centres
     scale = ground.inverse_resolution
     along = 0.5 * samples.radius
-    # In the plane: half the lowest point's way aside with camber, and half the wheel's width.
+    # Horizontal: half the camber's sideways shift of the lowest point, plus half the wheel's width.
     aside = along * np.sqrt(up[0] * up[0] + up[1] * up[1]) + samples.half_width
     gx = centres[wheel, 0] - ground.x0 + samples.radius * (half * forward[0] - 0.5 * up[0])
     gy = centres[wheel, 1] - ground.y0 + samples.radius * (half * forward[1] - 0.5 * up[1])
@@ -67,17 +77,17 @@ def _find_max_below_half(model, work, wheel, half):
 def _scan_inside(model, work, wheel, tops, near):
     """Sample a rim over known ground.
 
-    Rows of samples at one angle are visited: the start, where the wheel was nearest before, then
-    from the lowest one to the rear and to the front, until even the highest ground is farther
-    below than the nearest sample, by a reach. What the loop reads is in local variables: the
-    compiler must take it that anything written may lie anywhere.
+    A row holds the samples at one angle. The start row, where the wheel was nearest before, comes
+    first. Then follow the rows from the lowest one to the rear, and to the front. A direction ends
+    once the gap to the highest ground exceeds the smallest gap by more than the reach. The loop
+    reads local variables only, because the compiler reloads arrays after each write.
 
     Args:
         model: A record with `ground` and `samples`.
         work: A record with `placement` and `contacts`.
         wheel: Index of the wheel.
-        tops: (below the rear half, below the front half) highest ground [m].
-        near: (reach [m], row of samples to start with).
+        tops: Highest ground [m] below the rear half and below the front half.
+        near: Reach [m], and the row of samples to start with.
     """
     ground, samples = model.ground, model.samples
     placement, contacts = work.placement, work.contacts
@@ -126,7 +136,10 @@ def _scan_inside(model, work, wheel, tops, near):
 
 @kernel
 def _note_sample(contacts, circle, k, stride, gap):
-    """Note a near sample of row k on circle m: the nearest, or the nearest away from that."""
+    """Note the gap of row k on a circle (wheel, m), if it is the smallest or second smallest.
+
+    The second smallest is more than `stride` rows away from the smallest.
+    """
     wheel, m = circle
     if gap < contacts.first_gap[wheel, m]:
         if abs(k - contacts.first_row[wheel, m]) > stride:
@@ -139,10 +152,10 @@ def _note_sample(contacts, circle, k, stride, gap):
 
 @kernel
 def _scan_carefully(model, work, wheel, scope):
-    """Sample a rim that may be over unknown ground, beyond the map or beside a face.
+    """Sample a rim that may be over unknown ground, off the map or next to a face.
 
-    COARSE looks at every other sample of the middle circle; EXACT refines each sample that may be
-    near at once. Returns the worst ContactStatus.
+    COARSE visits every other sample of the middle circle. EXACT refines each sample that may be
+    near immediately. Returns the worst ContactStatus.
     """
     ground, samples = model.ground, model.samples
     placement, contacts = work.placement, work.contacts
@@ -191,15 +204,15 @@ def _scan_carefully(model, work, wheel, scope):
 
 @kernel
 def _may_come_near(model, work, place, turn, best):
-    """Tell whether a search of a circle from one of its samples may come near to `best` [m].
+    """Return whether the search of a circle from one sample may find a gap close to `best`.
 
-    Not where the highest cell below the stretch that is searched, a spacing to both sides, stays
-    too far below the lowest place of that stretch.
+    The search covers one sample spacing to both sides. It finds none if the highest cell below
+    this arc is too far below the arc's lowest point.
 
     Args:
         model: A record with `ground` and `samples`.
         work: A record with `placement`.
-        place: x and y of the sample in cells, height of the middle of its circle [m].
+        place: x and y of the sample [cells], height of the centre of its circle [m].
         turn: (sine, cosine) of the sample's angle.
         best: Smallest gap found so far [m].
     """
@@ -213,7 +226,7 @@ def _may_come_near(model, work, place, turn, best):
     c_most, s_most = 1.0, min(1.0, abs(s) + turn_s)
     if abs(s) > turn_s:
         c_most = c * turn_c + abs(s) * turn_s
-    # The arc is a little longer than its sine.
+    # An arc is slightly longer than its sine.
     way = 1.01 * turn_s * samples.radius * ground.inverse_resolution
     reach_x = way * (abs(forward[0]) * c_most + abs(up[0]) * s_most)
     reach_y = way * (abs(forward[1]) * c_most + abs(up[1]) * s_most)

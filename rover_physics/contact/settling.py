@@ -1,8 +1,8 @@
 """Inverse kinematics: the pose in which all six wheels just touch the terrain (paper 3.1).
 
-Six unknowns, q = (z, roll, pitch, right rocker angle, right and left bogie angle), and six
-conditions, the gaps of the wheels. This is the closure of the paper's eqs (1)-(7) in 3-D without
-small angles.
+The six unknowns are q = (z, roll, pitch, right rocker angle, right and left bogie angle). The six
+conditions are zero gaps of the wheels. This is the closure of the paper's eqs (1)-(7) in 3-D,
+without the assumption of small angles.
 """
 
 from enum import IntEnum
@@ -17,47 +17,53 @@ from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.status import ContactStatus, PoseStatus
 
 GAP_TOLERANCE = 3e-5
-"""Largest gap left in a settled pose [m], found by a search of its own."""
+"""Largest gap in a settled pose [m], checked by a final search."""
 NEWTON_TOLERANCE = 5e-6
 """Largest gap at which Newton's method stops [m]."""
 MAX_NEWTON_STEPS = 20
+"""Largest number of Newton steps."""
 QUICK_ATTEMPTS = 5
+"""Newton's method runs up to this often with searches near the last contacts."""
 NOTES_HOLD = 1e-2
-"""Gaps, in wheel radii, below which a step is too small to bring other circles near."""
+"""Largest gap [wheel radii] at which the samples noted by the last full scan are reused. So small
+a step brings no other circle near the ground."""
 RECOVERIES = 6
+"""Attempts with exact searches after the quick attempts have failed."""
 RELAXATION_STEPS = 120
+"""Largest number of relaxation steps per attempt."""
 RELAXED = 0.003
-"""Largest gap, in wheel radii, at which relaxation hands over to Newton's method."""
+"""Largest gap [wheel radii] at which relaxation ends and Newton's method starts."""
 RELAXED_FURTHER = 0.25
-"""The same after each attempt that failed: wedged between tread and face, gaps are small."""
+"""Factor on RELAXED after each failed attempt: a wheel wedged at a face has small gaps."""
 RELAXATION = 0.3
+"""Fraction of a gap that a relaxation step closes."""
 TURNED_OVER = 1.45
-"""Roll or pitch [rad] beyond which the search is given up: the rover is on its end or side."""
+"""Roll or pitch [rad] above which the search stops: the rover is on its end or side."""
 
 
 class GroundSlope(IntEnum):
-    """How the ground counts in the derivatives of the gaps."""
+    """Slope of the ground that the derivatives of the gaps assume."""
 
     LEVEL = 0
-    """As if it were level under each wheel."""
+    """Level ground under each wheel."""
     SLOPED = 1
-    """As it is."""
+    """The slope at the contact."""
 
 
 @kernel
 def settle(model, work):
     """Settle the rover at `work.pose`: write `work.q`, its placement and its contacts.
 
-    Starts from the suspension at rest, so the answer depends on nothing but the pose.
+    The search starts from q = 0, so the result depends on the pose alone.
 
     Args:
         model: A record with `ground` GROUND, `linkage` LINKAGE and `samples` WHEEL_SAMPLES.
         work: A record with `pose` (3,): x, y [m] and yaw [rad] of the body origin; `q` (6,),
-            `placement` PLACEMENT and `contacts` CONTACTS, which are written; and work space
-            `J` (6, 6), `step` (6, 1).
+            `placement` PLACEMENT and `contacts` CONTACTS, written; and work space `J` (6, 6),
+            `step` (6, 1).
 
     Returns:
-        A PoseStatus, other than NO_EQUILIBRIUM.
+        A PoseStatus, never NO_EQUILIBRIUM.
     """
     work.q[:] = 0.0
     place(model.linkage, work.pose, work.q, work.placement)
@@ -70,9 +76,9 @@ def settle(model, work):
 
 @kernel
 def settle_from(model, work):
-    """Settle the rover as `settle` does, but from the q that is given, such as a neighbour's.
+    """Settle the rover as `settle` does, but start from `work.q`, such as that of a neighbour.
 
-    Faster than from rest, but over edges it depends on q which of several poses is found.
+    This is faster. Over edges with several solutions, the start decides which one is found.
     """
     radius = model.linkage.radius
     place(model.linkage, work.pose, work.q, work.placement)
@@ -109,7 +115,7 @@ def settle_from(model, work):
 
 @kernel
 def _refuse(status):
-    """Return the PoseStatus of a pose with a wheel off the known ground."""
+    """Return the PoseStatus of a pose with a wheel off the map or over unknown ground."""
     if status == ContactStatus.OFF_MAP:
         return PoseStatus.OFF_MAP
     return PoseStatus.UNKNOWN_GROUND
@@ -117,7 +123,7 @@ def _refuse(status):
 
 @kernel
 def _find_contacts(model, work, scope):
-    """Return the ContactStatus of the worst wheel and the largest absolute gap [m]."""
+    """Write all contacts; return the worst ContactStatus and the largest absolute gap [m]."""
     worst = 0.0
     status = ContactStatus.IN_CONTACT
     for wheel in range(6):
@@ -134,7 +140,7 @@ def _find_contacts(model, work, scope):
 
 @kernel
 def _newton(model, work, scope):
-    """Newton's method on the gaps with a halving line search; returns the largest left."""
+    """Apply Newton's method with a halving line search; return the largest remaining gap [m]."""
     q, step = work.q, work.step
     worst = 0.0
     for wheel in range(6):
@@ -164,10 +170,10 @@ def _newton(model, work, scope):
 
 @kernel
 def _relax(model, work, relaxed, scope):
-    """Let the wheels fall or rise by part of their gaps until none is above `relaxed` [m].
+    """Lower or raise the wheels by a fraction of their gaps until none exceeds `relaxed` [m].
 
-    Slow, but it does not cycle: a wheel that has no equilibrium at the foot of a step goes up to
-    its top, as it would on the ground.
+    This is slow but does not cycle. A wheel without an equilibrium at the foot of a step rises to
+    its top, as a real wheel would.
     """
     for _ in range(RELAXATION_STEPS):
         _descend(model, work, RELAXATION)
@@ -185,7 +191,7 @@ def _has_turned_over(q):
 
 @kernel
 def _descend(model, work, fraction):
-    """Take a fraction of the step that closes the gaps if the ground is level under each wheel."""
+    """Take a fraction of the step that would close the gaps on level ground under each wheel."""
     if _find_step(model.linkage, work, GroundSlope.LEVEL):
         fraction *= _limit_step(work.step)
         for i in range(6):
@@ -194,7 +200,7 @@ def _descend(model, work, fraction):
 
 @kernel
 def _limit_step(step):
-    """Return the fraction of `step` that turns nothing by more than 0.5 rad."""
+    """Return the fraction of `step` that changes no angle by more than 0.5 rad."""
     largest = 0.0
     for i in range(1, 6):
         largest = max(largest, abs(step[i, 0]))
@@ -203,7 +209,7 @@ def _limit_step(step):
 
 @kernel
 def _find_step(linkage, work, ground_is):
-    """Solve J step = gaps; `ground_is` a GroundSlope. False where J is singular."""
+    """Solve J step = gaps; `ground_is` is a GroundSlope. Return False if J is singular."""
     write_gap_rates(linkage, work.placement, work.contacts, ground_is, work.J)
     for i in range(6):
         work.step[i, 0] = work.contacts.gap[i]
@@ -212,7 +218,15 @@ def _find_step(linkage, work, ground_is):
 
 @kernel
 def write_gap_rates(linkage, placement, contacts, ground_is, J):
-    """Write the derivatives of the gaps by q into J (6, 6); `ground_is` a GroundSlope."""
+    """Write the derivatives of the gaps by q into J (6, 6) [m/m or m/rad].
+
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT at q.
+        contacts: CONTACTS with points and normals.
+        ground_is: A GroundSlope.
+        J: (6, 6), row per wheel, column per element of q; written.
+    """
     J[:, :] = 0.0
     R, origin = placement.R, placement.origin
     point, normal = contacts.point, contacts.normal
@@ -238,13 +252,16 @@ def write_gap_rates(linkage, placement, contacts, ground_is, J):
 
 @kernel
 def _arm_from(pivot, point):
-    """Return the way (x, y, z) [m] from a pivot (3,) to a point (3,)."""
+    """Return the vector (x, y, z) [m] from a pivot (3,) to a point (3,)."""
     return point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
 
 
 @kernel
 def _gap_rate(axis, arm, slope):
-    """Return how fast the gap at the end of `arm` grows in a turn about an axis; all tuples."""
+    """Return the change of the gap at the end of `arm` per rotation about an axis [m/rad].
+
+    `axis` and `arm` are (x, y, z), `slope` the (x, y) of the contact normal.
+    """
     ax, ay, az = axis
     dx, dy, dz = arm
     nx, ny = slope

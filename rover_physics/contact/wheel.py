@@ -1,10 +1,10 @@
-"""A rigid cylindrical wheel on the terrain: its vertical gap, where it touches and in what frame.
+"""Contact of a rigid cylindrical wheel with the terrain: vertical gap, contact point and normal.
 
 The lower half of the cylinder is sampled in the wheel's own, cambered plane: on circles across its
-width and angles along each circle. The smallest vertical gap between sample and terrain is the gap
-of the wheel; it is refined along the circle by the root of its derivative. Contact angles count
-from the lowest point of the circle, positive towards the front, so a wheel climbing has positive
-angles.
+width, at angles along each circle. The gap of the wheel is the smallest vertical gap between a
+sample and the terrain. It is refined along the circle by the root of its derivative. Contact
+angles are measured from the lowest point of the circle, positive towards the front, so a climbing
+wheel has a positive angle.
 """
 
 import numpy as np
@@ -17,17 +17,17 @@ from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import height_inside
 
 COMPLIANCE = 2e-3
-"""Depth, in wheel radii, to which real wheels and ground give way: circles with gaps closer than
-that share the load. On a plane a wheel thus touches in its middle, not on an edge at random."""
+"""Deformation of real wheels and ground [wheel radii]. Circles whose gaps differ by less share the
+load, so on a plane a wheel touches in its middle, not at a random edge."""
 
 
 @kernel
 def find_contact(model, work, wheel, scope):
-    """Find where `wheel` is nearest to the ground and write it into row `wheel` of the contacts.
+    """Find the contact of a wheel and write it into row `wheel` of the contacts.
 
-    FULL and AGAIN come after QUICK or NEAR at the same placement, AGAIN after FULL at a placement
-    that differs little. Samples off the known ground are passed over; the gap is NaN where there
-    is no other.
+    FULL and AGAIN require QUICK or NEAR at the same placement before; AGAIN also requires FULL at
+    a placement that differs little. Samples over unknown ground or off the map are skipped; the
+    gap is NaN if no sample is left.
 
     Args:
         model: A record with `ground` GROUND and `samples` WHEEL_SAMPLES.
@@ -62,7 +62,7 @@ def find_contact(model, work, wheel, scope):
 
 @kernel
 def _guess(model, work, wheel):
-    """Write the nearest of some samples of the middle circle; False near unknown ground."""
+    """Write the nearest of every other sample of the middle circle; False near unknown ground."""
     ground, samples, placement = model.ground, model.samples, work.placement
     forward, up, centres = placement.forward, placement.up, placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
@@ -95,7 +95,7 @@ def _guess(model, work, wheel):
 
 @kernel
 def _take_sample(samples, contacts, wheel):
-    """Take the nearest sample for the place where the wheel touches."""
+    """Take the nearest sample as the contact."""
     m = contacts.noted_circle[wheel]
     k = contacts.first_row[wheel, m]
     contacts.nearest[wheel] = m
@@ -119,7 +119,7 @@ def _write_contact(samples, work, wheel):
 
 @kernel
 def _hold(work, wheel):
-    """Write the contact of a wheel whose centre is held at a height, whatever the ground."""
+    """Write the contact of a wheel whose centre is held at a height, regardless of the ground."""
     centres, contacts = work.placement.centres, work.contacts
     contacts.gap[wheel] = centres[wheel, 2] - contacts.held_height[wheel]
     for i in range(3):
@@ -130,10 +130,11 @@ def _hold(work, wheel):
 
 @kernel
 def blend_contact(samples, work, wheel):
-    """Replace the contact of `wheel` by the mean over the circles that share the load.
+    """Replace the contact of `wheel` by the weighted mean of the circles that share the load.
 
-    Each circle counts by how far its own nearest point stays below the lowest plus COMPLIANCE
-    radii. The contact has to come from a FULL or EXACT `find_contact`.
+    The weight of a circle falls linearly from 1 at the smallest gap to 0 at COMPLIANCE radii above
+    it. A held wheel gets the angle of its face. `find_contact` must have run with FULL, AGAIN or
+    EXACT before.
     """
     contacts = work.contacts
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
@@ -156,9 +157,10 @@ def blend_contact(samples, work, wheel):
 
 @kernel
 def write_point(samples, work, wheel, turn, lateral):
-    """Write the point of the cylinder at the angle of `turn` and at `lateral` [m].
+    """Write a point of the cylinder [m], map frame, and its contact angle into the contacts.
 
-    `turn` is (sine, cosine) of the contact angle, `lateral` the distance from the middle plane.
+    `turn` is (sine, cosine) of the contact angle, `lateral` the distance from the middle plane
+    [m], positive to the left.
     """
     placement, contacts = work.placement, work.contacts
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
@@ -171,11 +173,12 @@ def write_point(samples, work, wheel, turn, lateral):
 
 @kernel
 def write_normal(work, wheel, turn, slope):
-    """Write the wheel's radial direction with the terrain's slope along the axis, scaled to z = 1.
+    """Write the contact normal: the wheel's radius, tilted by the terrain's slope along the axle.
 
-    `turn` is (sine, cosine) of the contact angle, `slope` that of the ground along x and y. The
-    part of the terrain's normal along the circle is left out: it vanishes where wheel and ground
-    are tangent, and where the wheel rests on an edge the wheel's own radius is the normal.
+    It is scaled to z = 1, map frame. `turn` is (sine, cosine) of the contact angle, `slope` that
+    of the ground along x and y. The component of the terrain's normal along the circle is left
+    out: it is zero where wheel and ground are tangent, and on an edge the wheel's radius is the
+    normal.
     """
     placement, normal = work.placement, work.contacts.normal
     R, forward, up = placement.R, placement.forward, placement.up

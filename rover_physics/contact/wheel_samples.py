@@ -1,4 +1,4 @@
-"""Where the cylinder of a wheel is sampled: angles along circles across its width."""
+"""Sample points of a wheel's cylinder: angles along circles across its width."""
 
 from typing import Any
 
@@ -8,9 +8,10 @@ from rover_physics.numerics.records import new_record, record_type
 from rover_physics.rover.model import Rover
 
 MAX_ANGLES, MAX_CIRCLES = 49, 9
+"""Largest numbers of angles and circles, which fix the sizes of the records."""
 WHEEL_SAMPLES = record_type(
     ("radius", float),  # wheel radius [m]
-    ("reach", float),  # farthest a sample can be from the wheel's centre in the plane [m]
+    ("reach", float),  # largest horizontal distance of a sample from the wheel's centre [m]
     ("rows", np.int64),  # number k of contact angles
     ("circles", np.int64),  # number m of circles
     ("sines", float, (MAX_ANGLES,)),  # (k,) sines of the contact angles, ascending
@@ -23,11 +24,14 @@ WHEEL_SAMPLES = record_type(
     ("lateral_spacing", float),  # distance between neighbouring circles [m]
     ("laterals", float, (MAX_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
 )
-"""Where the cylinder of a wheel is sampled: at k angles of m circles."""
+"""Samples of a wheel's cylinder: k angles on each of m circles."""
 
 
 def sample_wheel(rover: Rover, resolution: float) -> Any:
-    """Choose samples no farther apart than the cells of a terrain of `resolution` [m]."""
+    """Return WHEEL_SAMPLES about as dense as the cells of a terrain of `resolution` [m].
+
+    There are 21 to 49 angles and 3 to 9 circles.
+    """
     wheel = rover.wheel
     half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 10, 24))
     half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 1, 4))

@@ -1,1 +1,1 @@
-"""The model along a path: poses in, predictions out."""
+"""Prediction of the rover along a path or over a map: poses in, predictions out."""

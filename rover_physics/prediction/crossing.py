@@ -1,10 +1,10 @@
-"""Between waypoints: faces that wheels climb, edges they roll off, and how far they drop.
+"""Poses between waypoints, where wheels climb faces or roll off edges.
 
-Where the contact of a wheel jumps from one waypoint to the next, the poses in between decide
-whether the rover gets there. The path is divided around each jump until the jump is resolved or
-shorter than MIN_SPACING. What is left is a jump in height at one place: upwards the wheel is
-evaluated while it climbs the face, held at heights from foot to edge with the face as its
-contact; downwards it drops.
+A wheel contact can jump from one waypoint to the next. The poses in between then decide whether
+the rover gets there. The path is divided around each jump until the jump is resolved or the piece
+is shorter than MIN_SPACING. A jump that remains is a change in height at one place. Upwards, the
+wheel climbs a face: it is held at heights from foot to edge, with the face as its contact, and
+evaluated at each. Downwards, the wheel drops.
 """
 
 from collections.abc import Callable
@@ -25,14 +25,14 @@ from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 HEIGHT_JUMP = 0.25
-"""Change of a wheel's height, in wheel radii, that is looked into."""
+"""Change of a wheel's height between two poses [wheel radii] above which it is a jump."""
 PIECES = 4
-"""Pieces into which a stretch with a jump is divided, again and again."""
+"""Number of pieces into which a stretch with a jump is divided in each round."""
 MIN_SPACING = 1e-4
-"""Distance between poses [m] below which a jump counts as one place."""
+"""Distance between poses [m] below which a jump counts as at one place."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
-"""Shares of the height of a face at which a climbing wheel is evaluated; at its foot only where
-the wheel has the edge of the face there, for no later contact is as steep."""
+"""Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
+the wheel already touches the edge of the face there: no later contact is as steep."""
 
 Evaluate = Callable[[np.ndarray, np.ndarray], Any]
 
@@ -42,7 +42,7 @@ class Crossings:
     """Poses between waypoints, in the order of the path."""
 
     place: np.ndarray
-    """(m,) place along the path, counted in waypoints."""
+    """(m,) place along the path in waypoints: 2.5 is halfway between waypoints 2 and 3."""
     waypoint: np.ndarray
     """(m,) index of the waypoint that follows."""
     poses: np.ndarray
@@ -52,22 +52,22 @@ class Crossings:
 
     @property
     def points(self) -> PathPoints:
-        """The same as kernels take it."""
+        """The same data as a PathPoints tuple, for kernels."""
         return PathPoints(self.place, self.waypoint, self.poses, self.results)
 
     def select(self, rows: np.ndarray) -> "Crossings":
-        """Return the poses in some rows, in their order, or those that a mask (m,) has."""
+        """Return the poses at row indices, in that order, or where a mask (m,) is True."""
         results = _numbers(self.results)[rows].view(RESULT)[:, 0]
         return Crossings(self.place[rows], self.waypoint[rows], self.poses[rows], results)
 
     def between(self, first: int, end: int) -> "Crossings":
-        """Return what lies between waypoints `first` and `end`, counted from the first of them."""
+        """Return the poses from waypoint `first` up to `end`; places count from `first`."""
         rows = slice(*np.searchsorted(self.place, (first, end)))
         place, waypoint = self.place[rows] - first, self.waypoint[rows] - first
         return Crossings(place, waypoint, self.poses[rows], self.results[rows])
 
     def followed_by(self, more: "Crossings") -> "Crossings":
-        """Return the rows of both."""
+        """Return the rows of both, these first."""
         numbers = np.concatenate([_numbers(self.results), _numbers(more.results)])
         return Crossings(
             np.concatenate([self.place, more.place]),
@@ -81,12 +81,12 @@ _NUMBERS = RESULT.itemsize // 8
 
 
 def _numbers(results: Any) -> np.ndarray:
-    """Return RESULTs (n,) as numbers (n, k): numpy copies records field by field."""
+    """Return RESULTs (n,) as floats (n, k), which numpy copies faster than records."""
     return results.view(np.float64).reshape(len(results), _NUMBERS)
 
 
 def limits_of(radius: float) -> JumpLimits:
-    """Return what counts as a jump for wheels of a radius [m]."""
+    """Return the JumpLimits for wheels of a radius [m]."""
     return JumpLimits(float(radius), MIN_SPACING, HEIGHT_JUMP * radius)
 
 
@@ -104,12 +104,17 @@ def find_crossings(
     Args:
         terrain: The ground.
         radius: Wheel radius [m].
-        poses: (n, 3) waypoints of one path, or of several behind one another.
-        results: (n,) their RESULTs.
-        evaluate: Evaluates poses (k, 3), with heights and contact angles (k, 6, 2) of held
-            wheels or NONE_HELD.
-        direction: 1 where the rover drives forwards along the path, -1 backwards.
-        joined: (n - 1,) True where the path leads from a waypoint to the next one.
+        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints of one path, or of several paths
+            one after the other, map frame.
+        results: (n,) RESULT of each waypoint.
+        evaluate: Function of poses (k, 3) and `held`: heights [m] and contact angles [rad] of
+            held wheels, (k, 6, 2), or NONE_HELD. It returns RESULTs (k,).
+        direction: 1 if the rover drives forwards along the path, -1 if backwards.
+        joined: (n - 1,) True where a waypoint and the next one belong to the same path.
+
+    Returns:
+        The poses between the waypoints, without those of status NOT_SETTLED; poses of climbing
+        wheels are kept in any case.
     """
     jumps = np.empty((len(poses), 2), np.int64)
     joined = np.broadcast_to(joined, len(poses) - 1)
@@ -139,7 +144,7 @@ _NOTHING = Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_result
 
 
 def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings:
-    """Return PIECES - 1 poses between each two rows `ends` (k, 2), stretch by stretch."""
+    """Return PIECES - 1 evaluated poses in each stretch between the rows `ends` (k, 2)."""
     n = len(ends) * (PIECES - 1)
     place, waypoint, poses = np.empty(n), np.empty(n, np.int64), np.empty((n, 3))
     divide_stretches(ends, PIECES, known.points, (place, waypoint, poses))
@@ -149,9 +154,10 @@ def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings
 def _sort_pieces(
     known: Crossings, ends: np.ndarray, radius: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows between which a contact still jumps, (j, 2), first of open pieces.
+    """Return the pieces in which a contact still jumps, as rows (j, 2): open ones, closed ones.
 
-    The last rows are those between `ends`; `sort_pieces` says which pieces are closed.
+    The last rows of `known` are the poses within the stretches `ends`. `sort_pieces` defines open
+    and closed.
     """
     pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
     n_open, n_closed = sort_pieces(ends, PIECES, known.points, limits_of(radius), pieces)
@@ -166,9 +172,9 @@ def _climb(
     evaluate: Evaluate,
     direction: float,
 ) -> Crossings:
-    """Evaluate wheels held at stages between foot and edge where they jump up at one place.
+    """Evaluate wheels that jump up at one place, held at stages between foot and edge.
 
-    The places are between rows of `known`, the `ends` (k, 2).
+    `ends` (k, 2) are the rows of `known` before and after each place.
     """
     before, after = known.results["wheel_centres"][ends].swapaxes(0, 1)
     rise = (after - before)[:, :, 2]
@@ -201,7 +207,7 @@ def _climb(
 
 
 def _face_ahead(terrain: Terrain, radius: float, centre: np.ndarray, yaw: float):
-    """Return slope angle [rad] and edge height [m] of the ground just ahead of a wheel."""
+    """Return slope angle [rad] and edge height [m] of the ground ahead of a wheel centre (3,)."""
     step = 0.25 * terrain.resolution
     ahead = np.arange(0.0, radius + 2.0 * terrain.resolution, step)
     heights = terrain.elevation_at(
@@ -214,6 +220,9 @@ def _face_ahead(terrain: Terrain, radius: float, centre: np.ndarray, yaw: float)
 
 
 def _angle_on_face(radius: float, height: float, face: float, edge: float) -> float:
-    """Return the contact angle of a wheel with its centre at `height`: on the face or its edge."""
+    """Return the contact angle [rad] of a wheel with its centre at `height` [m].
+
+    The wheel touches the face while its centre is below the edge, then the edge.
+    """
     above = (height - edge) / radius
     return face if above <= 0.0 else min(face, float(np.arccos(min(above, 1.0))))

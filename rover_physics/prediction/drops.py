@@ -1,9 +1,9 @@
 """Wheels that roll off an edge: where they fall, and how far they drop.
 
-A wheel whose contact lies behind it, steeper than friction holds, rolls and slides down whatever
-the motors do. Where that is over within little more than a wheel's size it has rolled off an edge:
-until it lands there is no equilibrium and none is needed, and how far it drops is a result. Where
-it goes on for longer the wheel is on a slope too steep to stand on, and the slope is judged.
+A wheel slides down if its contact is behind it and steeper than friction can hold, whatever the
+motors do. If this lasts little more than a wheel's size, the wheel has rolled off an edge. Until
+it lands there is no equilibrium, and none is required; the height of the drop is a result. If it
+lasts longer, the wheel is on a slope that is too steep, and the usual limits apply.
 """
 
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
 from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossings
 
 MIN_ANGLE = np.radians(15.0)
-"""A wheel falls only from contacts at least this steep, however slippery they are."""
+"""Least steepness [rad] of a contact from which a wheel falls, however low its friction."""
 MAX_FALLING = 2
-"""One axle at a time may fall; more is a rover sliding down a slope."""
+"""Most wheels that can fall at once: one axle. If there are more, the rover slides downhill."""
 ON_THE_EDGE = np.radians(-2.0)
-"""Contact angle from which on a wheel turns over an edge."""
+"""Contact angle [rad] below which a wheel rolls over an edge before it falls."""
 ROUNDING = 1e-9
-"""Descents [m] that are none."""
+"""Descent [m] below which it counts as zero."""
 MAX_FALL_LENGTH = 2.5
-"""Way of the rover, in wheel radii, from before the edge to after the landing."""
+"""Longest distance [wheel radii] the rover drives from before the edge to after the landing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +33,9 @@ class Falls:
     at_waypoints: np.ndarray
     """(n, 6) True for wheels that fall at a waypoint."""
     between: np.ndarray
-    """(m, 6) the same between waypoints."""
+    """(m, 6) True for wheels that fall at a pose between waypoints."""
     drops: np.ndarray
-    """(n, 6) how far each wheel has dropped when it comes to a waypoint [m]."""
+    """(n, 6) largest drop of each wheel at a waypoint or on the way to it [m]."""
 
 
 def find_falls(
@@ -45,9 +45,14 @@ def find_falls(
     crossings: Crossings,
     direction: float = 1.0,
 ) -> Falls:
-    """Find where wheels of `radius` [m] fall along a path with its crossings.
+    """Find where wheels fall along a path, and how far they drop.
 
-    `direction` is 1 where the rover drives forwards along the path, -1 backwards.
+    Args:
+        radius: Wheel radius [m].
+        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
+        results: (n,) RESULT of each waypoint.
+        crossings: Poses between the waypoints.
+        direction: 1 if the rover drives forwards along the path, -1 if backwards.
     """
     found = _find_falls(float(radius), float(direction), poses, results, crossings.points)
     return Falls(*found)
@@ -91,7 +96,7 @@ def _find_falls(radius, direction, poses, results, between):
 
 @exact_kernel
 def _merge(n, place, order):
-    """Write the waypoints 0 to n - 1 and then the m places, as n + i, in the order of the path."""
+    """Write the rows in path order into `order`: waypoint i as i, the i-th place as n + i."""
     i = 0
     for k in range(n + place.size):
         waypoint = k - i
@@ -116,9 +121,9 @@ def _read_contacts(result, direction, angle, height):
 
 @exact_kernel
 def _find_steep(angle, friction, steep):
-    """Write (6,) True where contacts behind a wheel are steeper than friction holds.
+    """Write (6,) True where the contact is behind the wheel and steeper than friction can hold.
 
-    Not where the rover as a whole goes downhill: then it slides, and no wheel falls by itself.
+    All are False if the rover as a whole goes downhill: it then slides, and no wheel falls alone.
     """
     count, others, least_held = 0, 0.0, np.inf
     for wheel in range(6):
@@ -136,7 +141,7 @@ def _find_steep(angle, friction, steep):
 
 @exact_kernel
 def _keep_short_runs(distance, radius, steep):
-    """Drop from `steep` (k, 6) runs that begin or end the path or are longer than a fall."""
+    """Clear runs in `steep` (k, 6) that touch an end of the path or are longer than a fall."""
     rows = distance.size
     for wheel in range(6):
         start = 0
@@ -152,7 +157,7 @@ def _keep_short_runs(distance, radius, steep):
 
 @exact_kernel
 def _extend_to_edges(falling, angle, distance, radius, extended):
-    """Write `falling` with the way on which a wheel turns over the edge before it falls."""
+    """Write `falling` (k, 6) into `extended`, with the rows before it while a wheel rolls over."""
     rows = distance.size
     for wheel in range(6):
         for row in range(rows):
@@ -168,7 +173,7 @@ def _extend_to_edges(falling, angle, distance, radius, extended):
 
 @exact_kernel
 def _measure_drops(radius, height, steps, falling, fallen):
-    """Add up the descent of each wheel while it falls; a sudden descent at one place is a fall."""
+    """Add up the descent [m] of each falling wheel; a sudden descent at one place also counts."""
     for wheel in range(6):
         for k in range(1, steps.size):
             descent = height[k - 1, wheel] - height[k, wheel]

@@ -26,26 +26,27 @@ from rover_physics.status import PoseStatus, TorquePolicy
 from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
 
 CHUNK, MAX_CHUNKS = 16, 64
-"""Poses that share one work space at least, and most such chunks: enough to keep cores busy."""
+"""Least number of poses per chunk, and largest number of chunks, enough to keep all cores busy.
+The poses of a chunk share one work space."""
 OPTIMAL_EFFORT = 5
-"""Time of a pose under optimal torques, in that of one under equal ones."""
+"""Time of a pose with optimal torques over that of a pose with equal torques."""
 NONE_HELD = np.empty((0, 6, 2))
-"""No wheel climbs a face."""
+"""Value of `held` if no wheel climbs a face."""
 
 
 SETTINGS = record_type(
     ("policy", np.int64),  # TorquePolicy.EQUAL or OPTIMAL
-    ("friction", float),  # friction coefficient where the terrain gives none
+    ("friction", float),  # friction coefficient where the terrain has no friction layer
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest wheel torque within the safety limit [N m]
-    ("on_soil", np.bool_),  # whether anything but the ground's own Coulomb friction may hold
-    ("direction", float),  # 1 where the rover drives forwards, -1 backwards
+    ("on_soil", np.bool_),  # whether the terrain or the options name soils; else Coulomb friction
+    ("direction", float),  # 1 if the rover drives forwards, -1 if backwards
     ("speed", float),  # speed of the wheels over the ground [m/s]
     ("max_wheel_speed", float),  # largest wheel speed [rad/s]
     ("flat_angle", float),  # tip-over angle on flat ground [rad]
     ("flat_measure", float),  # force-angle measure on flat ground [N m]
 )
-"""What a sweep is asked for."""
+"""Options of a sweep, as kernels read them."""
 
 MODEL = record_type(
     ("ground", GROUND),
@@ -53,7 +54,7 @@ MODEL = record_type(
     ("samples", WHEEL_SAMPLES),
     ("settings", SETTINGS),
 )
-"""All that kernels read: terrain, rover with arm and payload, points of a wheel, options."""
+"""All inputs of the kernels: terrain, rover with arm and payload, wheel samples, options."""
 
 RESULT = record_type(
     ("status", np.int8),
@@ -76,30 +77,30 @@ RESULT = record_type(
     ("belly_clearance", float),
     ("power", float),
 )
-"""The results of one pose; all but q are as in `PathPrediction`."""
+"""Results at one pose: `q` as in WORK, the rest as in `PathPrediction`."""
 
 WORK = record_type(
     ("pose", float, (3,)),  # x, y [m] and yaw [rad] of the body origin
     ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie angle [rad]
-    ("placement", PLACEMENT),  # where the parts are at q
-    ("contacts", CONTACTS),  # where the wheels touch
-    ("balance", BALANCE),  # forces over torques
-    ("search", TORQUE_SEARCH),  # the forces that are taken
+    ("placement", PLACEMENT),  # positions of the parts at q
+    ("contacts", CONTACTS),  # wheel contacts
+    ("balance", BALANCE),  # forces as linear functions of the torques
+    ("search", TORQUE_SEARCH),  # the chosen forces
     ("J", float, (6, 6)),  # derivatives of the gaps by q
     ("step", float, (6, 1)),  # Newton step
     ("corners", float, (CORNERS, 3)),  # support polygon [m]
     ("centre", float, (3,)),  # centre of mass [m]
-    ("force", float, (3,)),  # net force but for the ground's [N]
-    ("moment", float, (3,)),  # net moment about the centre but for the ground's [N m]
+    ("force", float, (3,)),  # net force without that of the ground [N]
+    ("moment", float, (3,)),  # net moment about the centre without that of the ground [N m]
     ("soils", float, (6, SOIL_NUMBERS)),  # soil under each wheel
-    ("best", float, (3, 6)),  # best N, T, S so far, in weights
-    ("result", RESULT),  # result of a pose of which only a score is kept
+    ("best", float, (3, 6)),  # best N, T, S so far, over the rover's weight
+    ("result", RESULT),  # result of a pose if only its score is kept
 )
-"""All that kernels write at one pose: work space of one thread."""
+"""Work space of one thread: all that kernels write at one pose; map frame."""
 
 
 def new_results(n: int) -> Any:
-    """Return the results (n,) of n poses, all NaN."""
+    """Return RESULTs (n,), all NaN with status 0."""
     numbers = np.full((n, RESULT.itemsize // 8), np.nan)
     results = numbers.view(RESULT)[:, 0]
     results["status"] = 0
@@ -107,24 +108,24 @@ def new_results(n: int) -> Any:
 
 
 def new_work() -> Any:
-    """Return empty work space, no wheel held."""
+    """Return an empty WORK, no wheel held."""
     work = new_record(WORK)
     work.contacts.held_height = work.contacts.held_angle = np.nan
     return work
 
 
 _NEW_WORK = np.array([new_work()], WORK).view(np.float64)
-"""As numbers, for numpy copies records field by field."""
+"""Empty WORK as floats, which numpy copies faster than records."""
 
 
 def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
-    """Evaluate the model at poses and return the results (n,), a RESULT each.
+    """Evaluate the model at poses and return RESULTs (n,).
 
     Args:
         model: (1,) MODEL.
-        poses: (n, 3) x, y [m] and yaw [rad].
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
-            those that rest on the ground; (0, 6, 2) where none climbs.
+            those that rest on the ground; (0, 6, 2) if none climbs.
     """
     results = new_results(len(poses))
     with limit_threads(effort(model[0].settings, len(poses))) as threads:
@@ -133,21 +134,26 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
 
 
 def new_works(threads: int, poses: int) -> Any:
-    """Return empty work spaces for a sweep, one for each chunk of poses."""
+    """Return empty WORKs for a sweep, one for each chunk of poses."""
     chunks = 1 if threads == 1 else min(MAX_CHUNKS, -(-poses // CHUNK))
     return _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
 
 
 def effort(settings, poses: int) -> int:
-    """Return how long so many poses take, in that of one under equal torques."""
+    """Return the time of a sweep over `poses` poses, relative to one pose with equal torques."""
     return poses * (1 if settings["policy"] == TorquePolicy.EQUAL else OPTIMAL_EFFORT)
 
 
 @sweep_kernel
 def evaluate_poses(models, poses, held, works, results):
-    """Evaluate the poses into `results` in chunks, as many as there are work spaces.
+    """Evaluate the poses into `results`, one chunk per work space, in parallel.
 
-    Records can't be handed to the threads but as arrays, here (1,) MODEL.
+    Args:
+        models: (1,) MODEL; Numba passes records to threads only as arrays.
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+        held: As for `evaluate`.
+        works: (chunks,) WORK.
+        results: (n,) RESULT, written.
     """
     n, chunks = poses.shape[0], works.size
     for chunk in prange(chunks):
@@ -159,14 +165,14 @@ def evaluate_poses(models, poses, held, works, results):
 
 @kernel
 def set_pose(poses, i, work):
-    """Write pose i of (n, 3) into the work space."""
+    """Copy row i of poses (n, 3) into the work space."""
     for k in range(3):
         work.pose[k] = poses[i, k]
 
 
 @kernel
 def hold_wheels(held, i, contacts):
-    """Write which wheels are held at pose i, and how, into the contacts."""
+    """Copy height and contact angle of the held wheels at pose i into the contacts."""
     for wheel in range(6 if held.shape[0] > 0 else 0):
         contacts.held_height[wheel] = held[i, wheel, 0]
         contacts.held_angle[wheel] = held[i, wheel, 1]
@@ -174,7 +180,10 @@ def hold_wheels(held, i, contacts):
 
 @kernel
 def evaluate_pose(model, work, result):
-    """Evaluate the model at `work.pose` into a RESULT; only its status where it fails."""
+    """Evaluate the model at `work.pose` into a RESULT.
+
+    If the rover does not settle or its forces do not balance, only status and q (NaN) are written.
+    """
     linkage = model.linkage
     status = settle(model, work)
     if status == PoseStatus.SETTLED:
@@ -264,7 +273,7 @@ def _wheel_speed(radius, slip, settings):
 
 @kernel
 def find_tip_over(linkage, work):
-    """Return tip-over angle [rad] and force-angle measure [N m] of a placed rover."""
+    """Return tip-over angle [rad] and force-angle measure [N m] from placement and contacts."""
     centre, force, moment = work.centre, work.force, work.moment
     _write_centre_of_mass(linkage, work.placement, centre)
     force[0], force[1], force[2] = 0.0, 0.0, -linkage.mass * linkage.gravity
@@ -277,7 +286,7 @@ def find_tip_over(linkage, work):
 
 @kernel
 def _add_tool_load(linkage, placement, centre, force, moment):
-    """Add the tool's force and its moment about `centre`."""
+    """Add the tool's force [N] and its moment [N m] about `centre` to `force` and `moment`."""
     origin, tool = placement.origin, linkage.tool
     fx, moment_x = tool_load(placement.R, tool, np.int64(0))
     fy, moment_y = tool_load(placement.R, tool, np.int64(1))

@@ -1,8 +1,8 @@
-"""Many poses that form no path, such as all cells of a map: few numbers each.
+"""Scores of many single poses, such as all cells of a map.
 
-A prediction keeps some 100 numbers a pose; of a map of a million cells at eight headings that
-would be 6 GB. Here the results of each pose are boiled down at once to what decides whether the
-rover can stand and drive there.
+A prediction keeps about 100 numbers per pose, which is 6 GB for a map of a million cells at eight
+headings. Here each pose keeps only the numbers that decide whether the rover can stand and drive
+there.
 """
 
 from collections.abc import Iterator
@@ -25,19 +25,19 @@ from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 BATCH = 32_768
-"""About how many poses of a map are scored at a time."""
+"""Approximate number of poses of a map that are scored at a time."""
 NUMBERS = 6
-"""Numbers that a score has beside the status."""
+"""Numbers in a score, without the status."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseScores:
-    """What decides about poses; arrays of one shape, NaN where the rover does not settle."""
+    """Scores of poses: read-only arrays of one shape, NaN where the rover does not settle."""
 
     status: NDArray[np.int8]
-    """A PoseStatus each."""
+    """PoseStatus of each pose."""
     friction_utilisation: SingleFloats
-    """Largest of the six wheels; infinite where one lifts off."""
+    """Largest of the six wheels; infinite where a wheel lifts off."""
     torque_saturation: SingleFloats
     """Largest of the six wheels."""
     least_load: SingleFloats
@@ -53,7 +53,7 @@ class PoseScores:
         freeze_fields(self)
 
     def within_limits(self, rover: Rover) -> NDArray[np.bool_]:
-        """Tell where the rover keeps the limits of its file, but for sinkage and suspension."""
+        """Return True where the rover keeps its limits, sinkage and suspension not checked."""
         limits = rover.limits
         return np.asarray(
             (self.status == PoseStatus.SETTLED)
@@ -69,19 +69,19 @@ class PoseScores:
 def score_poses(
     rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
 ) -> PoseScores:
-    """Score poses each for itself, with nothing between them.
+    """Score single poses; nothing between them is evaluated.
 
     Args:
         rover: The rover.
         terrain: The ground.
-        poses: (..., 3) x, y [m] and yaw [rad] of base_link in the map frame, of any shape.
+        poses: (..., 3) x, y [m] and yaw [rad] of base_link in the map frame.
         options: As for `sweep_path`.
 
     Returns:
-        Arrays of the shape of the poses without the last axis.
+        Scores with the shape of `poses` without its last axis.
 
     Raises:
-        PoseError: poses of wrong shape, or not finite.
+        PoseError: Poses of wrong shape, or not finite.
         ModelError, SoilError: As `sweep_path`.
     """
     given = np.asarray(poses)
@@ -92,7 +92,7 @@ def score_poses(
 def sweep_map(
     rover: Rover, terrain: Terrain, headings: int = 8, options: SweepOptions = DEFAULT_OPTIONS
 ) -> Iterator[tuple[int, PoseScores]]:
-    """Score the rover over each cell of a map at headings all around, a few rows at a time.
+    """Score the rover at each cell of a map and several headings, a few rows at a time.
 
     Args:
         rover: The rover.
@@ -101,8 +101,8 @@ def sweep_map(
         options: As for `sweep_path`.
 
     Yields:
-        The first row, and scores (rows, nx, headings) of that row and those that follow. Whoever
-        keeps all of them keeps 25 bytes a pose.
+        Index of the first row, and scores (rows, nx, headings) of it and the rows that follow.
+        A score takes 25 bytes per pose.
 
     Raises:
         ModelError, SoilError: As `sweep_path`.
@@ -120,7 +120,7 @@ def sweep_map(
 
 
 def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
-    """Score poses (n, 3); the scores have another shape of n elements."""
+    """Score poses (n, 3) and return scores of `shape`, which has n elements."""
     n = len(poses)
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
     with sweep_lock, limit_threads(effort(model.settings, n)) as threads:
@@ -130,7 +130,15 @@ def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pos
 
 @sweep_kernel
 def score_all(models, poses, works, status, numbers):
-    """Score the poses in chunks, as many as there are work spaces."""
+    """Score the poses, one chunk per work space, in parallel.
+
+    Args:
+        models: (1,) MODEL.
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+        works: (chunks,) WORK.
+        status: (n,) PoseStatus, written.
+        numbers: (NUMBERS, n) scores in the order of `PoseScores`, written.
+    """
     n, chunks = poses.shape[0], works.size
     for chunk in prange(chunks):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
@@ -142,7 +150,7 @@ def score_all(models, poses, works, status, numbers):
 
 @kernel
 def _write_score(result, i, numbers):
-    """Write column i of numbers (NUMBERS, n), in the order of `PoseScores`."""
+    """Write the score of a RESULT into column i of numbers (NUMBERS, n), as in `PoseScores`."""
     if result.status != PoseStatus.SETTLED:
         for k in range(NUMBERS):
             numbers[k, i] = np.nan

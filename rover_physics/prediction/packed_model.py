@@ -1,4 +1,4 @@
-"""What a sweep needs in the form that the kernels read, from checked arguments."""
+"""Rover, terrain and options, checked and packed into the records that kernels read."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,7 +26,7 @@ class PackedModel:
     records: np.ndarray
     """(1,) MODEL."""
     ground: Ground
-    """The terrain that the record points to; it lives as long as this."""
+    """The terrain. The MODEL holds its addresses, so it must live as long as this object."""
 
     def __reduce__(self) -> str:
         raise TypeError(
@@ -48,11 +48,11 @@ class PackedModel:
 def pack_model(
     rover: Rover, terrain: Terrain, options: SweepOptions = DEFAULT_OPTIONS
 ) -> PackedModel:
-    """Check rover, terrain and options and pack them for the kernels, once for the same request.
+    """Check rover, terrain and options and pack them for the kernels; the last 8 are cached.
 
     Raises:
         ModelError: An option that this rover cannot have, such as a payload without an arm.
-        SoilError: A soil of the terrain, or `options.soil`, that is not among the presets.
+        SoilError: A soil of the terrain, or `options.soil`, that is not a preset.
     """
     return _pack_model(_SameRover(rover), terrain, options)
 
@@ -70,7 +70,7 @@ def _pack_model(same: "_SameRover", terrain: Terrain, options: SweepOptions) -> 
 
 
 class _SameRover:
-    """A rover by its identity: a key for what hangs on nothing but the rover."""
+    """A cache key that compares rovers by identity."""
 
     def __init__(self, rover: Rover):
         self.rover = rover
@@ -86,7 +86,7 @@ class _SameRover:
 def _pack_request(
     same: _SameRover, resolution: float, on_soil: bool, options: SweepOptions
 ) -> tuple[Any, Any, Any]:
-    """Return LINKAGE, WHEEL_SAMPLES and SETTINGS, the same ones where the same is asked."""
+    """Return LINKAGE, WHEEL_SAMPLES and SETTINGS, cached."""
     rover, angles = same.rover, options.arm_angles
     mu = rover.friction if options.friction is None else options.friction
     torque = rover.wheel.max_torque if options.max_torque is None else options.max_torque
@@ -111,7 +111,11 @@ def _pack_request(
 
 @lru_cache(maxsize=4)
 def _tip_over_on_flat_ground(same: _SameRover) -> tuple[float, float]:
-    """Return the tip-over measures of the rover as its file has it: arm stowed, at rest."""
+    """Return tip-over angle [rad] and force-angle measure [N m] on flat ground, arm stowed.
+
+    Raises:
+        ModelError: The rover tips over on flat ground.
+    """
     rover = same.rover
     linkage = pack_linkage(rover, *body_mass_and_com(rover))
     work, q = new_work(), np.zeros(6)

@@ -1,4 +1,4 @@
-"""What an uncertain map leaves open along a path: one frozen record of intervals."""
+"""Bounds on a prediction along a path over an uncertain map: one frozen record of intervals."""
 
 from dataclasses import dataclass
 
@@ -12,16 +12,16 @@ from rover_physics.status import BoundStatus
 
 @dataclass(frozen=True, eq=False)
 class PathBounds:
-    """Bounds along a path of n waypoints: smallest and largest value in the last axis.
+    """Bounds along a path of n waypoints; the last axis holds smallest and largest value.
 
-    The values and their units are those of `PathPrediction`. NaN where a waypoint has no bounds.
-    All arrays are read-only.
+    Quantities and units are those of `PathPrediction`. A waypoint without bounds has NaN. All
+    arrays are read-only.
     """
 
     sigmas: float
-    """Standard deviations of the map that are allowed for."""
+    """Number of standard deviations by which the map's heights may be wrong."""
     status: NDArray[np.int8]
-    """(n,) a BoundStatus each."""
+    """(n,) BoundStatus of each waypoint."""
     roll: Floats
     """(n, 2) [rad]."""
     pitch: Floats
@@ -35,7 +35,8 @@ class PathBounds:
     tip_over_ratio: Floats
     """(n, 2)."""
     wheel_loads: Floats
-    """(n, 6, 2) [N]; largest infinite where the torques follow the ground (policy "optimal")."""
+    """(n, 6, 2) [N]; the largest is infinite under policy "optimal", whose torques follow the
+    ground."""
     friction_utilisation: Floats
     """(n, 6, 2)."""
     torque_saturation: Floats

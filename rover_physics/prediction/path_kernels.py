@@ -1,4 +1,4 @@
-"""Loops over the waypoints of a path: where contacts jump, and what adds up along the way."""
+"""Kernels over the waypoints of a path: contact jumps, and sums of distance, time and energy."""
 
 from typing import Any, NamedTuple
 
@@ -8,28 +8,29 @@ from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.status import PoseStatus
 
 ANGLE_JUMP = np.radians(12.0)
-"""Change of a contact angle that is looked into, where one of the two is steep."""
+"""Change of a contact angle [rad] above which it is a jump, if one of the two angles is steep."""
 STEEP_CONTACT = np.radians(25.0)
+"""Size of a contact angle [rad] above which the contact is steep."""
 
 
 class JumpLimits(NamedTuple):
-    """What counts as a jump of a contact."""
+    """Limits that define a contact jump."""
 
     max_spacing: float
-    """Largest distance [m] of waypoints between which jumps are looked for."""
+    """Largest distance of two waypoints between which jumps are searched [m]."""
     min_spacing: float
-    """Length [m] below which a piece is no longer divided."""
+    """Length below which a piece is not divided further [m]."""
     height: float
-    """Change of a wheel's height [m] that is a jump."""
+    """Change of a wheel's height above which it is a jump [m]."""
 
 
 class PathPoints(NamedTuple):
-    """Poses along a path with their results, and where on the path they are."""
+    """Poses along a path with their places on it and their results."""
 
     place: np.ndarray
-    """(n,) place along the path, counted in waypoints."""
+    """(n,) place along the path in waypoints: 2.5 is halfway between waypoints 2 and 3."""
     waypoint: np.ndarray
-    """(n,) index of the waypoint that each belongs to, or that follows."""
+    """(n,) index of the waypoint itself, or of the next one for a pose in between."""
     poses: np.ndarray
     """(n, 3) x, y [m], yaw [rad]."""
     results: Any
@@ -38,14 +39,14 @@ class PathPoints(NamedTuple):
 
 @exact_kernel
 def find_jumps(results, poses, joined, limits, ends):
-    """Find the waypoints between which a contact jumps, and return how many pairs there are.
+    """Find the pairs of waypoints between which a contact jumps; return their number.
 
     Args:
-        results: (n,) RESULTs of the waypoints.
-        poses: (n, 3) their poses.
-        joined: (n - 1,) True where the path leads from a waypoint to the next one.
+        results: (n,) RESULT of each waypoint.
+        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints.
+        joined: (n - 1,) True where a waypoint and the next one belong to the same path.
         limits: JumpLimits.
-        ends: (>= n, 2) where the pairs are written to.
+        ends: (>= n, 2) rows of the pairs, written.
     """
     count = 0
     for row in range(results.size - 1):
@@ -59,13 +60,13 @@ def find_jumps(results, poses, joined, limits, ends):
 
 @exact_kernel
 def divide_stretches(ends, pieces, known, new):
-    """Write what lies evenly between two rows each into the rows of `new`, stretch by stretch.
+    """Divide stretches evenly and write the poses within them, stretch by stretch.
 
     Args:
-        ends: (k, 2) rows of `known` between which the stretches lie.
-        pieces: Into how many each is divided.
+        ends: (k, 2) rows of `known` at the start and end of each stretch.
+        pieces: Number of pieces of a stretch.
         known: PathPoints.
-        new: (place, waypoint, poses) of k * (pieces - 1) rows, to be written.
+        new: (place, waypoint, poses), each with k * (pieces - 1) rows, written.
     """
     place, waypoint, poses = known.place, known.waypoint, known.poses
     new_place, new_waypoint, new_poses = new
@@ -86,18 +87,18 @@ def divide_stretches(ends, pieces, known, new):
 
 @exact_kernel
 def sort_pieces(ends, pieces, known, limits, sorted_ends):
-    """Find the pieces of stretches within which a contact still jumps; return how many of both.
+    """Find the pieces of stretches in which a contact still jumps; return how many open, closed.
 
-    Closed are pieces shorter than the least spacing, and those that hold a pose in which the
-    rover does not settle; the others are open.
+    A piece is closed if it is shorter than `limits.min_spacing`, or if the rover does not settle
+    at a pose within it. The other pieces are open.
 
     Args:
-        ends: (k, 2) rows between which the stretches lie.
-        pieces: Into how many each was divided; the rows between the ends are the last ones.
+        ends: (k, 2) rows of `known` at the start and end of each stretch.
+        pieces: Number of pieces of a stretch; the poses within the stretches are the last rows.
         known: PathPoints.
         limits: JumpLimits.
-        sorted_ends: (2, >= k * pieces, 2) where the rows of open pieces, then those of closed
-            ones are written to.
+        sorted_ends: (2, >= k * pieces, 2) end rows of the open pieces, then of the closed ones,
+            written.
     """
     results, poses = known.results, known.poses
     n_open, n_closed = 0, 0
@@ -143,7 +144,12 @@ def _jumps(here, there, height_jump):
 def add_up(poses, results, speed, sums):
     """Write distance [m], time [s] and energy [J] since the first waypoint into sums (3, n).
 
-    Only settled stretches take time and energy; both are NaN where the rover is not settled.
+    Args:
+        poses: (n, 3) x, y [m] and yaw [rad].
+        results: (n,) RESULT of each pose. Time and energy are NaN where it is not settled, and
+            the climb between two poses counts only if both are settled.
+        speed: Speed along the ground [m/s].
+        sums: (3, n), written.
     """
     distance, time, energy = 0.0, 0.0, 0.0
     for i in range(results.size):

@@ -1,4 +1,4 @@
-"""What the model predicts along a path: one frozen record of arrays, a row per waypoint."""
+"""Prediction of the rover along a path: one frozen record of arrays, a row per waypoint."""
 
 from dataclasses import dataclass
 
@@ -12,15 +12,15 @@ from rover_physics.prediction.path_bounds import PathBounds
 
 @dataclass(frozen=True, eq=False)
 class PathPrediction:
-    """The rover along a path of n waypoints; NaN where it did not settle; order as in `names`.
+    """Prediction at n waypoints; NaN where the rover did not settle.
 
-    All arrays are read-only.
+    Wheels and sides are in the order of `names`. All arrays are read-only.
     """
 
     poses: Floats
-    """(n, 3) x, y [m] and yaw [rad] of the body origin, map frame, as asked for."""
+    """(n, 3) x, y [m] and yaw [rad] of the body origin, map frame, as given."""
     status: NDArray[np.int8]
-    """(n,) a PoseStatus each."""
+    """(n,) PoseStatus of each waypoint."""
     settled: NDArray[np.bool_]
     """(n,) True where all wheels touch the ground and the forces balance."""
     position: Floats
@@ -28,7 +28,7 @@ class PathPrediction:
     roll: Floats
     """(n,) roll [rad]."""
     pitch: Floats
-    """(n,) pitch [rad], positive lowers the nose."""
+    """(n,) pitch [rad], positive nose down."""
     rocker_angle: Floats
     """(n, 2) rocker angles relative to the body [rad]."""
     bogie_angle: Floats
@@ -36,9 +36,9 @@ class PathPrediction:
     wheel_centres: Floats
     """(n, 6, 3) wheel centres [m], map frame."""
     contact_points: Floats
-    """(n, 6, 3) where the wheels touch [m], map frame."""
+    """(n, 6, 3) contact points of the wheels [m], map frame."""
     contact_angle: Floats
-    """(n, 6) angle of the contact from the lowest point of the wheel, positive in front [rad]."""
+    """(n, 6) angle from the lowest point of the wheel to the contact, positive in front [rad]."""
     wheel_loads: Floats
     """(n, 6) normal forces N on the wheels [N]."""
     tangential: Floats
@@ -48,45 +48,47 @@ class PathPrediction:
     torque: Floats
     """(n, 6) motor torques [N m], positive forward."""
     friction: Floats
-    """(n, 6) friction coefficient mu at the contact; on yielding soil the largest drawbar pull
+    """(n, 6) friction coefficient mu at the contact; on yielding soil: the largest drawbar pull
     over the wheel load."""
     friction_utilisation: Floats
-    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that lifts off; on
-    yielding soil (T, S) relative to the largest forces in their direction."""
+    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that lifts off. On
+    yielding soil: (T, S) relative to the largest forces in their direction."""
     slip_ratio: Floats
     """(n, 6) i = 1 - v / (r omega) from the soil model."""
     torque_saturation: Floats
     """(n, 6) |torque| / largest torque."""
     sinkage: Floats
-    """(n, 6) how deep the wheels sink into yielding soil [m]."""
+    """(n, 6) sinkage of the wheels in yielding soil [m]."""
     motion_resistance: Floats
-    """(n, 6) resistance of the soil that the torque overcomes beside the traction [N]."""
+    """(n, 6) motion resistance of the soil [N]; the torque overcomes it besides the traction."""
     tip_over_ratio: Floats
-    """(n,) smallest tip-over angle now / on flat ground (the paper's stability margin)."""
+    """(n,) smallest tip-over angle over that on flat ground (the paper's stability margin)."""
     tip_over_force_angle: Floats
-    """(n,) force-angle measure (Papadopoulos and Rey) now / on flat ground."""
+    """(n,) force-angle measure (Papadopoulos and Rey) over that on flat ground."""
     belly_clearance: Floats
     """(n,) smallest height of the underside above the ground [m]."""
     power: Floats
-    """(n,) mechanical power of the wheel motors; braking gives nothing back [W]."""
+    """(n,) mechanical power of the wheel motors; braking motors count as 0 [W]."""
     energy: Floats
-    """(n,) mechanical energy spent since the first waypoint, settled stretches only [J]."""
+    """(n,) mechanical energy spent since the first waypoint; poses that are not settled count as
+    0 W [J]."""
     time: Floats
     """(n,) time since the first waypoint at nominal speed [s]."""
     distance: Floats
-    """(n,) way since the first waypoint, in the plane [m]."""
+    """(n,) horizontal distance since the first waypoint [m]."""
     wheel_drop: Floats
-    """(n, 6) how far a wheel that rolled off an edge has dropped when it comes here [m]."""
+    """(n, 6) height that a wheel dropped off an edge, here or on the way here [m]."""
     falling: NDArray[np.bool_]
-    """(n, 6) True for wheels that roll off an edge here: no equilibrium is asked for."""
+    """(n, 6) True for wheels that roll off an edge here; they need no equilibrium."""
     between: "PathPrediction | None"
-    """Poses between waypoints where contacts jump, as on faces and edges; None in itself."""
+    """Poses between waypoints where contacts jump, as on faces and edges; its own `between` is
+    None."""
     waypoint: NDArray[np.int64]
-    """(n,) index of the waypoint a row belongs to: its own, or the next if in between."""
+    """(n,) index of the waypoint of a row: its own, or the next one for a pose in between."""
     policy: str
     """Torque policy: "equal" or "optimal"."""
     bounds: PathBounds | None = None
-    """Bounds on all this where the map is uncertain, added by `judge_path`."""
+    """Bounds on the prediction if the map is uncertain, added by `judge_path`; else None."""
 
     def __post_init__(self) -> None:
         freeze_fields(self)

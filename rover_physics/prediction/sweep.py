@@ -22,7 +22,7 @@ from rover_physics.terrain.grid import Terrain
 
 POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
 
-sweep_lock = threading.Lock()  # not all of numba's threading layers allow two callers
+sweep_lock = threading.Lock()  # some of Numba's threading layers allow one caller only
 
 
 def sweep_path(
@@ -35,14 +35,14 @@ def sweep_path(
 
     Args:
         rover: The rover.
-        terrain: The ground; its layers of friction and soil hold where it has them.
+        terrain: The ground; its friction and soil layers override the options.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
         options: Torque policy, friction, soil, arm and direction.
 
     Raises:
         PoseError: Poses of wrong shape, or not finite.
         ModelError: An option that this rover cannot have.
-        SoilError: A soil of the terrain, or of the options, that is not among the presets.
+        SoilError: A soil of the terrain, or of the options, that is not a preset.
     """
     return sweep_paths(rover, terrain, [poses], options)[0]
 
@@ -53,7 +53,7 @@ def sweep_paths(
     paths: Sequence[ArrayLike],
     options: SweepOptions = DEFAULT_OPTIONS,
 ) -> list[PathPrediction]:
-    """Predict the rover along several paths at once, which is faster than one after the other.
+    """Predict the rover along several paths at once, faster than one by one.
 
     Args:
         rover: The rover.
@@ -82,7 +82,7 @@ def _sweep(
     joined = np.ones(len(poses) - 1, bool)
     joined[ends[:-1] - 1] = False
     radius, direction = rover.wheel.radius, float(model.settings["direction"])
-    with limit_threads(effort(model.settings, len(poses))):  # told once, not for each round
+    with limit_threads(effort(model.settings, len(poses))):  # set once, not per round
         results = evaluate_at(poses)
         crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []
@@ -97,7 +97,7 @@ def _sweep(
 def _predict(
     settings: Any, radius: float, poses: np.ndarray, results: np.ndarray, crossings: Crossings
 ) -> PathPrediction:
-    """Return what results and crossings of one path say of it."""
+    """Return the prediction of one path from its results and crossings."""
     falls = find_falls(radius, poses, results, crossings, float(settings["direction"]))
     between = _collect(
         crossings.poses,
@@ -120,7 +120,7 @@ def _predict(
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:
-    """Return a copy of poses as float array (n, 3).
+    """Return a copy of poses as a float array (n, 3).
 
     Raises:
         PoseError: Wrong shape or type, no pose, or values that are not finite.

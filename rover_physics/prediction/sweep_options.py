@@ -1,4 +1,4 @@
-"""What may be chosen when the model is asked: policy, friction, torque, soil, arm, direction."""
+"""Options of a prediction: torque policy, friction, torque, soil, arm and direction."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,34 +15,37 @@ POLICIES = {EQUAL: TorquePolicy.EQUAL, OPTIMAL: TorquePolicy.OPTIMAL}
 """Torque policies by name."""
 
 JointAngles = tuple[tuple[str, float], ...]
-"""Names and angles [rad] of joints."""
+"""Pairs of joint name and angle [rad]."""
 
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """Options of `sweep_path` and of all that is built on it; they can be compared and hashed.
+    """Options of `sweep_path` and of all that is built on it; comparable and hashable.
 
     Raises:
-        ModelError: A value out of range; names the option and what would be right.
+        ModelError: A value out of range; the text names the option and its range.
     """
 
     policy: str = EQUAL
-    """EQUAL: all wheels pull alike; OPTIMAL: the torques that need the least friction."""
+    """EQUAL: equal torques on all wheels; OPTIMAL: the torques that need the least friction."""
     friction: float | None = None
-    """Coulomb friction coefficient; None: that of the rover file. A friction layer of the terrain
-    comes first."""
+    """Coulomb friction coefficient (default: that of the rover file). A friction layer of the
+    terrain overrides it."""
     max_torque: float | None = None
-    """Largest wheel torque [N m]; None: that of the rover file."""
+    """Largest wheel torque [N m] (default: that of the rover file)."""
     soil: str | None = None
-    """Preset soil where the terrain names none (docs/soil.md); None: Coulomb friction."""
+    """Preset soil where the terrain names none, see docs/soil.md (default: Coulomb friction)."""
     joint_angles: Mapping[str, float] | JointAngles | None = None
-    """Arm angles [rad] by joint name, kept as pairs; joints left out, and None: stowed."""
+    """Arm angles [rad] by joint name, stored as pairs. Joints left out are stowed; None stows
+    all."""
     payload: float | None = None
-    """Mass at the arm's tip [kg]; None: that of the rover file."""
+    """Mass at the arm's tip [kg] (default: that of the rover file)."""
     tool_force: Any = None
-    """(3,) force [N] that the surroundings exert on the arm's tip, body frame, kept as a tuple."""
+    """(3,) force of the surroundings on the arm's tip [N], body frame, stored as a tuple (default:
+    none)."""
     tool_moment: Any = None
-    """(3,) moment [N m] that they exert on it, body frame, kept as a tuple."""
+    """(3,) moment of the surroundings on the arm's tip [N m], body frame, stored as a tuple
+    (default: none)."""
     backward: bool = False
     """Whether the rover drives backwards along the poses."""
 
@@ -64,14 +67,14 @@ class SweepOptions:
 
     @property
     def direction(self) -> float:
-        """1.0 where the rover drives forwards, -1.0 backwards."""
+        """1.0 if the rover drives forwards, -1.0 if backwards."""
         return -1.0 if self.backward else 1.0
 
     @property
     def arm_angles(self) -> dict[str, float] | None:
-        """Arm angles [rad] by joint name, None for the stowed arm."""
+        """Arm angles [rad] by joint name; None if the arm is stowed."""
         return None if self.joint_angles is None else dict(self.joint_angles)
 
 
 DEFAULT_OPTIONS = SweepOptions()
-"""Equal torques, the numbers of the rover file, arm stowed, forwards."""
+"""Equal torques, values of the rover file, arm stowed, forwards."""

@@ -1,1 +1,1 @@
-"""What a prediction means: limits, verdicts, classes, traps and reach."""
+"""Assessment of predictions: limits, verdicts, traversability classes, entrapment and reach."""

@@ -1,4 +1,4 @@
-"""What the bounds of an uncertain map add to a verdict: refusals at worst."""
+"""Refusals that follow from the worst case within the bounds of an uncertain map."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ _UNBOUNDED = {
 def judge_bounds(
     rover: Rover, prediction: PathPrediction, bounds: PathBounds, verdict: Verdict
 ) -> Verdict:
-    """Add to a verdict what the bounds refuse; nothing that it refuses is taken back.
+    """Add the refusals of the bounds to a verdict; its own refusals remain.
 
     Args:
         rover: The rover, with its limits.
@@ -31,8 +31,8 @@ def judge_bounds(
         verdict: The verdict on the prediction itself.
 
     Returns:
-        The verdict with the further refusals and with the extremes of the bounds. The reason of a
-        waypoint that the prediction passes says that it holds at worst.
+        The verdict with the additional refusals and the extremes of the bounds. An additional
+        reason contains "at worst" or "within ... sigma of the map".
     """
     codes, reasons = list(verdict.codes), list(verdict.reasons)
     within = f"within {bounds.sigmas:g} sigma of the map"
@@ -71,7 +71,7 @@ def _extreme(choose, values: Floats) -> float:
 def _find_worst(
     rover: Rover, prediction: PathPrediction, bounds: PathBounds
 ) -> tuple[list[str], list[str]]:
-    """Return code and reason of the limits that are broken at worst, empty where none is."""
+    """Return code and reason of the limits broken in the worst case, empty if none is."""
 
     def at(name: str, end: int) -> Floats:
         values = getattr(bounds, name)[..., end]
@@ -99,7 +99,7 @@ def _find_worst(
 
 
 def _largest(value: Floats, bounds: Floats) -> Floats:
-    """Return of intervals (n, 2) the end farther from zero, the value (n,) where there is none."""
+    """Return the end of each interval (n, 2) farther from 0; the value (n,) where it is NaN."""
     rows = np.arange(len(bounds))
     farther = bounds[rows, np.argmax(np.abs(bounds), axis=1)]
     return np.where(np.isnan(farther), value, farther)

@@ -1,4 +1,4 @@
-"""How passable each waypoint is: with equal torques, only with traction control, or not at all."""
+"""Traversability classes: passable, passable only with traction control, or impassable."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,25 +23,25 @@ IMPASSABLE = "impassable"
 TRAVERSABILITY_CLASSES = (PASSABLE, WITH_TRACTION_CONTROL, IMPASSABLE)
 """The classes, from best to worst."""
 WHEEL_CONSTRAINTS = ("wheel_lift", "friction", "torque")
-"""The paper's three constraints, by their codes in a verdict."""
+"""The paper's three constraints, named by their codes in a verdict."""
 
 
 @dataclass(frozen=True)
 class ClassifiedWaypoint:
-    """How passable one waypoint is, with the way to it, and what decides that."""
+    """Class of one waypoint, including the way to it, and the constraint that decides it."""
 
     traversability_class: str
     """PASSABLE, WITH_TRACTION_CONTROL or IMPASSABLE."""
     policy: str
-    """Torque policy that the rest is about: EQUAL where passable, else OPTIMAL."""
+    """Torque policy of the fields below: EQUAL if passable, else OPTIMAL."""
     constraint: str
-    """Code of the limit that is broken; else of the tightest of WHEEL_CONSTRAINTS."""
+    """Code of the broken limit; if none is broken, of the tightest of WHEEL_CONSTRAINTS."""
     wheel: str
-    """Name of the wheel it is about, empty where it is about none."""
+    """Name of the wheel concerned, empty if none."""
     margin: float
-    """Share of the limit that is left, negative where broken; NaN where there is no amount."""
+    """Share of the limit that is left, negative if it is broken; NaN if it has no amount."""
     reason: str
-    """Why the waypoint is impassable, or why equal torques do not do; empty where passable."""
+    """Why the waypoint is impassable, or why equal torques are not enough; empty if passable."""
 
 
 def classify_path(
@@ -52,18 +52,18 @@ def classify_path(
     *,
     sigmas: float | None = SIGMAS,
 ) -> tuple[ClassifiedWaypoint, ...]:
-    """ClassifiedWaypoint each waypoint of a path by what both torque policies make of it.
+    """Classify each waypoint of a path from its verdicts under both torque policies.
 
     Args:
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        options: As for `sweep_path`; its policy is not looked at.
+        options: As for `sweep_path`; its policy is ignored.
         sigmas: As for `judge_path`.
 
     Returns:
-        A class per waypoint; a limit broken on the way to a waypoint counts there, and so does
-        that the rover would be trapped.
+        A class per waypoint. A limit broken on the way to a waypoint counts at that waypoint, as
+        does entrapment.
 
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
@@ -82,17 +82,21 @@ def classify_judged(
     *,
     sigmas: float | None = SIGMAS,
 ) -> tuple[ClassifiedWaypoint, ...]:
-    """ClassifiedWaypoint each waypoint of a path that `judge_path` has judged under one policy.
+    """Classify each waypoint of a path that `judge_path` has judged under one policy.
 
-    The other policy is asked only where it matters: nothing that equal torques pass needs others.
+    The path is judged under the other policy only if needed: a path that is traversable with
+    equal torques needs no optimal ones.
 
     Args:
         rover: The rover.
         terrain: The ground.
         prediction: The path under either policy, from `judge_path`.
-        verdict: What was said of it.
-        options: The options it was judged with; their policy is not looked at.
+        verdict: The verdict on it, from `judge_path`.
+        options: The options it was judged with; their policy is ignored.
         sigmas: The standard deviations of the map it was judged with.
+
+    Returns:
+        A class per waypoint, as `classify_path`.
 
     Raises:
         PoseError, ModelError, SoilError: As `judge_path`.
@@ -110,10 +114,10 @@ def classify_judged(
 
 
 def deciding_waypoint(classes: Sequence[ClassifiedWaypoint]) -> int:
-    """Return the index of the waypoint that the class of a whole path hangs on.
+    """Return the index of the waypoint that decides the class of the whole path.
 
-    Of the waypoints with the worst class it is the first where that is IMPASSABLE, else the one
-    with the least margin.
+    If the worst class is IMPASSABLE, it is the first such waypoint. Otherwise it is the waypoint
+    of the worst class with the smallest margin.
     """
     worst = max(
         TRAVERSABILITY_CLASSES.index(waypoint.traversability_class) for waypoint in classes
@@ -130,7 +134,7 @@ def deciding_waypoint(classes: Sequence[ClassifiedWaypoint]) -> int:
 
 
 class _Decision(NamedTuple):
-    """What decides about a waypoint under one policy; its reason is empty where passable."""
+    """Constraint that decides a waypoint under one policy; its reason is empty if passable."""
 
     constraint: str
     wheel: int
@@ -139,11 +143,11 @@ class _Decision(NamedTuple):
 
 
 _NOTHING_ASKED = _Decision("", -1, float("nan"), "")
-"""Where a wheel rolls off an edge none of WHEEL_CONSTRAINTS counts: see UNNEEDED_IN_A_FALL."""
+"""Decision while a wheel rolls off an edge: no wheel constraint counts, see UNNEEDED_IN_A_FALL."""
 
 
 def _classify(equal: _Decision, optimal: _Decision) -> ClassifiedWaypoint:
-    """Return the class of a waypoint from what decides about it under either policy."""
+    """Return the class of a waypoint from its decisions under both policies."""
     if not equal.reason:
         traversability_class, policy, decision, reason = PASSABLE, EQUAL, equal, ""
     elif not optimal.reason:
@@ -167,18 +171,18 @@ def _classify(equal: _Decision, optimal: _Decision) -> ClassifiedWaypoint:
 
 
 def _decide(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> list[_Decision]:
-    """Return what decides about each waypoint, the way to it included."""
+    """Return the decision of each waypoint, including the way to it."""
     decisions = list(_decide_rows(rover, prediction))
     _look_between(rover, prediction, decisions)
     for i, (code, reason) in enumerate(zip(verdict.codes, verdict.reasons, strict=True)):
         if code != (decisions[i].constraint if decisions[i].reason else ""):
-            # trapped, or what else is about more than the waypoint itself
+            # The verdict knows more than the waypoint alone, such as entrapment or bounds.
             decisions[i] = _Decision(code, -1, float("nan"), reason)
     return decisions
 
 
 def _look_between(rover: Rover, prediction: PathPrediction, decisions: list[_Decision]) -> None:
-    """Replace what decides about a waypoint where the way to it is worse."""
+    """Replace the decision of a waypoint where the way to it is worse."""
     between = prediction.between
     if between is None or not len(between.poses):
         return

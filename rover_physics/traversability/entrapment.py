@@ -1,14 +1,14 @@
-"""Trapped? A path is refused where the rover can go in, but neither on nor back.
+"""Entrapment: a path is refused if the rover can drive in, but neither on nor back out.
 
-What differs between driving in and driving back are edges, off which a wheel drops and which it
-has to climb on the way back, and soil, whose resistance holds the rover going up as much as it
-brakes it going down. On Coulomb ground without drops the forces of the rover at rest are the same
-both ways: whatever was passable on the way in is passable on the way back.
+Driving back differs from driving in for two reasons. A wheel that dropped off an edge has to climb
+it on the way back. Soil resists motion in either direction, so it helps the rover to brake
+downhill and hinders it uphill. On Coulomb ground without drops, the forces at rest are the same
+both ways, so a path that is passable on the way in is passable on the way back.
 
-So the way back is driven, backwards, only where the forces of the way in would not do for it. It
-leads from where the path ends, or fails, to before all such places. Where it fails is the point of
-no return, and then a way on is looked for: straight ahead and in curves, from the end and from
-just behind the point of no return.
+The way back is therefore predicted only if the forces of the way in are not enough for it. It
+leads backwards from the end of the path, or from where the path fails, to a point before all such
+places. The waypoint where the way back fails is the point of no return. Ways on are then checked,
+straight ahead and in curves: from the end of the path, and from just past the point of no return.
 """
 
 from collections.abc import Iterator
@@ -27,17 +27,17 @@ from rover_physics.traversability.limit_checks import TOLERANCE, largest_of
 from rover_physics.traversability.verdict import Verdict, judge
 
 LOOK_AHEAD = 1.5
-"""Wheelbases that the way on is looked at beyond as much way as the rover went in."""
+"""Length of a way on [wheelbases], in addition to the distance from the point of no return."""
 MAX_LOOK_AHEAD = 6.0
-"""Wheelbases that the way on is looked at, however far the rover went in."""
+"""Largest length of a way on [wheelbases]."""
 CURVES = (0.0, 1.0, -1.0)
-"""Curvatures of the ways on, in turns of one radian a wheelbase, for LOOK_AHEAD wheelbases."""
+"""Curvatures of the ways on [rad per wheelbase]; they hold for LOOK_AHEAD wheelbases."""
 DROP = 0.1
-"""Drop, in wheel radii, from which on the way back is asked for."""
+"""Drop of a wheel [wheel radii] above which the way back is checked."""
 RUN_UP = 1.0
-"""Wheelbases before the first place that needs asking to which the way back has to lead."""
+"""Distance [wheelbases] before the first place that needs a check where the way back ends."""
 UNKNOWN_CODES = ("off_map", "unknown_ground")
-"""Codes that close a way on only within LOOK_AHEAD wheelbases; what lies further is not known."""
+"""Codes that close a way on only within LOOK_AHEAD wheelbases; farther ground may be open."""
 
 
 def ask_for_ways_out(
@@ -47,7 +47,15 @@ def ask_for_ways_out(
     verdict: Verdict,
     options: SweepOptions,
 ) -> Verdict:
-    """Return the verdict, refused as trapped where there is neither a way on nor back."""
+    """Return the verdict, refused as "trapped" if there is neither a way on nor a way back.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        prediction: The prediction of the path.
+        verdict: The verdict on it.
+        options: The options of the prediction.
+    """
     end = len(prediction.poses) if verdict.first_failure < 0 else verdict.first_failure
     one_way = np.flatnonzero(_find_one_way(rover, prediction, options)[:end])
     if not one_way.size:
@@ -67,9 +75,9 @@ def ask_for_ways_out(
 
 
 def _find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
-    """Return (n,) True where, or just before where, the forces of the way in do not do for back.
+    """Return (n,) True at or just after places where the forces of the way in do not allow a return.
 
-    Another set of torques may do, under policy "optimal"; this only tells where to ask.
+    Under policy "optimal" other torques may allow it; these are only the places to check.
     """
     one_way = np.any(prediction.wheel_drop > DROP * rover.wheel.radius, axis=1)
     for part in (prediction, prediction.between):
@@ -82,7 +90,7 @@ def _find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOption
 def _resists_way_back(
     rover: Rover, prediction: PathPrediction, options: SweepOptions
 ) -> np.ndarray:
-    """Return (n,) True where driving back with the same forces breaks a limit on some soil."""
+    """Return (n,) True where driving back with the same forces breaks a limit on yielding soil."""
     resistance = prediction.motion_resistance
     if not largest_of(resistance) > 0.0:
         return np.zeros(len(resistance), dtype=bool)
@@ -105,7 +113,7 @@ def _resists_way_back(
 def _judge_way(
     rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
 ) -> Verdict:
-    """Judge a way; under whatever policy, equal torques are asked first: that is much faster."""
+    """Judge a way; equal torques are tried first under either policy, which is much faster."""
     equal = replace(options, policy=EQUAL)
     verdict = judge(rover, sweep_path(rover, terrain, poses, equal))
     if verdict.traversable or options.policy == EQUAL:
@@ -126,9 +134,9 @@ def _find_way_on(
     end: int,
     options: SweepOptions,
 ) -> str:
-    """Return why the rover can't go on straight ahead from the end, empty if any way on is open.
+    """Return why the first way on, straight ahead from the end, is closed; empty if any is open.
 
-    `stop` and `end` are the waypoints between which it can move.
+    The rover can move between the waypoints `stop` and `end`.
     """
     wheelbase = _wheelbase(rover)
     inside = prediction.distance[end] - prediction.distance[stop]
@@ -154,7 +162,7 @@ def _find_way_on(
 def _ways_ahead(
     pose: np.ndarray, wheelbase: float, length: float, spacing: float, options: SweepOptions
 ) -> Iterator[np.ndarray]:
-    """Yield ways (m, 3) on from a pose: straight on, and in curves that then go straight on."""
+    """Yield ways on (m, 3) from a pose (3,): straight, then curves that end straight."""
     direction = options.direction
     ahead = np.arange(0.0, length + spacing, spacing)
     turning = np.minimum(ahead, LOOK_AHEAD * wheelbase) / wheelbase

@@ -1,4 +1,4 @@
-"""The main question: a path in, what the rover would do on it and the verdict out."""
+"""The main call of the package: a path in, the prediction and the verdict out."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,18 +24,19 @@ def judge_path(
     *,
     sigmas: float | None = SIGMAS,
 ) -> tuple[PathPrediction, Verdict]:
-    """Predict a path and judge it, entrapment included.
+    """Predict a path and judge it, including entrapment.
 
-    On a terrain with a layer `elevation_std` the prediction has bounds, and the verdict also
-    refuses what the heights of the map make possible. It passes nothing that it would refuse
-    without the layer.
+    If the terrain has a layer `elevation_std`, the prediction has bounds, and the verdict also
+    refuses waypoints that break a limit in the worst case within them. The layer adds refusals and
+    removes none.
 
     Args:
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) waypoints, x, y [m] and yaw [rad] of base_link, map frame.
         options: As for `sweep_path`.
-        sigmas: Standard deviations of the map to allow for; 0 or None takes it as exact.
+        sigmas: Number of standard deviations by which the map's heights may be wrong; 0 or None
+            takes the map as exact.
 
     Returns:
         The prediction, and the verdict on it.
@@ -43,7 +44,7 @@ def judge_path(
     Raises:
         PoseError: Poses of wrong shape, or not finite.
         ModelError: An option that this rover cannot have, or `sigmas` below 0.
-        SoilError: A soil that is not among the presets.
+        SoilError: A soil that is not a preset.
     """
     return judge_paths(rover, terrain, [poses], options, sigmas=sigmas)[0]
 
@@ -56,7 +57,7 @@ def judge_paths(
     *,
     sigmas: float | None = SIGMAS,
 ) -> list[tuple[PathPrediction, Verdict]]:
-    """Judge several paths at once, which is faster than one after the other; see `judge_path`."""
+    """Judge several paths at once, faster than one by one; see `judge_path`."""
     check_sigmas(sigmas)
     judged = []
     for prediction in sweep_paths(rover, terrain, paths, options):

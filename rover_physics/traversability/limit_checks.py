@@ -1,4 +1,4 @@
-"""Each limit held against a prediction: where it is broken, and in which words that is told."""
+"""Checks of a prediction against each limit: where it is broken, and the text of the reason."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,26 +11,27 @@ from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 
 TOLERANCE = 1e-9
+"""Excess over a limit, in its unit, that counts as rounding."""
 
 
 class Check(NamedTuple):
-    """One limit held against all waypoints of a prediction."""
+    """Comparison of one limit with all waypoints of a prediction."""
 
     code: str
-    """Its code in a verdict."""
+    """Code of the limit in a verdict."""
     extreme: float
-    """The value that comes closest to the limit or goes furthest beyond it, NaN where none is
-    known; NaN too for limits that are no single number."""
+    """The value closest to the limit or furthest beyond it; NaN if none is known, or if the limit
+    is not a single number."""
     breaks: bool
     """Whether the limit is broken anywhere."""
     broken: Callable[[], np.ndarray]
-    """Gives (n,) True where the limit is broken."""
+    """Returns (n,) True where the limit is broken."""
     margins: Callable[[], np.ndarray]
-    """Gives the share of the limit (n,) that is left, negative where it is broken."""
+    """Returns the share of the limit that is left, (n,), negative where it is broken."""
     wheels: Callable[[], np.ndarray]
-    """Gives the index of the wheel (n,) that it is about, -1 for none."""
+    """Returns the index of the wheel concerned, (n,), -1 for none."""
     describe: Callable[[int], str]
-    """Says of a waypoint by how much."""
+    """Returns the reason of a waypoint, with value and limit."""
 
 
 def tilt_of(prediction: PathPrediction) -> np.ndarray:
@@ -40,14 +41,14 @@ def tilt_of(prediction: PathPrediction) -> np.ndarray:
 
 
 def compare(value: float, limit: float, digits: int, unit: str = "") -> str:
-    """Return "value, limit ..." with as many digits as it takes to tell the two apart."""
+    """Return "value, limit ..." with enough digits that the two differ."""
     while digits < 9 and f"{value:.{digits}f}" == f"{limit:.{digits}f}":
         digits += 1
     return f"{value:.{digits}f}{unit}, limit {limit:.{digits}f}{unit}"
 
 
 def _share_left(values: np.ndarray, limit: float) -> np.ndarray:
-    """Return the share of an upper limit that is left; the amount where the limit is 0."""
+    """Return the share of an upper limit that is left; the difference if the limit is 0."""
     return 1.0 - values / limit if limit > 0.0 else limit - values
 
 
@@ -56,17 +57,17 @@ def _no_wheel(values: np.ndarray) -> Callable[[], np.ndarray]:
 
 
 def largest_of(values: np.ndarray) -> float:
-    """Return the largest of values that are not NaN, NaN where there is none."""
+    """Return the largest value that is not NaN, or NaN if there is none."""
     return float(np.fmax.reduce(values, axis=None)) if values.size else np.nan
 
 
 def smallest_of(values: np.ndarray) -> float:
-    """Return the smallest of values that are not NaN, NaN where there is none."""
+    """Return the smallest value that is not NaN, or NaN if there is none."""
     return float(np.fmin.reduce(values, axis=None)) if values.size else np.nan
 
 
 def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
-    """Return the checks of a prediction, the most telling reason first."""
+    """Return the checks of a prediction, in the order in which they become reasons."""
     return [
         _check_suspension(rover, prediction),
         _check_tilt(rover, prediction),

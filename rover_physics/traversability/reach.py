@@ -1,4 +1,4 @@
-"""A query of the rover at rest: whether the arm can reach a point and push there."""
+"""Reach query: whether the arm of the standing rover can reach a point and push there."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -28,36 +28,38 @@ OF_THE_VERDICT = (
     "min_belly_clearance",
     "max_sinkage",
 )
-"""What an answer in words tells of its verdict."""
+"""Fields of the verdict that `ReachAnswer.to_dict` includes."""
 PER_WHEEL = ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation")
-"""What it tells of each wheel, in the order of `names.WHEELS`."""
+"""Values of each wheel that it includes, in the order of `names.WHEELS`."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReachAnswer:
-    """Whether the arm can reach a point and bear a load there, and the reason where it cannot."""
+    """Whether the arm can reach a point and bear a load there, and the reason if it cannot."""
 
     possible: bool
     """True if the tip reaches the point and the rover holds still within all its limits."""
     reachable: bool
-    """True if the arm can bring its tip to the point, whether or not the rover holds."""
+    """True if the arm can bring its tip to the point, even if the rover does not hold still."""
     code: str
     """Empty if possible; "too_far", "too_near" or "joint_limits", else a code of a verdict."""
     reason: str
-    """The same in words, with amounts."""
+    """The reason in words, with values; empty if possible."""
     target: np.ndarray
     """(3,) the point in the body frame [m], NaN where the rover does not settle."""
     out_of_reach: float
-    """How far [m] the point is out of reach: above 0 too far, below 0 too near, NaN unknown."""
+    """Distance of the point from the arm's reach [m]: above 0 too far, below 0 too near, NaN
+    unknown."""
     joint_angles: Mapping[str, float] | None
-    """Arm angles [rad] by joint name, of the two ways to reach the point the one that is safer."""
+    """Arm angles [rad] by joint name, the safer of the two solutions; None if out of reach."""
     verdict: Verdict | None
-    """The limits held against the rover with the arm there; None where it was not asked."""
+    """The verdict with the arm at the point, or without it if the rover does not settle; None if
+    the point is out of reach."""
     prediction: PathPrediction | None
-    """Loads, utilisations and margins with the arm there, one row; None where not asked."""
+    """Loads, utilisations and margins with the arm at the point, one row; else None."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the answer as JSON can hold it; what is not known is None or left out."""
+        """Return the answer as JSON types; unknown values are None or left out."""
         names = ("possible", "reachable", "code", "reason", "target", "out_of_reach")
         answer = {name: getattr(self, name) for name in (*names, "joint_angles")}
         if self.verdict is not None:
@@ -78,25 +80,25 @@ def judge_reach(
     force: ArrayLike | None = None,
     moment: ArrayLike | None = None,
 ) -> ReachAnswer:
-    """Tell whether the arm can reach a point, and whether the rover holds a load there.
+    """Check whether the arm can reach a point, and whether the rover holds a load there.
 
-    The rover stands still; its wheels hold it with torques as the policy has them. Neither what
-    the arm's own joints can bear nor whether its links hit something is looked at.
+    The rover stands still; its wheels hold it with the torques of the policy. The strength of the
+    arm's joints and collisions of its links are not checked.
 
     Args:
         rover: The rover; it must have a manipulator.
         terrain: The ground.
         pose: (3,) x, y [m] and yaw [rad] of base_link, map frame.
-        target: (3,) where the tip of the arm shall be [m], map frame.
-        options: As for `sweep_path`; arm angles and tool load follow from the other arguments.
-        force: (3,) force [N] that the surroundings exert on the tip there, map frame: a tool that
-            presses on the ground is pushed up; None: none.
-        moment: (3,) moment [N m] that they exert on it, map frame; None: none.
+        target: (3,) point that the tip of the arm has to reach [m], map frame.
+        options: As for `sweep_path`; its arm angles and tool load are ignored.
+        force: (3,) force of the surroundings on the tip [N], map frame (default: none). A tool
+            that presses on the ground is pushed up.
+        moment: (3,) moment of the surroundings on the tip [N m], map frame (default: none).
 
     Raises:
         PoseError: A pose of wrong shape, or not finite.
         ModelError: A rover without an arm, or an option that this rover cannot have.
-        SoilError: A soil that is not among the presets.
+        SoilError: A soil that is not a preset.
     """
     arm = rover.manipulator
     if arm is None:
@@ -197,6 +199,6 @@ def _describe_limits(arm: Manipulator, local: np.ndarray) -> str:
 
 def _attitude(standing: PathPrediction) -> np.ndarray:
     angles = [standing.poses[0, 2], standing.pitch[0], standing.roll[0]]
-    from scipy.spatial.transform import Rotation  # long to import
+    from scipy.spatial.transform import Rotation  # imported here: it is slow
 
     return Rotation.from_euler("ZYX", angles).as_matrix()

@@ -1,8 +1,8 @@
-"""The range of torques of each wheel, at each waypoint, with which all constraints can be kept.
+"""Torque ranges: the lowest and highest torque of each wheel that can keep all constraints.
 
-The forces that balance the rover and keep the paper's three constraints are a convex set. The
-lowest and the highest torque of a wheel in it are second-order cone programs; Clarabel solves
-them.
+The forces that balance the rover and keep the paper's three constraints form a convex set. The
+lowest and the highest torque of a wheel in this set are second-order cone programs (SOCP), which
+Clarabel solves.
 
 Source: Goulart and Chen, Clarabel: An interior-point solver for conic programs with quadratic
 objectives, arXiv:2405.12762, 2024.
@@ -26,15 +26,15 @@ from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 EQUAL_SHARES = 1e-9
-"""Lateral forces, in weights, by which shares still count as equal."""
+"""Largest change of a lateral force [rover weights] at which the shares still count as equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueRanges:
-    """For each of n waypoints and wheel the torques that a set within all constraints can have."""
+    """Torque range of each wheel at n waypoints, under all constraints; arrays are read-only."""
 
     feasible: np.ndarray
-    """(n,) True where some torques keep all constraints."""
+    """(n,) True where a set of torques keeps all constraints."""
     lowest: Floats
     """(n, 6) lowest torque of each wheel [N m], NaN where not feasible or not found."""
     highest: Floats
@@ -46,14 +46,15 @@ class TorqueRanges:
 
 @dataclass(frozen=True, eq=False)
 class _FeasibleSet:
-    """The forces that keep the constraints, in units of the weight, linear in x (k,).
+    """The forces that keep the constraints, over the rover's weight, linear in x (k,).
 
-    A row is a constant and its k slopes: row @ [1, *x].
+    A row holds a constant and k slopes; its value is row @ [1, *x].
     """
 
     rows: np.ndarray
-    """(30, 1 + k) for each wheel utmost shear u nu N, shear along T + u R and across S, which
-    form a second-order cone; then room below the torque limit (6) and above its negative (6)."""
+    """(30, 1 + k) rows. First three per wheel, a second-order cone: largest shear force, shear
+    force along the wheel and across it. Then the distance of each torque below its upper limit
+    (6) and above its lower limit (6), over the wheel radius."""
     thrust: np.ndarray
     """(6, 1 + k) torque over the wheel radius: T + R."""
 
@@ -61,24 +62,25 @@ class _FeasibleSet:
 def find_torque_ranges(
     rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
 ) -> TorqueRanges:
-    """Find for each wheel the torques that keep all constraints, whatever the others then do.
+    """Find the torque range of each wheel in which all constraints can be kept.
 
-    The constraints are sqrt(T^2 + S^2) <= mu N, N >= 0 and |torque| <= largest torque, the first
-    and last within the rover's safety limits. Each wheel's range is with the other wheels' torques
-    free; not all torques within the ranges go together. Lateral forces are as in policy "optimal":
-    equal shares where these do, else free. On yielding soil, shear strength and resistance grow in
-    proportion to the load from what they are at the torques of that policy.
+    The constraints are sqrt(T^2 + S^2) <= mu N, N >= 0 and |torque| <= largest torque; the first
+    and the last include the rover's safety limits. The other wheels' torques are free in the range
+    of a wheel, so not every combination of torques within the ranges is feasible. Lateral forces
+    are as in policy "optimal": equal shares if these are feasible, else free. On yielding soil,
+    shear strength and resistance are taken as proportional to the load, with the values at the
+    torques of that policy as reference.
 
     Args:
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        options: As for `sweep_path`; its policy is not looked at.
+        options: As for `sweep_path`; its policy is ignored.
 
     Raises:
         PoseError: Poses of wrong shape, or not finite.
-        ModelError: An argument that makes no sense.
-        SoilError: A soil that is not among the presets.
+        ModelError: An option that this rover cannot have.
+        SoilError: A soil that is not a preset.
     """
     poses = check_poses(poses)
     model = pack_model(rover, terrain, replace(options, policy="optimal"))
@@ -97,7 +99,7 @@ def find_torque_ranges(
             _describe_set(rover, model, work.balance, results[i])
         )
     scale = model.record.linkage.radius * model.record.linkage.mass * model.record.linkage.gravity
-    most = model.settings.allowed_torque  # the solver keeps its constraints to 1e-8
+    most = model.settings.allowed_torque  # Clarabel's tolerance is 1e-8
     lowest, highest = (np.clip(scale * ends, -most, most) for ends in (lowest, highest))
     return TorqueRanges(feasible, lowest, highest)
 
@@ -130,13 +132,13 @@ def _describe_set(rover: Rover, model: PackedModel, balance: Any, result: Any) -
 
 
 def _find_extremes(forces: _FeasibleSet) -> tuple[Floats, Floats]:
-    """Return the lowest and highest thrust (6,) of each wheel; NaN where the solver gives up."""
-    import clarabel  # takes a quarter of a second, with scipy.sparse
+    """Return the lowest and highest thrust (6,) of each wheel; NaN where the solver fails."""
+    import clarabel  # imported here: it takes 0.25 s, with scipy.sparse
     from scipy.sparse import csc_matrix
 
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    settings.equilibrate_enable = False  # in units of the weight all numbers are about one
+    settings.equilibrate_enable = False  # scaled by the weight, all numbers are about 1
     cones = [clarabel.SecondOrderConeT(3)] * 6 + [clarabel.NonnegativeConeT(12)]
     k = forces.thrust.shape[1] - 1
     solver = clarabel.DefaultSolver(

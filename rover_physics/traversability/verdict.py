@@ -1,4 +1,4 @@
-"""Safety limits held against a prediction: whether each waypoint is passable, and if not, why."""
+"""Verdict on a prediction: whether each waypoint keeps the safety limits, and if not, why."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -27,9 +27,11 @@ CODES = (
     "belly",
     "trapped",
 )
+"""Codes of a verdict; the first that applies is the reason of a waypoint."""
 UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
-"""Limits that do not count while a wheel rolls off an edge."""
+"""Codes of limits that do not count while a wheel rolls off an edge."""
 _LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
+"""Codes of limits that are lower bounds."""
 _PLACELESS = {
     PoseStatus.OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
     PoseStatus.UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
@@ -46,14 +48,14 @@ _PLACELESS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a path is traversable, and the physical reason where it is not."""
+    """Whether a path is traversable, and the physical reason if it is not."""
 
     traversable: bool
     """True if every waypoint is passable."""
     reasons: tuple[str, ...]
-    """For each waypoint the reason why it is not passable, empty where it is."""
+    """For each waypoint the reason why it is not passable, empty if it is."""
     codes: tuple[str, ...]
-    """For each waypoint one of CODES, empty where it is passable."""
+    """For each waypoint one of CODES, empty if it is passable."""
     first_failure: int
     """Index of the first waypoint that is not passable, -1 if none."""
     code: str
@@ -63,7 +65,7 @@ class Verdict:
     policy: str
     """Torque policy that was assumed."""
     min_tip_over_ratio: float
-    """Smallest tip-over ratio on the settled part of the path, NaN if none is settled."""
+    """Smallest tip-over ratio on the settled part of the path, NaN if no pose is settled."""
     max_friction_utilisation: float
     """Largest friction utilisation on the settled part."""
     max_torque_saturation: float
@@ -77,28 +79,28 @@ class Verdict:
     max_sinkage: float
     """Largest sinkage of a wheel on the settled part [m]; 0 on ground that does not yield."""
     map_sigmas: float = 0.0
-    """Standard deviations by which the heights of the map may be wrong; 0 where it is exact."""
+    """Number of standard deviations by which the map's heights may be wrong; 0 if it is exact."""
     tip_over_ratio_bound: float = float("nan")
-    """Smallest tip-over ratio that is possible then, NaN where the map is exact."""
+    """Smallest possible tip-over ratio within these standard deviations, NaN if none is known."""
     friction_utilisation_bound: float = float("nan")
-    """Largest possible friction utilisation."""
+    """Largest possible friction utilisation, NaN if none is known."""
     torque_saturation_bound: float = float("nan")
-    """Largest possible torque saturation."""
+    """Largest possible torque saturation, NaN if none is known."""
     tilt_bound: float = float("nan")
-    """Largest possible tilt of the body [rad]."""
+    """Largest possible tilt of the body [rad], NaN if none is known."""
     belly_clearance_bound: float = float("nan")
-    """Smallest possible belly clearance [m]."""
+    """Smallest possible belly clearance [m], NaN if none is known."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the verdict as JSON can hold it: lists for tuples, None for NaN and infinity."""
+        """Return the verdict as JSON types: lists for tuples, None for NaN and infinity."""
         return to_plain({field.name: getattr(self, field.name) for field in fields(self)})
 
 
 def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
-    """Hold a prediction against the limits of the rover.
+    """Compare a prediction with the limits of the rover.
 
-    The first limit broken, in the order of CODES, is the reason of a waypoint; a limit broken on
-    the way to a waypoint counts there, unless the waypoint has a reason of its own.
+    The reason of a waypoint is the first broken limit in the order of CODES. A limit broken on the
+    way to a waypoint counts there if the waypoint itself keeps all limits.
     """
     found, extremes = _hold_against_limits(rover, prediction)
     between = prediction.between
@@ -133,12 +135,12 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
 
 
 def find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
-    """Return code and reason of each row of a prediction, empty where passable."""
+    """Return code and reason of each row of a prediction, empty if passable."""
     return _spread_out(_hold_against_limits(rover, prediction)[0], len(prediction.poses))
 
 
 def _spread_out(found: dict[int, tuple[str, str]], n: int) -> tuple[list[str], list[str]]:
-    """Return code and reason of each of n rows, empty where none was found."""
+    """Return code and reason of each of n rows, empty if none was found."""
     codes, reasons = [""] * n, [""] * n
     for row, (code, reason) in found.items():
         codes[row], reasons[row] = code, reason
@@ -148,7 +150,7 @@ def _spread_out(found: dict[int, tuple[str, str]], n: int) -> tuple[list[str], l
 def _hold_against_limits(
     rover: Rover, prediction: PathPrediction
 ) -> tuple[dict[int, tuple[str, str]], dict[str, float]]:
-    """Return code and reason of the rows that aren't passable, and the extreme of each limit."""
+    """Return code and reason of the impassable rows, and the extreme value of each limit."""
     found = {
         row: _PLACELESS[PoseStatus(prediction.status[row])]
         for row in np.flatnonzero(prediction.status != PoseStatus.SETTLED).tolist()
@@ -169,6 +171,6 @@ def _hold_against_limits(
 
 
 def _where_forces_count(prediction: PathPrediction) -> np.ndarray | bool:
-    """Return (n,) False where a wheel rolls off an edge, True where none does anywhere."""
+    """Return (n,) False where a wheel rolls off an edge, or a single True if none ever does."""
     falling = prediction.falling
     return ~np.asarray(falling.any(axis=1)) if falling.any() else True
