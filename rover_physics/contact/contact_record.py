@@ -53,7 +53,7 @@ CONTACTS = record_type(
     ("noted_circle", np.int64, (6,)),  # circle of noted_gap
     ("first_gap", float, (6, MAX_CIRCLES)),  # smallest gap of each circle in the last scan [m]
     ("first_row", np.int64, (6, MAX_CIRCLES)),  # sample row of first_gap
-    ("second_gap", float, (6, MAX_CIRCLES)),  # smallest gap in other rows than around first_row [m]
+    ("second_gap", float, (6, MAX_CIRCLES)),  # smallest gap away from first_row [m]
     ("second_row", np.int64, (6, MAX_CIRCLES)),  # sample row of second_gap
 )
 """Contacts of the six wheels, and notes of the search; written by `find_contact`."""

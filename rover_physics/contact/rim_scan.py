@@ -62,7 +62,7 @@ def _find_max_below_half(model, work, wheel, half):
     forward, up, centres = placement.forward, placement.up, placement.centres
     scale = ground.inverse_resolution
     along = 0.5 * samples.radius
-    # Horizontal: half the camber's sideways shift of the lowest point, plus half the wheel's width.
+    # Horizontal: half the sideways shift of the lowest point by camber, plus half the width.
     aside = along * np.sqrt(up[0] * up[0] + up[1] * up[1]) + samples.half_width
     gx = centres[wheel, 0] - ground.x0 + samples.radius * (half * forward[0] - 0.5 * up[0])
     gy = centres[wheel, 1] - ground.y0 + samples.radius * (half * forward[1] - 0.5 * up[1])
@@ -80,7 +80,7 @@ def _scan_inside(model, work, wheel, tops, near):
     A row holds the samples at one angle. The start row, where the wheel was nearest before, comes
     first. Then follow the rows from the lowest one to the rear, and to the front. A direction ends
     once the gap to the highest ground exceeds the smallest gap by more than the reach. The loop
-    reads local variables only, because the compiler reloads arrays after each write.
+    reads local variables, because the compiler must assume that a write may change any array.
 
     Args:
         model: A record with `ground` and `samples`.

@@ -1,1 +1,1 @@
-"""What the ground's forces are: balance, torques, soil, tip-over measures."""
+"""Forces between wheels and ground: equilibrium, torques, soil, tip-over measures."""

@@ -1,13 +1,14 @@
 """Static equilibrium of a settled rover: wheel loads for given torques (paper 3.2 in 3-D).
 
 In the contact frame of a wheel, n points from the ground to the wheel's centre, a is the axis of
-the wheel and t = a x n points forward along the ground; the ground's force is N n + T t + S a.
-Nine equations hold: six for the whole rover about its body origin, one about each bogie pivot for
-what hangs on the bogie (eq 15), and the differential's, which passes equal moments from both
-rockers (eq 14 for both sides). The unknowns are six N, the lateral forces' S_i = s0 + s1 x_i
-(the paper's equal share, and the linear term that yaw balance needs) and the common part of T;
-differences between the wheels' T are free: the over-actuation. Lengths are scaled by a reference
-length and forces by the weight, so that the system is of order one for any rover.
+the wheel and t = a x n points forward along the ground. The force of the ground on the wheel is
+N n + T t + S a. There are nine equations: six for the whole rover about its body origin, one about
+each bogie pivot for the bogie and its wheels (eq 15), and one for the differential, which passes
+equal moments from both rockers (eq 14 for both sides). The nine unknowns are six N, the lateral
+forces S_i = s0 + s1 x_i (the paper's equal share, and a linear term for the yaw balance), and the
+common part of T. Differences between the wheels' T are free, because the rover is over-actuated.
+Lengths are scaled by a reference length and forces by the weight, so that the numbers of the
+system are of order 1 for any rover.
 """
 
 import numpy as np
@@ -17,12 +18,13 @@ from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
 
 UNKNOWNS = 9
+"""Number of equations and unknowns of the equilibrium."""
 FREE_TORQUES = 5
-"""Degrees of freedom of the torques: how much more each wheel but the last pulls than all do."""
+"""Degrees of freedom of the torques: extra traction of each wheel except the last."""
 FREE_FORCES = 9
-"""With four more of the lateral forces, which the suspension passes from wheel to wheel."""
+"""Degrees of freedom of torques and lateral forces together; four are lateral."""
 FREE_LATERAL = np.array([0, 1, 3, 4])
-"""Wheels whose lateral forces are the further degrees; the equal share makes up for them."""
+"""Wheels with a free extra lateral force; the common lateral terms s0 and s1 balance it."""
 
 
 BALANCE = record_type(
@@ -33,19 +35,26 @@ BALANCE = record_type(
     ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
     ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
 )
-"""How the forces of a settled rover depend on its wheel tractions, in units of its weight.
+"""Forces of a settled rover as linear functions of its free forces, over the rover's weight.
 
-Column 0 holds the forces when all wheels pull alike; column 1 + k, k < 5, how they change when
-wheel k pulls one unit more and the common pull makes up for it; column 6 + k how they change when
-wheel FREE_LATERAL[k] is pushed one unit more along its axis and the lateral shares make up for it.
+Column 0 holds the forces with equal traction on all wheels. Column 1 + k, k < 5, holds their
+change per unit of extra traction of wheel k; the common traction balances it. Column 6 + k holds
+their change per unit of extra lateral force on wheel FREE_LATERAL[k]; the common lateral terms
+balance it.
 """
 
 
 @kernel
 def balance_forces(linkage, placement, contacts, columns, balance):
-    """Solve the balance of a settled rover into `balance`; False where the equations are singular.
+    """Solve the equilibrium of a settled rover; return False if the equations are singular.
 
-    `columns` is 1 for the common pull alone, 6 with the changes by torques, 10 with all.
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT, with the centres of mass of the parts.
+        contacts: CONTACTS.
+        columns: Number of columns to solve: 1 for equal traction, 6 with extra tractions, 10 with
+            extra lateral forces, too.
+        balance: BALANCE, written.
     """
     write_equations(linkage, placement, contacts, columns, balance)
     return solve_equations(linkage, placement, columns, balance)
@@ -53,7 +62,7 @@ def balance_forces(linkage, placement, contacts, columns, balance):
 
 @kernel
 def solve_equations(linkage, placement, columns, balance):
-    """Solve the equations of `write_equations` into `balance`; False where they are singular."""
+    """Solve the equations of `write_equations`; return False if they are singular."""
     B = balance.B
     if not solve_in_place(balance.A, B, UNKNOWNS, columns):
         return False
@@ -71,7 +80,7 @@ def solve_equations(linkage, placement, columns, balance):
 
 @kernel
 def _axle(linkage, placement, wheel):
-    """Return the place of a wheel along the body, in reference lengths."""
+    """Return the position of a wheel along body x [reference lengths]."""
     R, origin, centres = placement.R, placement.origin, placement.centres
     along = 0.0
     for i in range(3):
@@ -94,8 +103,9 @@ def _write_frames(placement, contacts, frames):
 def write_equations(linkage, placement, contacts, columns, balance):
     """Write the nine equations: forces, moments about the origin, bogies, differential.
 
-    Rows of balance.A and balance.B: forces along map x, y, z in weights; moments about map x, y, z
-    in weights times the reference length; right and left bogie; differential.
+    Rows of balance.A and balance.B: forces along map x, y, z over the weight; moments about map x,
+    y, z over weight times reference length; right and left bogie; differential. Arguments are as
+    for `balance_forces`.
     """
     A, B, frames = balance.A, balance.B, balance.frames
     _write_frames(placement, contacts, frames)
@@ -151,8 +161,8 @@ def write_equations(linkage, placement, contacts, columns, balance):
 def _add_column(matrix, column, share, wrench, side):
     """Add `share` of a wheel's unit force to a column of the nine equations.
 
-    `wrench` holds force (3) and moment about the origin (3), the moment about the bogie pivot of
-    its side, and its part of the differential's equation.
+    `wrench` holds the force (3), the moment about the origin (3), the moment about the bogie pivot
+    of its side, and its term in the equation of the differential.
     """
     fx, fy, fz, mx, my, mz, about_bogie, about_differential = wrench
     matrix[0, column] += share * fx
@@ -167,7 +177,7 @@ def _add_column(matrix, column, share, wrench, side):
 
 @kernel
 def _moment_about(linkage, placement, pivot, force):
-    """Return the moment about the wheel axes of a force (x, y, z) at a pivot (3,)."""
+    """Return the moment about the origin along the wheel axes of a force (x, y, z) at a pivot."""
     R, origin, length = placement.R, placement.origin, linkage.length
     fx, fy, fz = force
     px = (pivot[0] - origin[0]) / length
@@ -182,7 +192,7 @@ def _moment_about(linkage, placement, pivot, force):
 
 @kernel
 def _add_weights(linkage, placement, B):
-    """Add what the weights of all parts ask of the ground to the right-hand side."""
+    """Add the weights of all parts to the right-hand side."""
     for part in range(5):
         mass = linkage.body_mass
         if part > 2:
@@ -199,7 +209,7 @@ def _add_weights(linkage, placement, B):
 
 @kernel
 def _add_tool_load(linkage, placement, B):
-    """Add what the tool's force and moment ask of the ground; they act on the body alone."""
+    """Add the tool's force and moment to the right-hand side; they act on the body."""
     weight = linkage.mass * linkage.gravity
     for i in range(3):
         force, moment = tool_load(placement.R, linkage.tool, i)
@@ -226,7 +236,7 @@ def _add_weight(linkage, placement, B, load, hangs):
     Args:
         linkage: LINKAGE.
         placement: PLACEMENT.
-        B: Right-hand sides, of which column 0 is added to.
+        B: Right-hand sides; the weight is added to column 0.
         load: (mass [kg], centre of mass (3,) [m]).
         hangs: (side, whether the part hangs on the rocker, whether on the bogie).
     """

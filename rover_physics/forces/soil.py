@@ -1,7 +1,7 @@
-"""Wheel-soil models: the slip, sinkage and torque with which a wheel gets its pull from a soil.
+"""Wheel-soil models: slip, sinkage and torque of a wheel for given forces on a soil.
 
-Coulomb friction, and Bekker's pressure-sinkage with Janosi and Hanamoto's shear for a rigid wheel.
-docs/soil.md has the formulas, their symbols and limits.
+There are two models: Coulomb friction, and for a rigid wheel Bekker's pressure-sinkage relation
+with Janosi and Hanamoto's shear relation. docs/soil.md has the formulas, symbols and limits.
 
 Source: Wong, Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 2.
 """
@@ -19,14 +19,15 @@ from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, load_soils, soi
 SOIL_MODEL, SOIL_FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(
     SOIL_NUMBERS
 )
-"""Columns of a packed soil."""
+"""Columns of the table of `pack_soils`."""
 COULOMB, BEKKER_WONG = 0.0, 1.0
 """Values of the column SOIL_MODEL."""
 MIN_FRICTION = 1e-3
-"""Effective friction of a wheel that cannot even pull itself, so that one may divide by it."""
+"""Least effective friction, for wheels without drawbar pull; above 0 because it is a divisor."""
 MODERATE_SINKAGE = 1.0 / 6.0
-"""Largest sinkage, in wheel diameters, at which Wong takes the sinkage formula to hold."""
+"""Largest sinkage [wheel diameters] at which the sinkage formula holds, according to Wong."""
 MAX_NEWTON_STEPS = 50
+"""Largest number of Newton steps of `find_mobilisation`."""
 
 
 def pack_soils(
@@ -35,16 +36,17 @@ def pack_soils(
     default: str | None = None,
     soils: Mapping[str, Soil] | None = None,
 ) -> NDArray[np.float64]:
-    """Return soils in the form the kernels read.
+    """Return a table of soils for the kernels.
 
     Args:
         names: Soils of a terrain's soil layer, ``terrain.soil_names``.
-        default: The soil where the layer says -1 or there is none; None: Coulomb friction with
-            the terrain's or the rover's own coefficient.
-        soils: Where the names are looked up; None for the presets.
+        default: Soil where the layer is -1, or everywhere without a layer (default: Coulomb
+            friction with the coefficient of the terrain or the rover).
+        soils: Soils by name (default: the presets).
 
     Returns:
-        Array (1 + number of names, 8): row 0 is the default, row 1 + k is ``names[k]``.
+        Table (1 + number of names, SOIL_NUMBERS): row 0 is the default, row 1 + k is
+        ``names[k]``.
 
     Raises:
         SoilError: A name that is not among the soils.
@@ -69,57 +71,58 @@ def _write_soil(soil: Soil, row: NDArray[np.float64]) -> None:
 
 
 class SoilWheel(NamedTuple):
-    """A wheel as the soil models need it."""
+    """Parameters of a wheel for the soil models."""
 
     radius: float
     """Radius r [m]."""
     width: float
     """Width b [m]."""
     friction: float
-    """Coulomb coefficient where a Coulomb soil has none of its own."""
+    """Coulomb coefficient for a Coulomb soil without its own."""
 
 
 class WheelOnSoil(NamedTuple):
-    """How a wheel gives the forces that are asked of it."""
+    """State of a wheel that exerts given forces."""
 
     slip_ratio: float
-    """i = 1 - v / (r omega), from -1 (braked) to 1 (spins on the spot), both also where the soil
-    cannot give the forces."""
+    """i = 1 - v / (r omega), from -1 (braking) to 1 (spinning on the spot). It is -1 or 1 if the
+    forces exceed the soil's strength."""
     sinkage: float
     """Sinkage [m]."""
     resistance: float
     """Motion resistance [N]."""
     drawbar_pull: float
-    """Largest drawbar pull [N], negative where the wheel cannot even pull itself."""
+    """Largest drawbar pull [N], negative if the resistance exceeds the thrust."""
     torque: float
     """Wheel torque [N m] that the forces need."""
     utilisation: float
-    """(T, S) relative to the largest forces in its direction, above 1 where they are beyond what
-    the soil can give, infinite where no forces in that direction are within."""
+    """(T, S) relative to the largest forces in its direction: above 1 if it exceeds the soil's
+    strength, infinite if no forces in that direction are within it."""
 
 
 @kernel
 def coulomb_slip(utilisation):
     """Return the slip ratio i = 1 - v / (r omega) on Coulomb ground.
 
-    A wheel sticks below the friction limit and spins freely above it: 0 or 1.
+    It is 0 up to the friction limit, where the wheel sticks, and 1 above, where it spins.
     """
     return 0.0 if utilisation <= 1.0 else 1.0
 
 
 @kernel
 def solve_wheel(soil, wheel, N, T, S):
-    """Find how a wheel gives the forces that the balance asks of it.
+    """Find slip, sinkage, resistance and torque of a wheel for the forces of the equilibrium.
 
     Args:
         soil: (8,) a row of `pack_soils`.
         wheel: SoilWheel.
         N: Load along the contact normal [N].
-        T: Net traction forward along the ground (drawbar pull) [N]; negative brakes.
+        T: Net traction forward along the ground (drawbar pull) [N]; negative if braking.
         S: Lateral force [N].
 
     Returns:
-        WheelOnSoil. A wheel without load has slip 1, infinite utilisation, and zeros else.
+        WheelOnSoil. A wheel without load has slip 1, infinite utilisation, torque r T, and zeros
+        otherwise.
     """
     mu, radius, width = wheel.friction, wheel.radius, wheel.width
     if not N > 0.0:
@@ -148,8 +151,9 @@ def solve_wheel(soil, wheel, N, T, S):
 def effective_friction(soil, wheel, N):
     """Return the largest drawbar pull over the load N [N], at least MIN_FRICTION.
 
-    All forces with sqrt(T^2 + S^2) up to this coefficient times N are within the soil's strength.
-    For Bekker-Wong it depends on the load. `wheel` is a SoilWheel.
+    All forces with sqrt(T^2 + S^2) up to this coefficient times N are within the soil's strength,
+    unless MIN_FRICTION applies. For Bekker-Wong it depends on the load. `soil` is a row of
+    `pack_soils`, `wheel` a SoilWheel.
     """
     mu, radius, width = wheel.friction, wheel.radius, wheel.width
     if soil[SOIL_MODEL] == COULOMB:
@@ -165,13 +169,13 @@ def effective_friction(soil, wheel, N):
 
 @kernel
 def is_sinkage_moderate(sinkage, radius):
-    """Tell whether the sinkage formula is within its limits of validity, z0 <= D / 6."""
+    """Return whether the sinkage formula is valid: z0 <= D / 6. Arguments in [m]."""
     return sinkage <= MODERATE_SINKAGE * 2.0 * radius
 
 
 @kernel
 def _own_friction(soil, mu):
-    """Return the Coulomb coefficient of a soil, else `mu`."""
+    """Return the Coulomb coefficient of a soil, or `mu` if it has none."""
     own = soil[SOIL_FRICTION]
     return own if own > 0.0 else mu
 
@@ -197,7 +201,7 @@ def motion_resistance(soil, width, sinkage):
 @kernel
 def contact_length(radius, sinkage):
     """Return the arc [m] of rim in the soil, l = r arccos(1 - z0 / r), at most a quarter."""
-    # The arcsine keeps its digits where the sinkage is small against the radius.
+    # This form is accurate for a sinkage much smaller than the radius.
     return 2.0 * radius * np.arcsin(np.sqrt(0.5 * min(sinkage / radius, 1.0)))
 
 
@@ -211,8 +215,8 @@ def shear_strength(soil, area, N):
 def thrust_at_slip(soil, radius, width, N, slip):
     """Return the thrust F [N] at a slip ratio, drawbar pull plus motion resistance.
 
-    F = (A c + N tan(phi)) (1 - K / (i l) (1 - exp(-i l / K))), of opposite sign for braking.
-    None from a wheel sunk to its axle.
+    F = (A c + N tan(phi)) (1 - K / (i l) (1 - exp(-i l / K))), negative for braking. It is 0 for a
+    wheel sunk to its axle.
     """
     sinkage = find_sinkage(soil, radius, width, N)
     if sinkage >= radius:
@@ -224,7 +228,7 @@ def thrust_at_slip(soil, radius, width, N, slip):
 
 @kernel
 def mobilised_share(x):
-    """Return 1 - (1 - exp(-x)) / x for x >= 0: how much of the strength x = i l / K mobilises."""
+    """Return 1 - (1 - exp(-x)) / x, the share of the strength mobilised at x = i l / K >= 0."""
     if x < 1e-3:
         return x * (1.0 / 2.0 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0)))
     return 1.0 + np.expm1(-x) / x
@@ -232,10 +236,10 @@ def mobilised_share(x):
 
 @kernel
 def find_mobilisation(share):
-    """Return the x >= 0 at which `mobilised_share` is `share`, from 0 to below 1.
+    """Return the x >= 0 at which `mobilised_share` is `share`, 0 <= share < 1.
 
-    The root of x (1 - share) = 1 - exp(-x). The difference of both sides is convex, so Newton's
-    steps from a bound above the root come down to it without a miss.
+    It is the root of x (1 - share) = 1 - exp(-x). The difference of both sides is convex, so
+    Newton's method converges from any start above the root.
     """
     if share < 1e-5:
         return share * (2.0 + share * 4.0 / 3.0)
@@ -251,7 +255,7 @@ def find_mobilisation(share):
 
 @kernel
 def _largest_thrust(soil, radius, sinkage, length, strength):
-    """Return the thrust [N] at slip 1; none from a wheel sunk to its axle."""
+    """Return the thrust [N] at slip 1; 0 for a wheel sunk to its axle."""
     if sinkage >= radius:
         return 0.0
     return strength * mobilised_share(length / soil[SHEAR_MODULUS])
@@ -261,13 +265,19 @@ def _largest_thrust(soil, radius, sinkage, length, strength):
 def use_of_shear(T, S, resistance, largest):
     """Return (T, S) relative to the largest forces in its direction.
 
-    The forces that the soil can give are the circle sqrt((T + R)^2 + S^2) <= F(1).
+    The soil's strength is the circle sqrt((T + R)^2 + S^2) <= F(1).
+
+    Args:
+        T: Net traction [N].
+        S: Lateral force [N].
+        resistance: Motion resistance R [N].
+        largest: Largest thrust F(1) [N].
     """
     room = (largest - resistance) * (largest + resistance)
     if room > 0.0:
         along = T * resistance
         return (along + np.sqrt(along * along + (T * T + S * S) * room)) / room
-    # Zero forces are outside of the circle: such a wheel has to be dragged by the others.
+    # T = S = 0 is outside the circle: the other wheels have to drag this wheel.
     thrust = T + resistance
     needed = np.sqrt(thrust * thrust + S * S)
     return needed / largest if needed < largest else np.inf
@@ -275,10 +285,10 @@ def use_of_shear(T, S, resistance, largest):
 
 @kernel
 def _slip_of_thrust(thrust, S, strength, shear_ratio):
-    """Return the slip ratio of a thrust within the strength; `shear_ratio` is K / l.
+    """Return the slip ratio of a thrust [N] within the strength [N]; `shear_ratio` is K / l.
 
-    Shear stress opposes shear displacement, so the longitudinal slip is the share of the thrust in
-    the whole displacement.
+    Shear stress is opposite to shear displacement. The longitudinal slip is therefore the total
+    slip times the thrust's share of the total shear force.
     """
     needed = np.sqrt(thrust * thrust + S * S)
     if needed == 0.0:

@@ -1,4 +1,4 @@
-"""Wheel forces where the ground may be soil: friction and resistance depend on the loads there."""
+"""Wheel forces on soil, where friction and resistance depend on the wheel loads."""
 
 from rover_physics.forces.soil import SoilWheel, effective_friction, solve_wheel
 from rover_physics.forces.torques import minimise_friction, take_equal_torques
@@ -7,15 +7,20 @@ from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import copy_soil, soil_row_at
 
 ROUNDS = 3
-"""Searches for the best torques, each at the loads that the one before has found."""
+"""Number of searches for the best torques; each uses the loads of the one before."""
 
 
 @kernel
 def share_forces_on_soil(model, work):
-    """Find the wheel forces for the policy asked for; leave them in `work.search`.
+    """Find the wheel forces of the policy on soil and write them into `work.search`.
 
-    The search takes friction and resistance as they are under the loads of equal torques, then
-    under the loads that it has found; the best of all these sets, equal torques included, is kept.
+    The first search uses friction and resistance at the loads of equal torques, the next ones
+    those at the loads found. The best of these sets is kept; equal torques are one of them.
+
+    Args:
+        model: A record with `ground` GROUND, `linkage` LINKAGE and `settings` SETTINGS.
+        work: WORK with contacts, balance and `search.mu`; `soils`, `best` and `search` are
+            written.
     """
     ground, linkage, settings = model.ground, model.linkage, model.settings
     search, best = work.search, work.best
@@ -51,7 +56,7 @@ def _copy(search, best):
 
 @kernel
 def _write_grip(linkage, settings, work):
-    """Write friction and resistance under the present loads into the search."""
+    """Write friction and resistance at the current loads into the search."""
     search = work.search
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
@@ -65,7 +70,7 @@ def _write_grip(linkage, settings, work):
 
 @kernel
 def _needed(linkage, settings, work):
-    """Return the largest utilisation of the soil, or of the torque where that is beyond 1."""
+    """Return the largest utilisation of the soil or, if above 1, of the allowed torque."""
     search = work.search
     weight = linkage.mass * linkage.gravity
     worst = 0.0

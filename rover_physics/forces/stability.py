@@ -1,10 +1,11 @@
 """Tip-over measures: the paper's ratio of angles, and the force-angle measure.
 
-The support polygon of a rocker-bogie rover has four corners. A bogie turns freely, so the ground
-carries it along the line through its pivot: it supports the rover where that line meets the line
-between its two contacts. The other two corners are the contacts of the wheels on the rockers. A
-rover tips over an edge of this polygon when the loads beyond the edge vanish: exactly so sideways;
-up and down a slope the tractions shift it by a few degrees.
+The support polygon of a rocker-bogie rover has four corners. A bogie turns freely, so the net
+force of the ground on it passes through its pivot: the corner is where the line through the pivot
+meets the line between the bogie's two contacts. The other two corners are the contacts of the
+wheels on the rockers. A rover tips over an edge of this polygon when the wheel loads beyond the
+edge become zero. This is exact sideways; up and down a slope the tractions shift the angle by a
+few degrees.
 
 Source: Papadopoulos and Rey, "A New Measure of Tipover Stability Margin for Mobile Manipulators",
 IEEE ICRA 1996: eqs for a_i, l_i, f_i*, theta_i, d_i and alpha = min theta_i |d_i| |f_i*|.
@@ -15,11 +16,15 @@ import numpy as np
 from rover_physics.numerics.kernels import kernel
 
 CORNERS = 4
+"""Corners of the support polygon."""
 
 
 @kernel
 def find_support(linkage, placement, contacts, corners):
-    """Write the support polygon into corners (4, 3) [m]: counter-clockwise from the rear right."""
+    """Write the support polygon into corners (4, 3) [m], map frame.
+
+    The order is counter-clockwise seen from above, from the rear right.
+    """
     for side in range(2):
         _write_side(linkage, placement, contacts, side, corners)
 
@@ -56,10 +61,10 @@ def tip_over_angles(corners, centre, force, moment):
     Args:
         corners: (k, 3) support polygon, counter-clockwise seen from above [m].
         centre: (3,) point where force and moment act, the centre of mass [m].
-        force: (3,) net force on the rover but for the ground's: weight and tool force [N].
-        moment: (3,) net moment about `centre` but for the ground's [N m].
+        force: (3,) net force on the rover without that of the ground: weight and tool force [N].
+        moment: (3,) net moment about `centre` without that of the ground [N m].
 
-    Both are negative once the net force points outside the polygon.
+    Both results are negative if the net force points outside the polygon.
     """
     smallest_angle = np.inf
     smallest_measure = np.inf
@@ -75,7 +80,8 @@ def tip_over_angles(corners, centre, force, moment):
 def measure_edge(corners, edge, centre, force, moment):
     """Return tip-over angle [rad] and force-angle measure [N m] of one edge of the polygon.
 
-    The edge leads from corner `edge` to the next one; the rest is as for `tip_over_angles`.
+    The edge is from corner `edge` to the next one. The other arguments are as for
+    `tip_over_angles`.
     """
     start, end = edge, (edge + 1) % corners.shape[0]
     ax, ay, az = (
@@ -114,7 +120,7 @@ def measure_edge(corners, edge, centre, force, moment):
 
 @kernel
 def _normal_to(axis, vector):
-    """Return the part of a vector (x, y, z) normal to a unit vector (x, y, z)."""
+    """Return the component of a vector (x, y, z) normal to a unit vector (x, y, z)."""
     ax, ay, az = axis
     x, y, z = vector
     along = ax * x + ay * y + az * z

@@ -1,11 +1,10 @@
-"""The torque set that needs least friction, in what equilibrium leaves free (policy optimal).
+"""Policy "optimal": the torques that need the least friction among those in equilibrium.
 
-Three questions in turn, each asked only as far as the next one needs: which set keeps all wheels
-on the ground, which of those keeps the torques within their limit, and which of those needs the
-least friction, sqrt(T^2 + S^2) <= u mu N at the smallest u. Each is the least level of a family
-of convex sets and is answered by the method of centres: go to the analytic centre of the set at
-a level by damped Newton steps on its self-concordant barrier, then lower the level towards what
-the centre needs.
+Three minimisations run in turn, the first two only until their constraint holds: keep all wheels
+on the ground; keep the torques within their limit; minimise the friction utilisation u with
+sqrt(T^2 + S^2) <= u mu N. Each minimises the level of a family of convex sets by the method of
+centres: damped Newton steps on a self-concordant barrier lead to the analytic centre of the set at
+a level, then the level is lowered towards the value that the centre needs.
 
 Source: Boyd and El Ghaoui, "Method of centers for minimizing generalized eigenvalues", Linear
 Algebra and its Applications 188, 1993.
@@ -21,22 +20,25 @@ from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
 
 MAX_LEVELS = 60
+"""Largest number of levels of one minimisation."""
 MAX_NEWTON_STEPS = 12
+"""Largest number of Newton steps per level."""
 STAY = 0.25
-"""Share of the old level kept above what the centre needs, so that the centre stays inside."""
+"""Fraction of the distance between old level and needed level that the new level keeps, so that
+the centre stays inside the set."""
 LOAD_KEPT = 1e-4
-"""Wheel load, in weights, that counts as on the ground."""
+"""Least wheel load [rover weights] of a wheel on the ground."""
 CENTRED = 0.1
-"""Newton decrement at which a centre is near enough."""
+"""Newton decrement at which the centre is accurate enough."""
 LEVEL_PRECISION = 5e-5
 """Relative precision of the smallest level."""
 
 
 class SearchGoal(IntEnum):
-    """What a search lowers the level of."""
+    """Quantity that a search minimises."""
 
     LOAD = 0
-    """The largest -N: the wheels are to stay on the ground."""
+    """The largest -N, so that all wheels stay on the ground."""
     TORQUE = 1
     """The largest torque."""
     FRICTION = 2
@@ -44,14 +46,14 @@ class SearchGoal(IntEnum):
 
 
 class SearchOutcome(IntEnum):
-    """What a search for the best torques came to."""
+    """Result of a search for the best torques."""
 
     FOUND = 0
-    """Torques within their limit that keep all wheels on the ground."""
+    """Found torques within their limit that keep all wheels on the ground."""
     LIFTS = 1
     """No torques keep all wheels on the ground."""
     SATURATES = 2
-    """None of those that do are within the limit."""
+    """All torques that keep the wheels on the ground exceed the limit."""
 
 
 TORQUE_SEARCH = record_type(
@@ -61,17 +63,17 @@ TORQUE_SEARCH = record_type(
     ("lateral", float, (6,)),  # S at y
     ("mu", float, (6,)),  # friction coefficients
     ("max_traction", float),  # largest torque over wheel radius; infinite: no limit
-    ("resistance", float, (6,)),  # motion resistances, against the forward way, beside T
+    ("resistance", float, (6,)),  # motion resistances; torque over radius is T + resistance
     ("H", float, (FREE_FORCES, FREE_FORCES)),  # Hessian of the barrier
     ("g", float, (FREE_FORCES, 1)),  # gradient of the barrier, then the Newton step
-    ("gradient", float, (FREE_FORCES,)),  # gradient, kept
+    ("gradient", float, (FREE_FORCES,)),  # copy of the gradient
 )
-"""Work space of the search, in units of the rover's weight."""
+"""Work space of the search; forces over the rover's weight."""
 
 
 @kernel
 def apply_torques(balance, free, search):
-    """Write the wheel forces at the first `free` degrees of y into the search."""
+    """Write the wheel forces at y into the search; only the first `free` elements of y count."""
     y = search.y
     for i in range(6):
         N, T, S = balance.normal[i, 0], balance.tangential[i, 0], balance.lateral[i, 0]
@@ -93,12 +95,18 @@ def take_equal_torques(balance, search):
 
 @kernel
 def minimise_friction(balance, max_traction, search):
-    """Find the torques that need least friction, starting from equal ones; leave them in `search`.
+    """Find the torques that need the least friction and write their forces into `search`.
 
-    `max_traction` is the largest torque over wheel radius and weight; torque also overcomes the
-    motion resistances in `search`. Lateral forces keep their equal shares where that does; where
-    it does not, friction passes them on to wheels that still hold. Returns a SearchOutcome; where
-    it is not FOUND, the set that comes nearest is left.
+    The search starts from equal torques. Lateral forces keep their equal shares if these are
+    feasible. Otherwise they are free, and wheels with friction in reserve take over.
+
+    Args:
+        balance: BALANCE with all columns.
+        max_traction: Largest torque over wheel radius and rover weight.
+        search: TORQUE_SEARCH; reads `mu` and `resistance`.
+
+    Returns:
+        A SearchOutcome. If it is not FOUND, `search` holds the forces closest to the constraint.
     """
     outcome = _search(balance, np.int64(FREE_TORQUES), max_traction, search)
     if outcome != SearchOutcome.FOUND or _needed(search, SearchGoal.FRICTION) > 1.0:
@@ -126,7 +134,7 @@ def _search(balance, free, max_traction, search):
 
 @kernel
 def _needed(search, goal):
-    """Return the level that the present forces need."""
+    """Return the smallest level whose set contains the current forces."""
     worst = -np.inf
     for i in range(6):
         if goal == SearchGoal.LOAD:
@@ -142,7 +150,7 @@ def _needed(search, goal):
 
 @kernel
 def _lower(balance, free, goal, enough, search):
-    """Lower the level of `goal` until it is `enough` or the smallest."""
+    """Lower the level of `goal` until it is at most `enough` or cannot be lowered further."""
     needed = _needed(search, goal)
     level = needed + 0.1 * abs(needed) + 1e-3
     stalled = 0
@@ -161,7 +169,7 @@ def _lower(balance, free, goal, enough, search):
 
 @kernel
 def _take_newton_step(balance, free, search):
-    """Take a damped Newton step on the barrier; False once at its minimum."""
+    """Take a damped Newton step on the barrier; return False at its minimum."""
     for k in range(free):
         search.gradient[k] = search.g[k, 0]
     if not solve_in_place(search.H, search.g, free, 1):
@@ -180,7 +188,7 @@ def _take_newton_step(balance, free, search):
 
 @kernel
 def _write_barrier(balance, free, goal, level, search):
-    """Write gradient and Hessian of the barrier of the set at `level`."""
+    """Write gradient and Hessian of the barrier of the set of `goal` at `level`."""
     search.H[:, :] = 0.0
     search.g[:, :] = 0.0
     traction = level if goal == SearchGoal.TORQUE else search.max_traction
@@ -204,7 +212,7 @@ def _write_barrier(balance, free, goal, level, search):
 
 @kernel
 def _add_log(free, row, slope, curvature, search):
-    """Add -log of a linear function's room, row[1:] its gradient; of H the lower half."""
+    """Add the barrier -log of a linear slack with gradient row[1:]; only the lower half of H."""
     for j in range(free):
         search.g[j, 0] -= slope * row[1 + j]
         for k in range(j + 1):
@@ -213,7 +221,7 @@ def _add_log(free, row, slope, curvature, search):
 
 @kernel
 def _add_cone(balance, free, i, mu, search):
-    """Add -log((mu N)^2 - T^2 - S^2) of wheel i; of H the lower half."""
+    """Add the barrier -log((mu N)^2 - T^2 - S^2) of wheel i; only the lower half of H."""
     n, t, s = balance.normal, balance.tangential, balance.lateral
     N, T, S = search.wheel_loads[i], search.tangential[i], search.lateral[i]
     room = mu * mu * N * N - T * T - S * S

@@ -1,1 +1,1 @@
-"""How numbers are computed: kernels, their records, threads, linear systems, quaternions."""
+"""Numerical tools: kernels, records, threads, linear systems, quaternions, read-only arrays."""

@@ -1,4 +1,4 @@
-"""Types of arrays, as annotations name them."""
+"""Array types for annotations."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,4 +6,4 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 """Array of double precision numbers."""
 SingleFloats = NDArray[np.float32]
-"""Array of single precision numbers, where there are many and three digits do."""
+"""Array of single precision numbers, for large results that need few digits."""

@@ -1,4 +1,4 @@
-"""How the numerical kernels are compiled: once, by numba, and cached beside their sources."""
+"""Decorators that compile kernels with Numba, and the removal of stale cached kernels."""
 
 import hashlib
 from pathlib import Path
@@ -15,45 +15,45 @@ LOOPS_ONLY = {
     "stencil": False,
     "fusion": False,
 }
-"""What numba may make parallel. Looking for more than the loop doubles the time to compile."""
+"""What Numba may make parallel: `prange` loops only. The other analyses double compile time."""
 COMPILE_OPTIONS = {
     "cache": True,
     "nogil": True,
     "error_model": "numpy",
     "fastmath": {"contract"},
 }
-"""A product and a sum may become one operation, rounded once; NaN and infinity are kept."""
+"""Options of every kernel. "contract" allows fused multiply-add; NaN and infinity stay exact."""
 
 
 def kernel(function):
-    """Compile a scalar function that other kernels call; it can't allocate, nor return an array.
+    """Compile a scalar function that kernels call; it can neither allocate nor return arrays.
 
-    Arrays are not reference-counted in it: counting every array of every argument at every call
-    took most of the time of a settled pose.
+    Numba does not count references to arrays in it. Counting them at every call took most of the
+    time of a settled pose.
     """
     return numba.njit(_nrt=False, **COMPILE_OPTIONS)(function)
 
 
 def exact_kernel(function):
-    """Compile a kernel that rounds after each operation, as numpy does."""
+    """Compile a kernel that rounds after each operation, as NumPy does."""
     return numba.njit(_nrt=False, **{**COMPILE_OPTIONS, "fastmath": False})(function)
 
 
 def allocating_kernel(function):
-    """Compile a function that makes work space for kernels."""
+    """Compile a function that may allocate arrays."""
     return numba.njit(**COMPILE_OPTIONS)(function)
 
 
 def sweep_kernel(function):
-    """Compile a function whose `prange` loop runs over the poses of a path."""
+    """Compile a function with a parallel `prange` loop, such as over poses."""
     return numba.njit(parallel=LOOPS_ONLY, **COMPILE_OPTIONS)(function)
 
 
 def drop_stale_kernels(package: Path) -> None:
-    """Remove cached kernels anywhere below `package` that were compiled from other sources.
+    """Remove all cached kernels below `package` if any of its sources has changed.
 
-    numba looks only at the file that holds a kernel, not at the files of the kernels it calls,
-    so an edit in one file would leave compiled callers in another file as they were.
+    Numba checks only the file of a kernel, not the files of the kernels that it calls. After an
+    edit in one file, callers in other files would otherwise run stale.
     """
     digest = hashlib.sha256()
     for source in sorted(package.rglob("*.py")):
@@ -69,7 +69,7 @@ def drop_stale_kernels(package: Path) -> None:
                 compiled.unlink(missing_ok=True)
         stamp.write_text(digest.hexdigest())
     except OSError:
-        return  # a read-only installation: its sources do not change under us
+        return  # a read-only installation, whose sources do not change
 
 
 drop_stale_kernels(Path(__file__).parents[1])

@@ -1,4 +1,4 @@
-"""Solving a small dense linear system inside a kernel."""
+"""Solver for small dense linear systems inside kernels."""
 
 from rover_physics.numerics.kernels import kernel
 
@@ -8,7 +8,7 @@ def solve_in_place(A, B, n, m):
     """Solve A X = B by Gaussian elimination with partial pivoting, overwriting both.
 
     A (n, n) and B (n, m) are the upper left parts of the arrays; on return B holds X. Returns
-    False where A is singular to working precision.
+    False if no pivot of A is above 1e-12; A should be scaled to order 1.
     """
     for k in range(n):
         pivot = k

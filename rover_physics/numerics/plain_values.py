@@ -1,4 +1,4 @@
-"""Results as JSON can hold them."""
+"""Conversion of results to JSON types."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ _PLAIN = (str, int, bool, type(None))
 
 
 def to_plain(value: Any) -> Any:
-    """Return a value of JSON's own types: numpy unwrapped, numbers that are not finite as None."""
+    """Return a value as JSON types: arrays as lists, numbers that are not finite as None."""
     if type(value) in _PLAIN:
         return value
     if isinstance(value, Mapping):

@@ -1,8 +1,8 @@
-"""Unit quaternions: from and to roll, pitch and yaw, and as rotation matrices.
+"""Unit quaternions: conversions from and to roll, pitch and yaw, and to rotation matrices.
 
-A quaternion turns vectors of the body frame into the map frame. The order of its elements is part
-of each function's name: `xyzw` as in ROS messages, `wxyz` as in MuJoCo and viser. Roll, pitch and
-yaw [rad] are those of R = Rz(yaw) Ry(pitch) Rx(roll).
+A quaternion rotates vectors from the body frame to the map frame. Function names state the order
+of its elements: `xyzw` as in ROS messages, `wxyz` as in MuJoCo and viser. Roll, pitch and yaw
+[rad] are defined by R = Rz(yaw) Ry(pitch) Rx(roll).
 """
 
 import math
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rover_physics.numerics.arrays import Floats
 
 Quaternion = Sequence[float] | Floats
-"""Four numbers in the order that the function's name says."""
+"""Four numbers, in the order that the function's name states."""
 
 
 def xyzw_from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Floats:
@@ -43,7 +43,7 @@ def xyzw_from_yaw(yaw: float) -> tuple[float, float, float, float]:
 
 
 def wxyz_about_y(angle: float) -> Floats:
-    """Return the quaternion w, x, y, z (4,) of a right-handed turn about +y by an angle [rad]."""
+    """Return the quaternion w, x, y, z (4,) of a rotation about +y by an angle [rad]."""
     return np.array([np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0])
 
 
@@ -62,7 +62,7 @@ def rpy_from_xyzw(xyzw: Quaternion, squared_norm: float = 1.0) -> tuple[float, f
 
     Args:
         xyzw: The quaternion.
-        squared_norm: Its squared length, where that is not 1 to rounding.
+        squared_norm: Its squared norm (default 1).
     """
     x, y, z, w = xyzw
     roll = math.atan2(2.0 * (w * x + y * z), squared_norm - 2.0 * (x * x + y * y))
@@ -72,9 +72,9 @@ def rpy_from_xyzw(xyzw: Quaternion, squared_norm: float = 1.0) -> tuple[float, f
 
 
 def forward_from_xyzw(xyzw: Quaternion) -> tuple[float, float]:
-    """Return the x and y of the body's forward axis in the map frame.
+    """Return x and y of the body's forward axis in the map frame.
 
-    Both are near 0 where that axis is vertical: such a body has no heading.
+    Both are near 0 if that axis is vertical; such a body has no heading.
     """
     x, y, z, w = xyzw
     return w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z)

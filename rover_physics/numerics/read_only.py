@@ -1,4 +1,4 @@
-"""Arrays that cannot be changed behind the back of those who have worked something out of them."""
+"""Read-only arrays, so that results derived from an array cannot become stale."""
 
 from dataclasses import fields
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def is_frozen(array: np.ndarray) -> bool:
-    """Tell whether neither an array nor what it is a view of can be written into."""
+    """Return whether an array and all arrays that it is a view of are read-only."""
     owner: Any = array
     while isinstance(owner, np.ndarray):
         if owner.flags.writeable:
@@ -17,9 +17,9 @@ def is_frozen(array: np.ndarray) -> bool:
 
 
 def freeze_array(array: np.ndarray) -> np.ndarray:
-    """Return an array that nobody can write into: the same one if so already, else a copy.
+    """Return a read-only array: the same one if `is_frozen`, else a copy.
 
-    Whoever has made an array for this alone saves the copy by `seal_array`.
+    `seal_array` avoids the copy for an array that is used nowhere else.
     """
     if is_frozen(array):
         return array
@@ -29,9 +29,9 @@ def freeze_array(array: np.ndarray) -> np.ndarray:
 
 
 def seal_array(array: np.ndarray) -> np.ndarray:
-    """Make an array read-only in place, with all that it is a view of, and return it.
+    """Make an array and all arrays that it is a view of read-only in place, and return it.
 
-    For whoever has made the array and keeps no other use of it.
+    Use it for a new array that is used nowhere else.
     """
     owner: Any = array
     while isinstance(owner, np.ndarray):
@@ -41,7 +41,7 @@ def seal_array(array: np.ndarray) -> np.ndarray:
 
 
 def freeze_fields(record: Any) -> None:
-    """Make all arrays of a dataclass read-only in place; they must belong to it alone."""
+    """Make all arrays of a dataclass read-only in place; no one else may write into them."""
     for field in fields(record):
         value = getattr(record, field.name)
         if isinstance(value, np.ndarray):

@@ -1,4 +1,4 @@
-"""How many threads a sweep is worth: to wake them takes longer than a short sweep takes alone."""
+"""Number of threads of a sweep; for a short sweep, waking threads takes longer than the sweep."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,12 +6,12 @@ from contextlib import contextmanager
 import numba
 
 MAX_SERIAL_POSES = 2000
-"""Poses under equal torques, or what takes as long, up to which one thread works alone."""
+"""Largest number of poses with equal torques, or equivalent effort, that use one thread."""
 
 
 @contextmanager
 def limit_threads(poses: int) -> Iterator[int]:
-    """Let kernels use as many threads as they may, or one if there are few `poses`; yield it."""
+    """Set the number of threads, one for few `poses`, else all that Numba allows; yield it."""
     allowed = numba.get_num_threads()
     used = allowed if poses > MAX_SERIAL_POSES else 1
     if used == allowed:

@@ -75,7 +75,7 @@ def ask_for_ways_out(
 
 
 def _find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
-    """Return (n,) True at or just after places where the forces of the way in do not allow a return.
+    """Return (n,) True at or just after places where the forces of the way in allow no return.
 
     Under policy "optimal" other torques may allow it; these are only the places to check.
     """
