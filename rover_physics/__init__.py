@@ -1,7 +1,7 @@
-"""The quasi-static model of a rocker-bogie rover on uneven ground: numpy in, dataclasses out.
+"""Quasi-static model of a rocker-bogie rover on uneven ground: NumPy in, dataclasses out.
 
-The names below are the API. Each is imported when it is first used, so that a program that needs
-a rover file alone does not wait for the compiled model.
+The names below are the API. Each is imported on first use, so a program that only reads a rover
+file does not load the compiled model.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""The exceptions of the package, all of them below RoverError."""
+"""Exceptions of the package; RoverError is their root."""
 
 
 class RoverError(Exception):
@@ -6,7 +6,7 @@ class RoverError(Exception):
 
 
 class RoverFileError(RoverError):
-    """A rover file with a missing, unknown or impossible key; the text names the dotted key."""
+    """A rover file with a missing, unknown or invalid key; the text names the dotted key."""
 
 
 class TerrainError(RoverError):
@@ -18,7 +18,7 @@ class PoseError(RoverError):
 
 
 class ModelError(RoverError):
-    """A model argument outside its range, such as an unknown policy or a friction of zero."""
+    """A model argument out of its range, such as an unknown policy or a friction of zero."""
 
 
 class SoilError(RoverError):

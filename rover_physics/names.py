@@ -1,4 +1,4 @@
-"""Names of wheels, sides and joints in the order of every array, and of the torque policies."""
+"""Names of wheels, sides and joints, in the order of all arrays, and names of torque policies."""
 
 WHEELS = (
     "rear_right",
@@ -20,11 +20,11 @@ WHEEL_POSITIONS = ("rear", "middle", "front")
 """Names of the wheels of one side, rear to front; the keys of ``suspension.wheels``."""
 
 SUSPENSION_JOINTS = ("rocker_right", "rocker_left", "bogie_right", "bogie_left")
-"""Suspension joints as they are called in joint messages."""
+"""Names of the suspension joints in joint messages."""
 
 WHEEL_JOINTS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
-"""Wheel drive joints as they are called in joint messages, in wheel order."""
+"""Names of the wheel drive joints in joint messages, in wheel order."""
 
 EQUAL, OPTIMAL = "equal", "optimal"
 TORQUE_POLICIES = (EQUAL, OPTIMAL)
-"""Torque policies: all wheels pull alike; the torques that need the least friction."""
+"""Torque policies: equal torques on all wheels; the torques that need the least friction."""

@@ -1,4 +1,4 @@
-"""Compiles all kernels that a question needs, or loads them from their cache."""
+"""Compilation of the kernels of predictions and bounds, or their loading from the cache."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from rover_physics.terrain.grid import Terrain
 
 
 def warm_up() -> None:
-    """Compile the kernels, or load them from the cache, by sweeping a short way up a step."""
+    """Compile the kernels, or load them from the cache, by a short prediction up a step."""
     rover, layer = load_rover("lsr1"), np.ones((64, 64))
     step = Terrain(np.where(np.arange(64) > 40, 0.1, 0.0) * layer, 0.05, (-1.6, -1.6))
     poses = np.zeros((8, 3))

@@ -1,1 +1,1 @@
-"""What an uncertain map leaves open: bounds on all that is predicted."""
+"""Bounds on predictions over uncertain maps."""

@@ -1,4 +1,4 @@
-"""Bounds on how far the belly stays above ground whose heights are known within bounds."""
+"""Bounds on the belly clearance above ground whose heights are known within bounds."""
 
 import numpy as np
 
@@ -9,11 +9,16 @@ from rover_physics.terrain.ground import elevation_of, height_at_cell, look_up
 
 @kernel
 def bound_clearance(uncertain, work, bounds):
-    """Write the smallest and largest possible clearance [m] into bounds (2,); NaN over nothing.
+    """Write the smallest and largest possible clearance [m] into bounds (2,); NaN if unknown.
 
-    Above each cell the underside is lowest where each wheel is at the end of its interval that
-    lowers it there. The rover is placed at its nominal configuration. Second-order terms of the
-    turn, and the shift of the outline that goes with it, are added at their largest.
+    Above a cell, the underside is lowest if each wheel is at that end of its interval that lowers
+    the underside there. Largest values of the second-order terms of the rotation, and of the shift
+    of the outline by it, are added.
+
+    Args:
+        uncertain: UNCERTAIN.
+        work: BOUNDS_WORK with `spread`, and the rover placed at its nominal configuration.
+        bounds: (2,), written.
     """
     ground, belly = uncertain.nominal.ground, uncertain.nominal.linkage.belly
     placement, spread = work.rover.placement, work.spread
@@ -60,9 +65,9 @@ def bound_clearance(uncertain, work, bounds):
 
 @kernel
 def _bound_points(uncertain, work, shift, bend, least):
-    """Return smaller of `least` and the least clearance below POINTS, and the most there [m].
+    """Return the bounds on the clearance at POINTS [m]; the lower one is at most `least`.
 
-    For outlines with no known cell inside, where `belly_clearance` looks at these points.
+    It is for outlines without a known cell, where `belly_clearance` uses these points.
     """
     ground, belly = uncertain.nominal.ground, uncertain.nominal.linkage.belly
     R, origin = work.rover.placement.R, work.rover.placement.origin
@@ -86,14 +91,14 @@ def _bound_points(uncertain, work, shift, bend, least):
 
 @kernel
 def _plane_change(R, spread, dx, dy, z):
-    """Return how far the plane of the underside at (dx, dy) from the origin may fall and rise [m].
+    """Return the largest fall and rise [m] of the underside's plane at (dx, dy, z) from the origin.
 
-    A turn of d about a horizontal axis a raises the plane's point at distance p by (a x p) d seen
-    along its normal, which is what it rises vertically divided by the normal's z.
+    A rotation by d about an axis a moves the plane's point p by (a x p) d. The rise of the plane
+    above a fixed place is the component of this along the plane's normal, over the normal's z.
     """
     length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
     nx, ny = R[0, 2] / R[2, 2], R[1, 2] / R[2, 2]
-    # roll turns about the body's x axis, pitch about the horizontal axis across the heading
+    # Roll rotates about the body's x axis, pitch about the horizontal axis across the heading.
     ax, ay, az = R[0, 0], R[1, 0], R[2, 0]
     by_roll = nx * (ay * z - az * dy) + ny * (az * dx - ax * z) + (ax * dy - ay * dx)
     ax, ay = -R[1, 0] / length, R[0, 0] / length

@@ -1,9 +1,10 @@
-"""Bounds on where the wheels touch ground whose heights are known within bounds.
+"""Bounds on the wheel contacts on ground whose heights are known within bounds.
 
-A point of the rim can touch only where its gap, less the error of the height difference, is
-smaller than all gaps on the way from there to the nearest point. The error of a difference is that
-of cells that err independently; cells that err alike, as neighbours do, differ by less. It also
-counts that the wheel moves along as the others rise and fall, which changes gaps by the slope.
+A point of the rim can touch only if its gap, minus the error of the height difference, is smaller
+than all gaps between it and the nearest point. Errors of different cells are taken as independent;
+for correlated errors, as of neighbours, the error of a difference is smaller than this. The bound
+also includes that a wheel moves forward or back as other wheels rise or fall, which changes gaps
+on a slope.
 """
 
 import numpy as np
@@ -16,33 +17,34 @@ from rover_physics.numerics.records import record_type
 from rover_physics.terrain.ground import elevation_of, height_at_cell, is_cell_on_map
 
 RUNGS = 4
-"""Places between a point and the nearest one that it is held against."""
+"""Number of places between a point and the nearest point with which the point is compared."""
 MAX_CONTACT_ANGLE = np.radians(70.0)
-"""Contact angle from which on steeper ones count as that steep, where the wheel moves along."""
+"""Contact angle [rad] at which angles are clipped for the effect of forward motion on gaps."""
 SQRT2 = np.sqrt(2.0)
+"""Factor from the error of one height to that of the difference of two."""
 HALVINGS = 5
-"""How often the way from the last sample that may touch to the first that can't is halved."""
+"""Bisection steps between the last sample that may touch and the first that cannot."""
 
 RIM = record_type(
     ("gap", float, (MAX_CIRCLES, MAX_ANGLES)),  # vertical gap of each sample [m]
-    ("lowest", float, (MAX_CIRCLES, MAX_ANGLES)),  # angle of a smallest gap near, NaN if none
-    ("largest_error", float),  # of the ground anywhere near [m]
-    ("reach", float),  # how far the wheel may move forward or back [m]
+    ("lowest", float, (MAX_CIRCLES, MAX_ANGLES)),  # angle of a local minimum [rad], NaN if none
+    ("largest_error", float),  # largest error of a height near the wheel [m]
+    ("reach", float),  # largest motion of the wheel forward or back [m]
     ("nearest", float, (MAX_CIRCLES,)),  # smallest gap of each circle [m]
-    ("nearest_angle", float, (MAX_CIRCLES,)),  # contact angle there [rad]
+    ("nearest_angle", float, (MAX_CIRCLES,)),  # contact angle of that gap [rad]
 )
-"""The gaps all around a wheel."""
+"""Gaps around the rim of one wheel."""
 
 CONTACT_BOUNDS = record_type(
     ("rim", RIM),
     ("angle", float, (6,)),  # nominal contact angle [rad]
     ("angle_low", float, (6,)),  # smallest possible [rad]
     ("angle_high", float, (6,)),  # largest possible [rad]
-    ("lateral", float, (6,)),  # nominal place of the contact along the axis [m]
+    ("lateral", float, (6,)),  # nominal place of the contact along the axle [m]
     ("lateral_low", float, (6,)),  # smallest possible [m]
     ("lateral_high", float, (6,)),  # largest possible [m]
 )
-"""Where the wheels may touch."""
+"""Bounds on the contacts of the six wheels."""
 
 
 @kernel
@@ -51,7 +53,7 @@ def bound_contacts(uncertain, work, nominal):
 
     Args:
         uncertain: UNCERTAIN; the elevation of its `error` bounds the error of each height [m].
-        work: BOUNDS_WORK; its spread says how far the wheels move along.
+        work: BOUNDS_WORK; `spread.reach` is the motion of the wheels forward or back.
         nominal: NOMINAL contacts.
     """
     placement, contact_bounds = work.rover.placement, work.contact_bounds
@@ -93,7 +95,7 @@ def _find_largest_error(uncertain, work, wheel):
 
 @kernel
 def _look_around(model, rover, wheel, angle, rim):
-    """Write the gaps of all samples of a wheel, and where each circle comes nearest."""
+    """Write the gaps of all samples of a wheel, and the nearest point of each circle."""
     samples = model.samples
     s, c = np.sin(angle), np.cos(angle)
     for m in range(samples.circles):
@@ -109,9 +111,9 @@ def _look_around(model, rover, wheel, angle, rim):
 
 @kernel
 def _find_lowest(model, rover, wheel, m, rim):
-    """Write where the gap of circle m is smallest near each sample that is below its neighbours.
+    """Write the local minima of the gap of circle m, searched from each local minimum of samples.
 
-    Beside a face or on an edge much lies between two samples.
+    Next to a face or on an edge the gap changes much between two samples.
     """
     samples = model.samples
     for k in range(samples.rows):
@@ -131,10 +133,9 @@ def _find_lowest(model, rover, wheel, m, rim):
 
 @kernel
 def _gap_at(model, rover, circle, turn):
-    """Return the gap [m] at one point of the rim, NaN off known ground, and its place in cells.
+    """Return the gap [m] at one point of the rim, NaN if unknown, and its place (x, y) [cells].
 
-    `circle` is (wheel, index of its circle), `turn` (sine, cosine) of the contact angle; the place
-    is (x, y).
+    `circle` is (wheel, index of its circle), `turn` (sine, cosine) of the contact angle.
     """
     ground, samples, placement = model.ground, model.samples, rover.placement
     wheel, m = circle
@@ -153,9 +154,9 @@ def _gap_at(model, rover, circle, turn):
 
 @kernel
 def _error_between(error, a, b):
-    """Return a bound on the error [m] of the height difference of two places, in cells.
+    """Return a bound on the error [m] of the height difference of two places (x, y) [cells].
 
-    Exact for errors that are independent from cell to cell, too large for such that are alike.
+    It is exact for independent errors of the cells, and too large for correlated ones.
     """
     total = 0.0
     for place in range(2):
@@ -175,7 +176,7 @@ def _error_between(error, a, b):
 
 @kernel
 def _weight(gx, gy, row, column):
-    """Return the share of a cell in the bilinear height at a place."""
+    """Return the weight of a cell in the bilinear height at a place."""
     return max(0.0, 1.0 - abs(gx - column)) * max(0.0, 1.0 - abs(gy - row))
 
 
@@ -201,7 +202,7 @@ def _widen(uncertain, work, wheel):
         if rim.nearest[m] - rim.nearest[best] <= reach + give:
             first, last = min(first, samples.laterals[m]), max(last, samples.laterals[m])
             _widen_angles(uncertain, work, wheel, m)
-    # Circles closer to each other than the give share the load: small errors shift it a little.
+    # Circles whose gaps differ by less than `give` share the load: small errors shift it slightly.
     share = min(1.0, largest / give)
     middle = contact_bounds.lateral[wheel]
     contact_bounds.lateral_low[wheel] = middle + share * (first - middle)
@@ -220,7 +221,7 @@ def _error_to_circle(uncertain, work, wheel, m, best):
 
 @kernel
 def _shift_between(rim, angle, other):
-    """Return how much the gaps at two contact_bounds change apart [m] as the wheel moves along."""
+    """Return the change of the gap difference of two angles [m] as the wheel moves forward."""
     angle = min(max(angle, -MAX_CONTACT_ANGLE), MAX_CONTACT_ANGLE)
     other = min(max(other, -MAX_CONTACT_ANGLE), MAX_CONTACT_ANGLE)
     return rim.reach * abs(np.tan(angle) - np.tan(other))
@@ -249,10 +250,10 @@ def _widen_angles(uncertain, work, wheel, m):
 
 @kernel
 def _find_farthest(uncertain, work, wheel, m, side):
-    """Return the last sampled angle [rad] at which circle m may touch, and the next outwards.
+    """Return the farthest angle [rad] at which circle m may touch, and the next one outwards.
 
-    Behind the nearest point (side 0) or ahead of it (1); samples count with the smallest gap
-    near them.
+    The search goes over the samples behind the nearest point (side 0) or ahead of it (1). A sample
+    counts with the local minimum near it.
     """
     samples, rim = uncertain.nominal.samples, work.contact_bounds.rim
     nearest = rim.nearest_angle[m]
@@ -283,7 +284,7 @@ def _clip_angle(angle):
 
 @kernel
 def _may_touch(uncertain, work, circle, angle, nearest):
-    """Tell whether a circle may touch at `angle` [rad] rather than on the way to `nearest`.
+    """Return whether a circle may touch at `angle` [rad] rather than between it and `nearest`.
 
     `circle` is (wheel, index of its circle).
     """

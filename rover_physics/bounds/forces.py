@@ -1,14 +1,14 @@
-"""Bounds on forces and tip-over angles over all configurations and contacts a rover may have.
+"""Bounds on forces and tip-over angles over all possible configurations and contacts of a rover.
 
-What the forces depend on are 18 numbers: the heights of the wheels, through the response of the
-configuration, and angle and place of each contact. What either end of the interval of each number
-changes tells where a force is extreme, and there the balance is solved. Heights and
-places go to their worst ends together, whatever their correlation; angles as errors under
-different wheels do that know nothing of each other: to the point of equal deviation at which the
-linear change is largest.
+The forces depend on 18 inputs: the height of each wheel, and angle and place of each contact. Each
+input has an interval. The equilibrium is solved with each input alone at either end; these gains
+give the point at which an output is extreme, and the equilibrium is solved again there. Heights
+and places take their worst ends together, whatever their correlation. Angle errors of different
+wheels count as independent: the angles take the point of equal deviation at which the linear
+change is largest.
 
-Source of the latter: Hasofer and Lind, "Exact and invariant second-moment code format", Journal of
-the Engineering Mechanics Division 100(1), 1974.
+Source for the angles: Hasofer and Lind, "Exact and invariant second-moment code format", Journal
+of the Engineering Mechanics Division 100(1), 1974.
 """
 
 import numpy as np
@@ -29,53 +29,59 @@ from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import SOIL_NUMBERS, copy_soil, friction_at, soil_row_at
 
 HEIGHT_INPUTS, ANGLE_INPUTS, PLACE_INPUTS = 0, 6, 12
-"""Where the heights of the wheels [m], the angles [rad] and the places of their contacts [m] begin
+"""First index of wheel heights [m], contact angles [rad] and contact places along the axle [m]
 among the inputs."""
 INPUT_COUNT = 18
+"""Number of inputs."""
 LOAD_OUTPUTS, PULL_OUTPUTS, SIDE_OUTPUTS, USE_OUTPUTS, TIP_OUTPUTS = 0, 6, 12, 18, 24
-"""Where loads, tractions, lateral forces (all in weights), utilisations and tip-over angles [rad]
-begin among the outputs."""
+"""First index of loads, tractions, lateral forces (over the rover's weight), utilisations and
+tip-over angles [rad] among the outputs."""
 OUTPUT_COUNT = 24 + CORNERS
+"""Number of outputs."""
 MIN_LOAD_SHARE = 1e-6
-"""Load, in weights, that counts where there is less, so that one may divide by it."""
+"""Least load [rover weights] in a utilisation, because the load is a divisor."""
 TOGETHER = 2.0
-"""Sum of the squares of the contact angles' deviations, in their intervals: the errors under
-different wheels are taken as independent, so that the probability of a sum of them is that of one
-deviation at the square root of this, not that of all angles at their ends at once."""
+"""Sum of the squares of the contact angles' deviations [half intervals]. The errors of different
+wheels count as independent, so all angles at their ends at once would be far less probable than
+the map's standard deviations."""
 MAX_SOILS = 32
 """Largest number of soils on a map, the default included."""
 
 BOX = record_type(
     ("base", float, (INPUT_COUNT,)),  # the nominal inputs
-    ("low", float, (INPUT_COUNT,)),  # their smallest
-    ("high", float, (INPUT_COUNT,)),  # and largest values
+    ("low", float, (INPUT_COUNT,)),  # smallest inputs
+    ("high", float, (INPUT_COUNT,)),  # largest inputs
     ("at", float, (INPUT_COUNT,)),  # a point of the box
-    ("value", float, (OUTPUT_COUNT,)),  # the outputs there
+    ("value", float, (OUTPUT_COUNT,)),  # the outputs at that point
     ("base_value", float, (OUTPUT_COUNT,)),  # the nominal outputs
-    ("gain_low", float, (INPUT_COUNT, OUTPUT_COUNT)),  # change of outputs, one input at its lowest
-    ("gain_high", float, (INPUT_COUNT, OUTPUT_COUNT)),  # the same with one at its highest
+    ("gain_low", float, (INPUT_COUNT, OUTPUT_COUNT)),  # change of outputs, one input at its low end
+    ("gain_high", float, (INPUT_COUNT, OUTPUT_COUNT)),  # change of outputs, one at its high end
     ("smallest", float, (OUTPUT_COUNT,)),  # smallest outputs
     ("largest", float, (OUTPUT_COUNT,)),  # largest outputs
-    ("mu_low", float, (6,)),  # smallest friction coefficient that a wheel may touch
-    ("mu_high", float, (6,)),  # largest one
-    ("soils", np.int64, (6, MAX_SOILS)),  # rows of the soils that it may touch
-    ("soil_count", np.int64, (6,)),  # number of these
-    ("soil", float, (SOIL_NUMBERS,)),  # one of them
-    ("aim", float, (OUTPUT_COUNT,)),  # weights of the outputs in the sum that is made extreme
+    ("mu_low", float, (6,)),  # smallest friction coefficient of ground that a wheel may touch
+    ("mu_high", float, (6,)),  # largest friction coefficient of that ground
+    ("soils", np.int64, (6, MAX_SOILS)),  # rows of the soils that a wheel may touch
+    ("soil_count", np.int64, (6,)),  # number of these soils
+    ("soil", float, (SOIL_NUMBERS,)),  # one of these soils
+    ("aim", float, (OUTPUT_COUNT,)),  # weights of the outputs in the sum that is maximised
     ("gain", float, (INPUT_COUNT,)),  # change of that sum with one input at its better end
-    ("end", float, (INPUT_COUNT,)),  # that end
+    ("end", float, (INPUT_COUNT,)),  # the better end of each input
     ("columns", np.int64),  # columns of the balance that the torque policy needs
 )
-"""The box of inputs, and the outputs over it."""
+"""Box of the inputs, and bounds on the outputs over it; forces over the rover's weight."""
 
 
 @kernel
 def bound_forces(model, work):
-    """Write smallest and largest outputs into `box`; False where the balance is singular.
+    """Write smallest and largest outputs into `work.box`; False if the balance is singular.
 
-    Under policy optimal the differences of the torques are those that are best for the nominal
-    rover, the common pull makes up for the rest: the best torques of any other rover need
-    no more friction than these. On soil they need no more than equal ones.
+    Under policy optimal, the torque differences are the best ones of the nominal configuration,
+    and the common traction balances the rest. The best torques of another configuration need no
+    more friction than these. On soil, equal torques are used: the best ones need no more friction.
+
+    Args:
+        model: MODEL on the nominal ground.
+        work: BOUNDS_WORK with `spread` and `contact_bounds`.
     """
     rover, box, settings = work.rover, work.box, model.settings
     _fill_box(work.spread, work.contact_bounds, box)
@@ -121,7 +127,7 @@ def _fill_box(spread, contact_bounds, box):
 
 @kernel
 def _find_grounds(model, placement, contact_bounds, box):
-    """Write friction and soils of all cells that each wheel of a placed rover may touch."""
+    """Write friction and soils of all cells that each wheel of the placed rover may touch."""
     ground, samples, settings = model.ground, model.samples, model.settings
     cell = 1.0 / ground.inverse_resolution
     layered = ground.friction != 0 or ground.soil != 0
@@ -170,7 +176,7 @@ def _note_soil(row, wheel, box):
 
 @kernel
 def _choose_torques(model, work):
-    """Balance the nominal rover and keep its torques for all others; False where singular."""
+    """Solve the nominal balance and keep its torque differences; False if it is singular."""
     rover, box, linkage = work.rover, work.box, model.linkage
     for k in range(INPUT_COUNT):
         box.at[k] = box.base[k]
@@ -190,7 +196,7 @@ def _choose_torques(model, work):
 
 @kernel
 def _evaluate(model, work):
-    """Write the outputs at the inputs `box.at`; False where the balance is singular."""
+    """Write the outputs at the inputs `box.at`; return False if the balance is singular."""
     linkage, rover, spread, box = model.linkage, work.rover, work.spread, work.box
     placement, contacts, search = rover.placement, rover.contacts, rover.search
     q = spread.trial
@@ -230,7 +236,7 @@ def _evaluate(model, work):
 
 @kernel
 def _worst_use(model, box, wheel, forces):
-    """Return the largest utilisation of a wheel on any of the grounds it may touch."""
+    """Return the largest utilisation of a wheel on all grounds that it may touch."""
     ground, linkage, settings = model.ground, model.linkage, model.settings
     N, T, S = forces
     N = max(N, MIN_LOAD_SHARE)
@@ -250,7 +256,7 @@ def _worst_use(model, box, wheel, forces):
 
 @kernel
 def _find_gains(model, work):
-    """Write what each input alone changes at either end; False where the balance is singular."""
+    """Write the change by each input alone at either end; False if the balance is singular."""
     box = work.box
     for k in range(INPUT_COUNT):
         box.at[k] = box.base[k]
@@ -279,7 +285,7 @@ def _find_gains(model, work):
 
 @kernel
 def _include_values(box):
-    """Widen the bounds to the outputs found last."""
+    """Widen the bounds to the outputs in `box.value`."""
     for output in range(OUTPUT_COUNT):
         box.smallest[output] = min(box.smallest[output], box.value[output])
         box.largest[output] = max(box.largest[output], box.value[output])
@@ -287,7 +293,7 @@ def _include_values(box):
 
 @kernel
 def _bound_output(model, work, output):
-    """Go where an output is largest and where it is smallest."""
+    """Evaluate where an output is largest and where it is smallest."""
     box = work.box
     for side in range(2):
         box.aim[:] = 0.0
@@ -297,12 +303,11 @@ def _bound_output(model, work, output):
 
 @kernel
 def _bound_use(model, work, wheel):
-    """Go where the utilisation of a wheel is largest.
+    """Evaluate where the utilisation of a wheel is largest.
 
-    The utilisation sqrt(T^2 + S^2) / (mu N) is at least u where T cos(a) + S sin(a) - u mu N >= 0
-    at some direction a. So these sums, which have no edges where T and S change their signs, are
-    taken to their extremes, at first towards each combination of signs, then in the direction
-    and at the level that were found.
+    The utilisation sqrt(T^2 + S^2) / (mu N) is at least u if T cos(a) + S sin(a) - u mu N >= 0 for
+    some direction a. These sums are smooth where T and S change sign. They are maximised first for
+    each combination of signs, then for the direction and the level found.
     """
     box = work.box
     pull = max(abs(box.smallest[PULL_OUTPUTS + wheel]), abs(box.largest[PULL_OUTPUTS + wheel]))
@@ -339,7 +344,7 @@ def _bound_use(model, work, wheel):
 
 @kernel
 def _go_to_extreme(model, work):
-    """Go where the sum of outputs that `box.aim` weighs is largest, as the gains have it."""
+    """Evaluate where, according to the gains, the sum of outputs weighted by `box.aim` peaks."""
     box = work.box
     total = 0.0
     for k in range(INPUT_COUNT):
@@ -364,10 +369,10 @@ def _go_to_extreme(model, work):
 
 @kernel
 def _share_deviation(total, box):
-    """Move the angles from their nominal values by their gains, none beyond its end.
+    """Move the angles from their nominal values in proportion to their gains, up to their ends.
 
-    `total` is the sum of the squares of their gains. What an angle at its end leaves is shared
-    among the others.
+    `total` is the sum of the squares of their gains. The deviation that an angle at its end does
+    not use is shared among the others.
     """
     left = TOGETHER
     for _ in range(6):

@@ -1,4 +1,4 @@
-"""Bounds on all that is predicted at one pose of uncertain ground, and the sweep of it."""
+"""Bounds on the prediction at one pose on uncertain ground, and their parallel sweep over poses."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,15 +30,15 @@ from rover_physics.status import BoundStatus, TorquePolicy
 from rover_physics.terrain.ground import GROUND, Ground, copy_soil
 
 BOUNDS_EFFORT = 50
-"""Time to bound a pose, in that to predict it under equal torques."""
+"""Time to bound a pose over the time to predict it with equal torques."""
 
 NOMINAL = record_type(
     ("settled", np.bool_),  # whether the pose was settled
     ("q", float, (6,)),  # configuration, as in `settling`
     ("contact_angle", float, (6,)),  # contact angles [rad]
-    ("contact_points", float, (6, 3)),  # where the wheels touch [m]
+    ("contact_points", float, (6, 3)),  # contact points [m], map frame
 )
-"""What was predicted at a pose on the ground as the map has it."""
+"""Prediction at a pose on the nominal ground, without errors."""
 
 BOUNDS = record_type(
     ("status", np.int8),
@@ -53,21 +53,21 @@ BOUNDS = record_type(
     ("torque_saturation", float, (6, 2)),
     ("sinkage", float, (6, 2)),
 )
-"""Smallest and largest values at one pose; all are as in `PathBounds`."""
+"""Smallest and largest values at one pose, with quantities and units as in `PathBounds`."""
 
 UNCERTAIN = record_type(
-    ("nominal", MODEL),  # the model on the ground in between
-    ("low", MODEL),  # the same on the lowest ground
-    ("high", MODEL),  # the same on the highest ground
-    ("error", GROUND),  # elevation: how far lowest and highest are from the ground in between [m]
+    ("nominal", MODEL),  # the model on the nominal ground
+    ("low", MODEL),  # the model on the lowest ground
+    ("high", MODEL),  # the model on the highest ground
+    ("error", GROUND),  # its elevation is the largest error of each height [m]
 )
 """A model whose ground is known within bounds."""
 
 BOUNDS_WORK = record_type(
     ("rover", WORK),  # work space of the model
-    ("spread", SPREAD),  # where the parts may be
-    ("contact_bounds", CONTACT_BOUNDS),  # where the wheels may touch
-    ("box", BOX),  # what the forces may be
+    ("spread", SPREAD),  # bounds on the configuration
+    ("contact_bounds", CONTACT_BOUNDS),  # bounds on the contacts
+    ("box", BOX),  # bounds on the forces
 )
 """Work space of one thread."""
 
@@ -81,11 +81,11 @@ class UncertainGround:
     high: Ground
     """The highest ground."""
     error: Ground
-    """Its elevation is how far both are from the ground in between [m]."""
+    """Its elevation is the largest error of each height [m]."""
 
 
 def new_bounds(n: int) -> Any:
-    """Return the bounds (n,) of n poses, all NaN."""
+    """Return BOUNDS (n,), all NaN with status 0."""
     blank = new_record(BOUNDS)
     for name in BOUNDS.names or ():
         blank[name] = 0 if name == "status" else np.nan
@@ -95,13 +95,13 @@ def new_bounds(n: int) -> Any:
 def find_bounds(
     model: PackedModel, ground: UncertainGround, poses: np.ndarray, nominal: np.ndarray
 ) -> Any:
-    """Bound what is predicted at poses; return BOUNDS (n,).
+    """Bound the prediction at poses; return BOUNDS (n,).
 
     Args:
-        model: The model on the ground in between.
+        model: The model on the nominal ground.
         ground: The bounds of the ground.
-        poses: (n, 3) x, y [m] and yaw [rad].
-        nominal: (n,) NOMINAL, what was predicted on the ground in between.
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+        nominal: (n,) NOMINAL, the prediction on the nominal ground.
     """
     bounds = new_bounds(len(poses))
     works = np.zeros(min(MAX_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
@@ -114,7 +114,7 @@ def find_bounds(
 
 
 def _pack_uncertain(model: PackedModel, ground: UncertainGround) -> Any:
-    """Return the UNCERTAIN of a model; whoever keeps it must keep the grounds."""
+    """Return the UNCERTAIN of a model; it is valid as long as the grounds live."""
     uncertain = new_record(UNCERTAIN, error=ground.error.records[0])
     for name, surface in (("nominal", None), ("low", ground.low), ("high", ground.high)):
         uncertain[name] = model.record
@@ -125,7 +125,15 @@ def _pack_uncertain(model: PackedModel, ground: UncertainGround) -> Any:
 
 @sweep_kernel
 def bound_poses(uncertains, poses, nominal, works, bounds):
-    """Bound the poses into `bounds` in chunks, as many as there are work spaces."""
+    """Bound the poses, one chunk per work space, in parallel.
+
+    Args:
+        uncertains: (1,) UNCERTAIN.
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+        nominal: (n,) NOMINAL.
+        works: (chunks,) BOUNDS_WORK.
+        bounds: (n,) BOUNDS, written.
+    """
     n, chunks = poses.shape[0], works.size
     for chunk in prange(chunks):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
@@ -135,7 +143,7 @@ def bound_poses(uncertains, poses, nominal, works, bounds):
 
 @kernel
 def bound_pose(uncertain, nominal, work, result):
-    """Bound the pose of the work space into `result`, a BOUNDS; return its BoundStatus."""
+    """Bound the pose of `work` into `result`, a BOUNDS; return its BoundStatus."""
     model, spread, box = uncertain.nominal, work.spread, work.box
     if not nominal.settled:
         return BoundStatus.NOT_SETTLED
@@ -221,10 +229,10 @@ def _write_wheel(model, wheel, box, result):
 
 @kernel
 def _let_torques_follow(settings, search, result):
-    """Widen the bounds of one set of torques to those of the sets that are best at each ground.
+    """Widen the bounds of one set of torques to those of the best torques on each possible ground.
 
-    These need no more friction than the worst wheel of the one set, within the limit of the torque
-    where the one set keeps it, and they keep the wheels on the ground where it does.
+    The best torques need no more friction than the worst wheel of this set. They keep the torque
+    limit if this set does, and keep the wheels on the ground if this set does.
     """
     allowed = settings.allowed_torque / settings.max_torque
     most_use, most_torque, least_load = 0.0, allowed, 0.0
@@ -233,12 +241,12 @@ def _let_torques_follow(settings, search, result):
         most_torque = max(most_torque, result.torque_saturation[wheel, 1])
         least_load = min(least_load, result.wheel_loads[wheel, 0])
     if settings.on_soil:
-        # There a torque beyond its limit counts like a friction utilisation beyond 1.
+        # On soil, a torque above its limit counts like a friction utilisation above 1.
         most_use = max(most_use, most_torque / allowed if most_torque > allowed else 0.0)
         most_torque = max(most_torque, most_use * allowed)
     for k in range(FREE_TORQUES, FREE_FORCES):
         if search.y[k] != 0.0:
-            # Lateral forces are passed on only where equal shares of them would slip.
+            # Lateral forces differ from equal shares only if equal shares would slip.
             most_use = max(most_use, 1.0)
     for wheel in range(6):
         result.friction_utilisation[wheel, 0] = result.torque_saturation[wheel, 0] = 0.0

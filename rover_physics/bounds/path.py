@@ -1,7 +1,7 @@
-"""Uncertain maps: bounds on what is predicted along a path.
+"""Bounds on the prediction along a path over an uncertain map.
 
-Where a terrain has a layer `elevation_std`, each height may be anywhere within so many standard
-deviations. docs/uncertainty.md has the method, what it assumes and how often it fails.
+If a terrain has a layer `elevation_std`, each height may be wrong by a given number of standard
+deviations. docs/uncertainty.md has the method, its assumptions and its failure rate.
 """
 
 from dataclasses import replace
@@ -24,7 +24,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 
 SIGMAS = 3.0
-"""Standard deviations of the map that are allowed for unless told."""
+"""Default number of standard deviations by which the map's heights may be wrong."""
 BOUNDED_VALUES = (
     "roll",
     "pitch",
@@ -37,11 +37,11 @@ BOUNDED_VALUES = (
     "torque_saturation",
     "sinkage",
 )
-"""What is bounded, by its names in `PathPrediction` and `PathBounds`."""
+"""Names of the bounded values in `PathPrediction` and `PathBounds`."""
 
 
 def check_sigmas(sigmas: float | None) -> float:
-    """Return the standard deviations to allow for, 0 for none.
+    """Return the number of standard deviations as a float, 0 for None.
 
     Raises:
         ModelError: Not a number, or negative.
@@ -62,21 +62,23 @@ def bound_path(
     options: SweepOptions = DEFAULT_OPTIONS,
     sigmas: float | None = SIGMAS,
 ) -> PathBounds | None:
-    """Bound what was predicted along a path where the heights of the map are uncertain.
+    """Bound a prediction along a path over a map with uncertain heights.
 
     Args:
         rover: The rover.
         terrain: The ground, with its layer `elevation_std`.
-        prediction: Of `sweep_path` over the same terrain.
-        options: Those that `sweep_path` had.
-        sigmas: Standard deviations by which each height may be wrong; 0 or None for no bounds.
+        prediction: The result of `sweep_path` on the same terrain.
+        options: The options of that `sweep_path`.
+        sigmas: Number of standard deviations by which each height may be wrong; 0 or None for no
+            bounds.
 
     Returns:
-        Bounds on each waypoint that contain the prediction; None where there is nothing to
-        bound: a terrain without the layer, or no standard deviations to allow for.
+        Bounds on each waypoint, which contain the prediction; None if the terrain has no such
+        layer or there are no standard deviations.
 
     Raises:
-        ModelError: `sigmas` is negative or no number, or an argument that makes no sense.
+        ModelError: `sigmas` is negative or not a number, an option that this rover cannot have, or
+            a terrain with too many soils.
         SoilError: As `sweep_path`.
     """
     allowed = check_sigmas(sigmas)
@@ -98,7 +100,7 @@ def bound_path(
 
 @lru_cache(maxsize=2)
 def _pack_uncertain(terrain: Terrain, sigmas: float) -> UncertainGround:
-    """Return the terrain as low and as high as its errors allow."""
+    """Return the lowest and highest terrain within its errors, and the errors."""
     assert terrain.elevation_std is not None
     error = np.ascontiguousarray(sigmas * terrain.elevation_std)
     heights = (terrain.elevation - error, terrain.elevation + error, error)
@@ -125,7 +127,7 @@ def _pack_nominal(prediction: PathPrediction) -> Any:
 
 
 def _include(bounds: Floats, prediction: PathPrediction, name: str) -> Floats:
-    """Return bounds widened to the predicted values; NaN where there are none."""
+    """Return bounds widened to the predicted values; NaN where there are no bounds."""
     value = getattr(prediction, name)
     widened = np.array(bounds)
     widened[..., 0] = np.minimum(bounds[..., 0], value)

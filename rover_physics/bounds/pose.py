@@ -1,10 +1,10 @@
 """Bounds on the configuration of a rover on ground whose heights are known within bounds.
 
-A wheel at a given place stands the higher the higher any of the ground below it is, so the lowest
-and the highest surface give the exact interval of its height. How the configuration follows the
-heights of the six wheels is the inverse of the derivatives of the gaps; its signs tell on which of
-the two surfaces each wheel has to stand for an angle to be extreme, and there the rover is settled
-anew, as wheels move sideways when the body turns.
+The height of a wheel at a given place increases with the height of all ground below it, so the
+lowest and the highest surface give the exact interval of its height. The change of the
+configuration with the heights of the six wheels is the inverse of the derivatives of the gaps. Its
+signs give the surface on which each wheel stands when an angle is extreme. The rover is settled
+again on these surfaces, because wheels move horizontally when the body rotates.
 
 Source of the idea, for kinematics and without forces: Otsu, Matheron, Ghosh, Toupet and Ono, "Fast
 approximate clearance evaluation for rovers with articulated suspension systems", Journal of Field
@@ -23,42 +23,43 @@ from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.status import BoundStatus, ContactStatus
 
 NOMINAL_GAP = 1e-2
-"""Largest gap, in wheel radii, at which a predicted configuration counts as standing. Beside rocks
-a search may miss the nearest point by so much; bounds are then widened by it."""
+"""Largest gap [wheel radii] of a wheel in the predicted configuration. Next to rocks the search
+may miss the nearest point by up to this; the gap then widens the bounds."""
 EXTREME_GAP = 3e-4
-"""Largest gap, in wheel radii, at which a wheel counts as standing without further doubt."""
+"""Largest gap [wheel radii] that does not widen the bounds."""
 EXTREME_STEPS = 8
+"""Largest number of contact searches, one per Newton step, for an extreme configuration."""
 MAX_GAP_LEFT = 0.2
-"""Gap, in wheel radii, from which on a wheel that finds no place counts as on an edge."""
+"""Largest gap [wheel radii] left in an extreme configuration; above, a wheel is on an edge."""
 JUMP = 0.3
-"""Rise or fall, in wheel radii, beyond what the slope makes of it, within reach of a wheel from
-which on it counts as on an edge."""
+"""Largest rise or fall [wheel radii] within reach of a wheel, in addition to that of the slope;
+above, the wheel is on an edge."""
 LEVEL_CHANGES = (0.8, 0.95, 1.1, 1.3)
-"""Rises and falls, in wheel radii, at which a wheel is looked for another place to stand. Where a
-face is higher than the wheel can roll over, there are two: at its foot and on top."""
+"""Rises and falls [wheel radii] at which a second resting place of a wheel is searched. A face too
+high to roll over has two: at its foot and on its top."""
 MAX_TURN = 0.3
-"""Largest turn of a step [rad]."""
+"""Largest change of an angle in one Newton step [rad]."""
 
 SPREAD = record_type(
     ("q", float, (6,)),  # the nominal configuration, as in `settling`
     ("rates", float, (6, 6)),  # derivatives of the gaps by q
     ("response", float, (6, 6)),  # derivatives of q by the wheels' heights
-    ("lift", float, (6, 6)),  # the same as if the ground were level under each wheel
-    ("low", float, (6,)),  # height of each wheel at its lowest, over the nominal one [m]
-    ("high", float, (6,)),  # the same at its highest [m]
+    ("lift", float, (6, 6)),  # the same for level ground under each wheel
+    ("low", float, (6,)),  # smallest height of each wheel relative to the nominal one [m]
+    ("high", float, (6,)),  # largest height of each wheel relative to the nominal one [m]
     ("q_low", float, (6,)),  # smallest q
     ("q_high", float, (6,)),  # largest q
-    ("reach", float, (6,)),  # how far each wheel may move forward or back [m]
-    ("rate", float, (6,)),  # how fast a wheel goes in one direction as q changes
-    ("trial", float, (6,)),  # a configuration on the way to an extreme one
-    ("raised", np.uint8, (6,)),  # 1 for the wheels that stand on the high surface in it
+    ("reach", float, (6,)),  # largest motion of each wheel forward or back [m]
+    ("rate", float, (6,)),  # derivatives of a wheel's forward position by q
+    ("trial", float, (6,)),  # q of the current step towards an extreme configuration
+    ("raised", np.uint8, (6,)),  # 1 for the wheels on the high surface in that configuration
 )
-"""Where a rover may be; heights are those of wheels at their nominal places."""
+"""Bounds on the configuration; heights are those of wheels at their nominal places."""
 
 
 @kernel
 def bound_configuration(uncertain, work):
-    """Write into `work.spread` how far its nominal q may change between two surfaces.
+    """Write the bounds on q between the lowest and the highest surface into `work.spread`.
 
     Args:
         uncertain: UNCERTAIN, the model on the nominal, the lowest and the highest ground.
@@ -85,7 +86,7 @@ def bound_configuration(uncertain, work):
 
 @kernel
 def _find_heights(uncertain, work):
-    """Write the response and the interval of each wheel's height; leave the nominal contacts."""
+    """Write the response and each wheel's interval of heights; keep the nominal contacts."""
     rover, spread, linkage = work.rover, work.spread, uncertain.nominal.linkage
     placement, contacts = rover.placement, rover.contacts
     place(linkage, rover.pose, spread.q, placement)
@@ -126,7 +127,7 @@ def _find_heights(uncertain, work):
 
 @kernel
 def _invert(matrix, copy, inverse):
-    """Write the inverse of a 6 x 6 matrix; False where it is singular."""
+    """Write the inverse of a 6 x 6 matrix; return False if it is singular."""
     for i in range(6):
         for k in range(6):
             copy[i, k] = matrix[i, k]
@@ -136,7 +137,7 @@ def _invert(matrix, copy, inverse):
 
 @kernel
 def _may_change_level(uncertain, work):
-    """Tell whether any wheel of the placed rover may climb or fall to another level."""
+    """Return whether any wheel of the placed rover may climb or fall to another level."""
     rover, spread, linkage = work.rover, work.spread, uncertain.nominal.linkage
     placement, contacts = rover.placement, rover.contacts
     fx, fy = placement.forward[0], placement.forward[1]
@@ -167,10 +168,10 @@ def _may_change_level(uncertain, work):
 
 @kernel
 def _find_arm(linkage, wheel, placement):
-    """Return how far a wheel is ahead of the pivot that it hangs on, and from it [m].
+    """Return the forward distance of a wheel from its pivot, and the length of the arm [m].
 
-    A wheel that rises or falls far is drawn towards its pivot, by the square of the way over
-    twice the arm: the second order that `_find_moves` leaves out.
+    A wheel that rises or falls by h moves towards its pivot by h^2 / (2 arm). `_find_moves` leaves
+    this second-order term out.
     """
     pivots = placement.bogie_pivots if linkage.on_bogie[wheel] else placement.rocker_pivots
     forward, centre, pivot = placement.forward, placement.centres[wheel], pivots[wheel // 3]
@@ -183,7 +184,7 @@ def _find_arm(linkage, wheel, placement):
 
 @kernel
 def _rise_at(model, rover, wheel, move):
-    """Return how much higher than now a wheel is where it is moved forward [m]."""
+    """Return the rise of a wheel [m] when it is moved forward by `move` [m]."""
     placement = rover.placement
     x, y = placement.centres[wheel, 0], placement.centres[wheel, 1]
     placement.centres[wheel, 0] += move * placement.forward[0]
@@ -195,9 +196,9 @@ def _rise_at(model, rover, wheel, move):
 
 @kernel
 def _find_moves(linkage, work, wheel):
-    """Return how far a wheel moves forward per metre that it alone rises, and at most [m].
+    """Return a wheel's forward motion per metre of its own rise, and its largest motion [m].
 
-    The latter is as all wheels rise or fall on the uncertain ground.
+    The largest motion includes the rise or fall of all wheels on the uncertain ground.
     """
     placement, spread = work.rover.placement, work.spread
     rate = spread.rate
@@ -226,7 +227,7 @@ def _find_moves(linkage, work, wheel):
 
 @kernel
 def _shift(axis, point, pivot, forward):
-    """Return how fast a point goes forward in a turn about an axis through `pivot`."""
+    """Return the forward motion of a point per rotation about an axis through `pivot` [m/rad]."""
     ax, ay, az = axis
     x, y, z = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
     return forward[0] * (ay * z - az * y) + forward[1] * (az * x - ax * z)
@@ -249,7 +250,7 @@ def _find_contact_on(model, rover, wheel):
 
 @kernel
 def _settle_extreme(uncertain, work, angle, sign):
-    """Settle where q[angle] is largest (sign 1) or smallest (-1); widen the bounds to that."""
+    """Settle where q[angle] is largest (sign 1) or smallest (-1), and widen the bounds to it."""
     spread, radius = work.spread, uncertain.nominal.linkage.radius
     q = spread.trial
     largest = 0.0
@@ -275,7 +276,7 @@ def _settle_extreme(uncertain, work, angle, sign):
 
 @kernel
 def _approach(uncertain, work):
-    """Take Newton steps from the trial; return the outcome and the largest gap left [m]."""
+    """Take Newton steps from the trial; return a BoundStatus and the largest gap left [m]."""
     linkage, rover, q = uncertain.nominal.linkage, work.rover, work.spread.trial
     worst = 0.0
     for attempt in range(EXTREME_STEPS):
@@ -302,7 +303,7 @@ def _approach(uncertain, work):
 
 @kernel
 def _find_trial_contacts(uncertain, work):
-    """Touch with each wheel of the trial on its surface; return outcome and largest gap [m]."""
+    """Find the trial's contacts, each on its surface; return BoundStatus and largest gap [m]."""
     rover, spread = work.rover, work.spread
     place(uncertain.nominal.linkage, rover.pose, spread.trial, rover.placement)
     worst = 0.0
@@ -317,7 +318,7 @@ def _find_trial_contacts(uncertain, work):
 
 @kernel
 def _include_trial(work, unsettled):
-    """Widen the bounds on q and on the wheels' heights to the trial and what is left of gaps."""
+    """Widen the bounds on q and on the wheels' heights to the trial and its remaining gaps."""
     spread, gap = work.spread, work.rover.contacts.gap
     q = spread.trial
     for i in range(6):

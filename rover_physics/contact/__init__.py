@@ -1,1 +1,1 @@
-"""Where the wheels touch the ground, and the pose in which all six do."""
+"""Wheel contacts, belly clearance, and the pose in which all six wheels touch the ground."""

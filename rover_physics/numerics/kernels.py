@@ -22,7 +22,7 @@ COMPILE_OPTIONS = {
     "error_model": "numpy",
     "fastmath": {"contract"},
 }
-"""Options of every kernel. "contract" allows fused multiply-add; NaN and infinity stay exact."""
+"""Options of every kernel. "contract" allows fused multiply-add; NaN and infinity are kept."""
 
 
 def kernel(function):

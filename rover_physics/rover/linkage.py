@@ -1,4 +1,4 @@
-"""The rocker-bogie linkage as the kernels see it: its constants, and where its parts are."""
+"""Rocker-bogie linkage for kernels: its constants, and the positions of its parts."""
 
 from typing import Any
 
@@ -24,26 +24,26 @@ LINKAGE = record_type(
     ("bogie_mass", float),  # mass of one bogie [kg]
     ("bogie_coms", float, (2, 3)),  # centres of mass of the bogies [m]
     ("mass", float),  # mass of the whole rover [kg]
-    ("length", float),  # rear to front axle [m]: makes moments comparable with forces
+    ("length", float),  # rear to front axle [m], the reference length of moments
     ("belly", float, (5,)),  # underside: z, smallest and largest x, smallest and largest y [m]
-    ("has_tool_load", np.bool_),  # whether the arm's tool is pushed or turned
+    ("has_tool_load", np.bool_),  # whether a force or moment acts on the arm's tool
     ("tool", float, (3, 3)),  # tip of the arm [m], force [N] and moment [N m] on the tool
 )
 """Geometry and masses of a rover, body frame, flat ground, right side first."""
 
 NO_TOOL = np.zeros((3, 3))
-"""A tool that nothing acts on."""
+"""Tool without force and moment."""
 
 
 def pack_linkage(
     rover: Rover, body_mass: float, body_com: np.ndarray, tool: np.ndarray = NO_TOOL
 ) -> Any:
-    """Return the constants of `rover` as a record LINKAGE.
+    """Return the constants of a rover as a LINKAGE.
 
     Args:
         rover: The rover.
         body_mass: Mass of the body with its arm and payload [kg].
-        body_com: (3,) centre of mass of the same [m], body frame.
+        body_com: (3,) centre of mass of body, arm and payload [m], body frame.
         tool: (3, 3) tip of the arm [m], force [N] and moment [N m] on the tool, body frame.
     """
     suspension, masses, belly = rover.suspension, rover.masses, rover.belly
@@ -111,12 +111,12 @@ PLACEMENT = record_type(
     ("forward", float, (3,)),  # horizontal direction in the plane of the wheels
     ("up", float, (3,)),  # direction in the plane of the wheels normal to `forward`, upwards
 )
-"""Where a rover's parts are in one configuration, map frame; written by `place`."""
+"""Positions of a rover's parts in one configuration, map frame; written by `place`."""
 
 
 @kernel
 def to_map(placement, point, out, row):
-    """Write the point (x, y, z) of the body frame in the map frame into row `row` of `out`."""
+    """Write a point (x, y, z) of the body frame, in the map frame, into row `row` of `out`."""
     R, origin = placement.R, placement.origin
     x, y, z = point
     for i in range(3):
@@ -125,20 +125,20 @@ def to_map(placement, point, out, row):
 
 @kernel
 def rocker_sign(side):
-    """Return the sign of the rocker angle on `side`: the differential mirrors the rockers."""
+    """Return the sign of the rocker angle on a side; the differential mirrors the rockers."""
     return 1.0 if side == 0 else -1.0
 
 
 @kernel
 def place(linkage, pose, q, placement):
-    """Write where all parts are into `placement`, but for the centres of mass.
+    """Write the positions of all parts, without the centres of mass, into `placement`.
 
     Args:
         linkage: LINKAGE.
         pose: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
         q: (6,) z of the body origin [m], roll, pitch, right rocker angle, right and left bogie
             angle [rad].
-        placement: PLACEMENT to be written.
+        placement: PLACEMENT, written.
     """
     R, origin, wheels = placement.R, placement.origin, linkage.wheels
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
@@ -166,7 +166,7 @@ def place(linkage, pose, q, placement):
 
 @kernel
 def place_masses(linkage, q, placement):
-    """Write where the centres of mass are into a placement written by `place` with q (6,)."""
+    """Write the centres of mass into a placement that `place` has written with q (6,)."""
     coms, body = placement.part_coms, linkage.body_com
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
     to_map(placement, (body[0], body[1], body[2]), coms, 0)

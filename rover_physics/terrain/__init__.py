@@ -1,1 +1,1 @@
-"""The ground: elevation maps, soils, and how kernels look heights up."""
+"""Terrain: elevation maps with their layers, soils, and height look-up for kernels."""

@@ -1,4 +1,7 @@
-"""Checks of what a terrain is made of; each returns the value in its own type and layout."""
+"""Checks of the fields of a terrain; each returns the value in its final type and layout.
+
+All raise a TerrainError that names the field, the value and the rule.
+"""
 
 from typing import Any
 
@@ -9,7 +12,7 @@ from rover_physics.errors import TerrainError
 
 
 def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
-    """Return heights of which at least one is known."""
+    """Return heights (ny, nx) [m]; at least one must be known."""
     elevation = _as_grid("elevation", values)
     if not np.isfinite(elevation).any():
         ny, nx = elevation.shape
@@ -20,7 +23,7 @@ def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return friction coefficients above 0, or NaN."""
+    """Return friction coefficients (ny, nx), each above 0 or NaN."""
     friction = _as_grid("friction", values)
     _check_shape("friction", friction, elevation)
     _refuse_first(friction, friction <= 0.0, "friction", "above 0, or NaN for the default")
@@ -30,7 +33,7 @@ def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np
 def as_soil(
     values: ArrayLike, names: tuple[str, ...], elevation: NDArray[np.float64]
 ) -> NDArray[np.int32]:
-    """Return indices of soils, from -1 to below the number of names."""
+    """Return indices of soils (ny, nx), each from -1 to the number of names minus 1."""
     soil = np.asarray(values)
     if soil.dtype.kind not in "iu":
         raise TerrainError(f"soil has type {soil.dtype}; it must be an array of whole numbers")
@@ -38,13 +41,13 @@ def as_soil(
     last = len(names) - 1
     allowed = f"-1 for the default, or 0 to {last}, an index into soil_names"
     must = allowed if names else "-1 for the default, as there are no soil_names"
-    # In the array's own type: an index too large for 32 bits must not wrap around to a small one.
+    # Checked before the conversion: an index too large for 32 bits would wrap around.
     _refuse_first(soil, (soil < -1) | (soil > last), "soil", must)
     return np.ascontiguousarray(soil, dtype=np.int32)
 
 
 def as_soil_names(values: Any) -> tuple[str, ...]:
-    """Return names of soils, none empty, none twice."""
+    """Return names of soils; none may be empty or appear twice."""
     must = "a list of different names, none of them empty"
     is_array = isinstance(values, np.ndarray)
     if not isinstance(values, list | tuple) and not (is_array and values.ndim == 1):
@@ -59,7 +62,7 @@ def as_soil_names(values: Any) -> tuple[str, ...]:
 
 
 def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return standard deviations of at least 0, known wherever the height is known."""
+    """Return standard deviations (ny, nx) [m], at least 0 and known where the height is known."""
     std = _as_grid("elevation_std", values)
     _check_shape("elevation_std", std, elevation)
     _refuse_first(std, std < 0.0, "elevation_std", "at least 0")
@@ -69,7 +72,7 @@ def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArr
 
 
 def as_resolution(value: Any) -> float:
-    """Return the cell size as a float above 0."""
+    """Return the cell size [m] as a float above 0."""
     number = np.asarray(value)
     if number.dtype.kind in "fiu" and number.size == 1:
         resolution = float(number.reshape(()))
@@ -79,7 +82,7 @@ def as_resolution(value: Any) -> float:
 
 
 def as_origin(value: Any) -> tuple[float, float]:
-    """Return the origin as two finite floats."""
+    """Return the origin (x, y) [m] as two finite floats."""
     try:
         point = np.asarray(value)
     except ValueError:
@@ -106,7 +109,7 @@ def _as_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 
 def _check_shape(name: str, layer: NDArray[Any], elevation: NDArray[np.float64]) -> None:
-    """Raise an error where a layer is not of the terrain's shape."""
+    """Raise an error if a layer does not have the shape of the elevation."""
     if layer.shape != elevation.shape:
         raise TerrainError(
             f"{name} has shape {layer.shape}; it must be that of elevation, {elevation.shape}"

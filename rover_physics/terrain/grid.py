@@ -1,4 +1,4 @@
-"""The terrain: an elevation grid with unknown cells; layers of friction, soil and uncertainty."""
+"""Terrain: an elevation grid with unknown cells and layers of friction, soil and uncertainty."""
 
 import zipfile
 import zlib
@@ -22,7 +22,7 @@ from rover_physics.terrain.checks import (
 )
 from rover_physics.terrain.presets import find_terrain_file
 
-_EDGE_TOLERANCE = 1e-9  # cells; rounding of (x - origin) / resolution at the map's edge
+_EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +30,8 @@ class Terrain:
     """Ground heights on a regular grid in the map frame.
 
     Cell [j, i] is centred at x = origin[0] + i * resolution, y = origin[1] + j * resolution.
-    Arrays are read-only: one that somebody else could write into is copied, so that what is
-    worked out of a terrain never goes stale.
+    Arrays are read-only, so that results derived from a terrain cannot become stale. A writeable
+    array is copied.
 
     Raises:
         TerrainError: Wrong shape or type, resolution not above 0, infinite heights, no known cell,
@@ -45,13 +45,14 @@ class Terrain:
     origin: tuple[float, float] = (0.0, 0.0)
     """Centre (x, y) of cell [0, 0] in [m], map frame."""
     friction: NDArray[np.float64] | None = None
-    """Coulomb coefficients (ny, nx), NaN where the rover's default holds; None: everywhere."""
+    """Coulomb coefficients (ny, nx), NaN for the rover's default; None: the default everywhere."""
     soil: NDArray[np.int32] | None = None
-    """Indices (ny, nx) into ``soil_names``, -1 where the default soil holds; None: everywhere."""
+    """Indices (ny, nx) into ``soil_names``, -1 for the default soil; None: the default
+    everywhere."""
     soil_names: tuple[str, ...] = ()
-    """Names of the soils that ``soil`` points to. Which soils exist is not checked here."""
+    """Names of the soils in ``soil``. Whether they exist is checked when a soil is needed."""
     elevation_std: NDArray[np.float64] | None = None
-    """Standard deviation of the heights (ny, nx) in [m], at least 0, known wherever the height is
+    """Standard deviation of the heights (ny, nx) in [m], at least 0, known where the height is
     known; None: the heights are exact."""
 
     def __post_init__(self) -> None:
@@ -85,11 +86,11 @@ class Terrain:
         return (x, x + (nx - 1) * self.resolution, y, y + (ny - 1) * self.resolution)
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
-        """Tell which points are on the map, within `bounds`; known or not.
+        """Return True for points on the map, within `bounds`, even if their height is unknown.
 
         Args:
             x: Positions in [m], map frame, any shape.
-            y: The same, of a shape that broadcasts with x.
+            y: The same, with a shape that broadcasts with x.
         """
         ny, nx = self.elevation.shape
         column, row = self._grid_coordinates(x, y)
@@ -101,11 +102,11 @@ class Terrain:
 
         Args:
             x: Positions in [m], map frame, any shape.
-            y: The same, of a shape that broadcasts with x.
+            y: The same, with a shape that broadcasts with x.
 
         Returns:
-            Heights in [m] of the broadcast shape, NaN where one of the four cells is unknown, and
-            off the map.
+            Heights in [m] of the broadcast shape, NaN where one of the four cells is unknown or
+            the point is off the map.
         """
         ny, nx = self.elevation.shape
         column, row = self._grid_coordinates(x, y)
@@ -121,19 +122,20 @@ class Terrain:
         return np.where(inside, (1.0 - v) * lower + v * upper, np.nan)
 
     def fill_gaps(self, max_gap: float) -> "Terrain":
-        """Close small unknown regions by a smooth surface through their rims.
+        """Fill small unknown regions with a smooth surface through their rims.
 
-        A region of unknown cells, joined by their sides, is filled when no square wider than
-        ``max_gap`` fits into it and it does not touch the map's edge, so that known ground
-        is all around it. The surface is harmonic (each filled height is the mean of its four
-        neighbours): it continues planes exactly and makes no new peaks or pits.
+        A region is a set of unknown cells joined by their sides. It is filled if no square wider
+        than ``max_gap`` fits into it and it does not touch the map's edge, so that known ground
+        surrounds it. The surface is harmonic: each filled height is the mean of its four
+        neighbours. It continues planes exactly and adds no peaks or pits.
 
         Args:
             max_gap: Largest width of a region in [m].
 
         Returns:
-            A terrain with the gaps filled; larger regions stay NaN. Friction and soil are as they
-            were. A filled cell is as uncertain as the most uncertain cell around its gap.
+            A terrain with the gaps filled; larger regions stay NaN. Friction and soil are
+            unchanged. A filled cell has the largest standard deviation of the cells around its
+            gap.
 
         Raises:
             TerrainError: max_gap is negative or not a number.
@@ -169,11 +171,11 @@ def load_terrain(name_or_path: str | Path) -> Terrain:
         name_or_path: A preset's name such as ``"spirit"``, or the path of a file with
             ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
             optionally layers (ny, nx): ``friction``, ``soil`` with ``soil_names``, and
-            ``elevation_std`` [m]. Other entries, such as ``source``, are left alone.
+            ``elevation_std`` [m]. Other entries, such as ``source``, are ignored.
 
     Raises:
-        TerrainError: Neither a preset nor a file, an unreadable file, or a missing or impossible
-            entry; names file and entry.
+        TerrainError: Neither a preset nor a file, an unreadable file, or a missing or invalid
+            entry; the text names file and entry.
     """
     path = find_terrain_file(name_or_path)
     entries = _read_npz(path)
@@ -200,9 +202,9 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
     """Save a terrain as an ``.npz`` file that `load_terrain` reads.
 
     Args:
-        path: File to write, taken as it is; a file of that name is replaced.
+        path: File to write, without a suffix added; an existing file is replaced.
         terrain: The terrain.
-        notes: Further texts to keep in the file, e.g. ``source``.
+        notes: Further texts to store in the file, e.g. ``source``.
 
     Raises:
         TerrainError: The file cannot be written.
@@ -224,7 +226,7 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
 
 
 def _read_npz(path: Path) -> dict[str, Any]:
-    """Read the entries that a terrain needs, without unpickling anything."""
+    """Read the entries of a terrain from a file, without unpickling."""
     wanted = (
         "elevation",
         "resolution",
@@ -253,15 +255,15 @@ def _read_npz(path: Path) -> dict[str, Any]:
 
 
 def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:
-    """Select the unknown regions in the map's inside that are at most max_cells wide."""
-    from scipy import ndimage  # takes as long to import as the rest of the package
+    """Select the unknown regions that are off the map's edge and at most max_cells wide."""
+    from scipy import ndimage  # imported here: it takes as long as the rest of the package
 
     labels, count = ndimage.label(unknown)
     small = np.ones(count + 1, dtype=bool)
     small[0] = False
     side = max_cells + 1
     if side <= min(unknown.shape):
-        # A square that is too wide fits where the erosion by it leaves a cell.
+        # A square that is too wide fits into a region if erosion by it leaves a cell.
         wide = ndimage.minimum_filter(
             unknown.astype(np.uint8), size=side, mode="constant", cval=0
         ).astype(bool)
@@ -273,7 +275,7 @@ def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]
 
 
 def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Solve for heights in the gaps that are the mean of their four neighbours each."""
+    """Solve for the heights in the gaps; each is the mean of its four neighbours."""
     from scipy import sparse
     from scipy.sparse import linalg
 
@@ -297,13 +299,13 @@ def _fill_harmonic(elevation: NDArray[np.float64], gaps: NDArray[np.bool_]) -> N
 
 
 def _fill_with_largest(std: NDArray[np.float64], gaps: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Give the cells of each gap the largest standard deviation around it."""
+    """Fill each gap with the largest standard deviation around it."""
     from scipy import ndimage
 
     filled = std.copy()
     labels, _ = ndimage.label(gaps)
     for label, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
-        # A gap is off the map's edge, so there is a cell all around it.
+        # A gap does not touch the map's edge, so it has a rim of cells.
         window = (slice(rows.start - 1, rows.stop + 1), slice(columns.start - 1, columns.stop + 1))
         gap = labels[window] == label
         rim = ndimage.binary_dilation(gap) & ~gap

@@ -1,8 +1,9 @@
-"""The ground as kernels read it: by addresses of arrays, bilinear, gaps told from the edge.
+"""Terrain for kernels: arrays read by address, with bilinear interpolation of heights.
 
-An array is handed from kernel to kernel as nine numbers, its address as one. With two arrays and
-some hundred calls a pose, handing them on took a quarter of the time. So a GROUND holds addresses,
-and a `Ground` keeps the arrays alive. All that reads or makes an address is in this file.
+Numba passes an array from kernel to kernel as nine numbers, but its address as one. Passing two
+arrays through some hundred calls per pose took a quarter of the time. A GROUND therefore holds
+addresses, and a `Ground` keeps the arrays alive. All code that makes or reads addresses is in this
+file.
 """
 
 from dataclasses import dataclass, replace
@@ -18,12 +19,13 @@ from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.terrain.grid import Terrain
 
 BLOCK_BITS = 2
+"""Base-2 logarithm of BLOCK."""
 BLOCK = 1 << BLOCK_BITS
-"""Cells along the side of a block."""
+"""Cells along the side of a block; maxima of blocks let kernels skip low ground."""
 SOIL_NUMBERS = 8
-"""Numbers that describe a soil to the kernels."""
+"""Columns of the table of soils."""
 NO_SOILS = np.zeros((1, SOIL_NUMBERS))
-"""A table of soils with one that is none."""
+"""Table of soils for a terrain without soils: one row of zeros."""
 
 
 GROUND = record_type(
@@ -32,11 +34,11 @@ GROUND = record_type(
         "block_max",
         np.int64,
     ),  # address of (block_rows, block_columns) highest elevation of each block
-    # [m], infinite where any of it is unknown
-    ("known_block_max", np.int64),  # address of the same, -inf where none of it is known
-    ("friction", np.int64),  # address of (rows, columns) friction coefficient, 0 if there is none
-    ("soil", np.int64),  # address of (rows, columns) rows of the table of soils, 0 if none
-    ("soils", np.int64),  # address of that table, (1 + k, SOIL_NUMBERS)
+    # [m], infinite if any cell of it is unknown
+    ("known_block_max", np.int64),  # address of the same, over known cells; -inf if there are none
+    ("friction", np.int64),  # address of (rows, columns) friction coefficient, 0 without layer
+    ("soil", np.int64),  # address of (rows, columns) rows in the table of soils, 0 without layer
+    ("soils", np.int64),  # address of the table of soils, (1 + k, SOIL_NUMBERS)
     ("rows", np.int64),  # rows of cells
     ("columns", np.int64),  # columns of cells
     ("block_rows", np.int64),  # rows of blocks of BLOCK x BLOCK cells
@@ -45,14 +47,14 @@ GROUND = record_type(
     ("y0", float),  # y of the centre of cell [0, 0] [m]
     ("inverse_resolution", float),  # cells per metre [1/m]
 )
-"""A terrain as kernels read it, by the addresses of the arrays of a `Ground`."""
+"""A terrain for kernels, with the addresses of the arrays of a `Ground`; map frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """A terrain as a sweep needs it: the record that kernels read, and what it points to.
+    """A terrain for kernels: the GROUND record and the arrays that it points to.
 
-    It cannot be pickled: addresses mean nothing in another process. Send the Terrain.
+    It cannot be pickled, because addresses are valid in one process only; pickle the Terrain.
     """
 
     records: np.ndarray
@@ -60,14 +62,14 @@ class Ground:
     elevation: np.ndarray
     """(ny, nx) elevation [m], NaN where unknown."""
     block_max: np.ndarray
-    """Highest elevation of each block of BLOCK x BLOCK cells [m], infinite where any of it is
+    """Highest elevation of each block of BLOCK x BLOCK cells [m], infinite if any cell of it is
     unknown."""
     known_block_max: np.ndarray
-    """Highest elevation of each block [m], -inf where none is known."""
+    """Highest known elevation of each block [m], -inf if none is known."""
     friction: np.ndarray | None
-    """(ny, nx) friction coefficient, NaN where the rover's own holds."""
+    """(ny, nx) friction coefficient, NaN for the rover's default."""
     soil: np.ndarray | None
-    """(ny, nx) int32 rows of the table of soils, 0 for the default."""
+    """(ny, nx) int32 rows in the table of soils, 0 for the default."""
     soils: np.ndarray
     """(1 + k, SOIL_NUMBERS) table of `pack_soils`: the default soil, then those of the layer."""
 
@@ -78,11 +80,11 @@ class Ground:
 
 
 def address_of(array: np.ndarray, kind: type) -> int:
-    """Return the address of an array; whoever keeps it must keep the array.
+    """Return the address of an array; it is valid as long as the array lives.
 
     Raises:
         TypeError: The elements are not of the type `kind`, in this machine's byte order.
-        ValueError: The array has gaps.
+        ValueError: The array is not C-contiguous.
     """
     if array.dtype != np.dtype(kind):
         raise TypeError(
@@ -95,7 +97,7 @@ def address_of(array: np.ndarray, kind: type) -> int:
 
 
 def _reader(element: types.Type, returned: types.Type) -> Any:
-    """Return the code of a function (address, index) -> the element there."""
+    """Return the intrinsic code of a function (address, index) -> element at that index."""
 
     def read(_context: Any, _address: Any, _index: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -122,12 +124,12 @@ ELEMENTS = {
     "soil": np.int32,
     "soils": np.float64,
 }
-"""Arrays of a Ground that are read by address, and the type of their elements."""
+"""Arrays of a Ground that kernels read by address, and their element types."""
 
 
 @lru_cache(maxsize=4)
 def pack_ground(terrain: Terrain) -> Ground:
-    """Return `terrain` as the kernels read it, with a soil that is none."""
+    """Return a terrain as a Ground, without soils; the last 4 are cached."""
     elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
     highest = _reduce_blocks(elevation, np.fmax)
     some_unknown = _reduce_blocks(np.isnan(elevation), np.logical_or)
@@ -145,7 +147,7 @@ def pack_ground(terrain: Terrain) -> Ground:
 
 
 def _point_to(terrain: Terrain, **arrays: np.ndarray | None) -> Ground:
-    """Return the Ground of these arrays, its record pointing to them."""
+    """Return a Ground of these arrays, with a record that points to them."""
     elevation, block_max = arrays["elevation"], arrays["block_max"]
     assert elevation is not None and block_max is not None
     record = new_record(
@@ -173,7 +175,7 @@ def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
 
 
 def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
-    """Reduce each block of cells to one; blocks at the far edges count their last cells twice."""
+    """Reduce each block of cells to one value; missing cells at the far edges repeat the last."""
     ny, nx = cells.shape
     missing = (0, -ny % BLOCK), (0, -nx % BLOCK)
     if missing != ((0, 0), (0, 0)):
@@ -187,22 +189,22 @@ def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
 
 @kernel
 def elevation_of(ground, i, j):
-    """Return the elevation [m] of cell [i, j], which must be on the map; NaN where unknown."""
+    """Return the elevation [m] of cell [i, j], which must be on the map; NaN if unknown."""
     return read_float(ground.elevation, i * ground.columns + j)
 
 
 @kernel
 def known_max_of_block(ground, bi, bj):
-    """Return the highest known elevation [m] of block [bi, bj], -inf where none is known."""
+    """Return the highest known elevation [m] of block [bi, bj], -inf if none is known."""
     return read_float(ground.known_block_max, bi * ground.block_columns + bj)
 
 
 @kernel
 def find_block_max(ground, gx, gy, reach_x, reach_y):
-    """Return the highest elevation [m] of a box around (gx, gy), all in cells.
+    """Return the highest elevation [m] in a box around (gx, gy), whose reach is also in cells.
 
-    Infinite where there is unknown ground or the map ends in it. Block by block, so somewhat more
-    than asked for is looked at.
+    It is infinite if the box contains unknown ground or leaves the map. The search takes whole
+    blocks, so it covers slightly more than the box.
     """
     low_x, high_x, low_y, high_y = gx - reach_x, gx + reach_x, gy - reach_y, gy + reach_y
     if not (
@@ -222,27 +224,30 @@ def find_block_max(ground, gx, gy, reach_x, reach_y):
 
 @kernel
 def height_inside(ground, gx, gy):
-    """Return the elevation [m] at (gx, gy), in cells from cell [0, 0], well within the map."""
+    """Return the elevation [m] at (gx, gy) [cells from cell [0, 0]], inside the last row, column.
+
+    Nothing is checked; NaN near unknown cells.
+    """
     i, j = int64(gy), int64(gx)
     return _interpolate(ground.elevation, i * ground.columns + j, ground.columns, gx - j, gy - i)
 
 
 @kernel
 def is_cell_on_map(ground, gx, gy):
-    """Tell whether (gx, gy), in cells from cell [0, 0], lies within the outermost centres."""
+    """Return whether (gx, gy) [cells from cell [0, 0]] is within the outermost cell centres."""
     return gx >= 0.0 and gy >= 0.0 and gx <= ground.columns - 1 and gy <= ground.rows - 1
 
 
 @kernel
 def height_at_cell(ground, gx, gy):
-    """Return the elevation [m] at (gx, gy), counted in cells from cell [0, 0], on the map."""
+    """Return the elevation [m] at (gx, gy) [cells from cell [0, 0]], which must be on the map."""
     i, j = min(int64(gy), ground.rows - 2), min(int64(gx), ground.columns - 2)
     return _interpolate(ground.elevation, i * ground.columns + j, ground.columns, gx - j, gy - i)
 
 
 @kernel
 def _interpolate(elevation, at, columns, u, v):
-    """Return the height [m] a share u along and v across from element `at` to the next ones."""
+    """Return the height [m] at fractions u (columns) and v (rows) from element `at` to the next."""
     here, above = read_float(elevation, at), read_float(elevation, at + columns)
     lower = here + u * (read_float(elevation, at + 1) - here)
     upper = above + u * (read_float(elevation, at + columns + 1) - above)
@@ -251,14 +256,14 @@ def _interpolate(elevation, at, columns, u, v):
 
 @kernel
 def look_up(ground, x, y):
-    """Return elevation [m] and its gradient at (x, y) [m]; NaN where there is none."""
+    """Return elevation [m] and slopes along x and y at (x, y) [m]; NaN if unknown or off map."""
     scale = ground.inverse_resolution
     return look_up_cell(ground, (x - ground.x0) * scale, (y - ground.y0) * scale)
 
 
 @kernel
 def look_up_cell(ground, gx, gy):
-    """Return elevation [m] and its gradient at (gx, gy), in cells; NaN where there is none."""
+    """Return elevation [m] and slopes along x and y at (gx, gy) [cells]; NaN as in `look_up`."""
     if not is_cell_on_map(ground, gx, gy):
         return np.nan, np.nan, np.nan
     i, j = min(int64(gy), ground.rows - 2), min(int64(gx), ground.columns - 2)
@@ -277,7 +282,7 @@ def look_up_cell(ground, gx, gy):
 
 @kernel
 def friction_at(ground, x, y, default):
-    """Return the friction coefficient of the cell nearest to (x, y) [m], else `default`."""
+    """Return the friction coefficient of the cell nearest to (x, y) [m], or `default` if none."""
     if ground.friction == 0:
         return default
     mu = read_float(ground.friction, _nearest_cell(ground, x, y))
@@ -286,7 +291,7 @@ def friction_at(ground, x, y, default):
 
 @kernel
 def soil_row_at(ground, x, y):
-    """Return the row of the table of soils that holds in the cell nearest to (x, y) [m]."""
+    """Return the row in the table of soils for the cell nearest to (x, y) [m]."""
     if ground.soil == 0:
         return 0
     return read_int(ground.soil, _nearest_cell(ground, x, y))

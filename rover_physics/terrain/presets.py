@@ -1,4 +1,4 @@
-"""Terrains that come with the package, found by name."""
+"""Preset terrains of the package, by name."""
 
 from pathlib import Path
 
@@ -13,13 +13,13 @@ def terrain_presets() -> dict[str, Path]:
 
 
 def find_terrain_file(name_or_path: str | Path) -> Path:
-    """Return the file of a preset terrain, or the path as it is.
+    """Return the file of a preset terrain, or the given path.
 
     Args:
         name_or_path: A preset's name such as ``"spirit"``, or the path of an ``.npz`` file.
 
     Raises:
-        TerrainError: Neither a preset nor a file; names the presets.
+        TerrainError: Neither a preset nor a file; the text lists the presets.
     """
     presets = terrain_presets()
     if not isinstance(name_or_path, Path) and name_or_path in presets:

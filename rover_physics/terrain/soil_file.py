@@ -1,4 +1,4 @@
-"""Soils: their parameters, the presets, and how they are read from a file."""
+"""Soils: parameters, presets and soil files."""
 
 import math
 from collections.abc import Mapping
@@ -15,22 +15,23 @@ from rover_physics.files.yaml_file import read_yaml
 
 COULOMB_MODEL, BEKKER_WONG_MODEL = "coulomb", "bekker_wong"
 MODELS = (COULOMB_MODEL, BEKKER_WONG_MODEL)
+"""Names of the soil models in a file."""
 MAX_EXPONENT = 2.0
-"""Sinkage exponents are published from 0.1 to 1.6; the wheel formula breaks down at 3."""
+"""Largest sinkage exponent: published values are 0.1 to 1.6, the formula is singular at 3."""
 
 
 @dataclass(frozen=True)
 class Soil:
-    """The parameters of a soil; NaN where its model does not use them."""
+    """Parameters of a soil; those that its model does not use are NaN."""
 
     name: str
-    """What the soil is called; in a file the key of the soil."""
+    """Name of the soil, its key in a file."""
     model: Annotated[str, choice(*MODELS)]
     """``"coulomb"`` or ``"bekker_wong"``."""
     source: Text
-    """Where the values come from."""
+    """Source of the values."""
     friction: Annotated[float, number("", above=0.0)] = math.nan
-    """Coulomb coefficient; NaN where the terrain's or the rover's own holds."""
+    """Coulomb coefficient; NaN for that of the terrain or the rover."""
     cohesion: Annotated[float, number("Pa", least=0.0)] = math.nan
     """Cohesion c in [Pa]."""
     friction_angle: Annotated[float, number("rad", least=0.0, most=1.2)] = math.nan
@@ -49,13 +50,13 @@ def load_soils(path: str | Path | None = None) -> dict[str, Soil]:
     """Load the soils of a file, or the presets.
 
     Args:
-        path: A YAML file with the keys of ``config/soils.yaml``; None for that file itself.
+        path: A YAML file with the keys of ``config/soils.yaml`` (default: that file).
 
     Returns:
         Soils by name, in the order of the file.
 
     Raises:
-        SoilError: Unreadable file, or a soil with a missing, unknown or impossible key.
+        SoilError: Unreadable file, or a soil with a missing, unknown or invalid key.
     """
     place = find_config("soils.yaml") if path is None else Path(path)
     try:
@@ -69,10 +70,11 @@ def soils_from_dict(data: object, source: str) -> dict[str, Soil]:
 
     Args:
         data: A mapping of names to mappings with the keys of a soil (docs/soil.md), SI units.
-        source: File name or other origin, opens every error text.
+        source: File name or other origin, at the start of every error text.
 
     Raises:
-        SoilError: Not such a mapping, or a missing, unknown or impossible key; names soil and key.
+        SoilError: Not such a mapping, or a missing, unknown or invalid key; the text names soil
+            and key.
     """
     with errors_of(source, SoilError):
         if not isinstance(data, dict) or not data:
@@ -85,10 +87,10 @@ def soil_named(name: str, soils: Mapping[str, Soil] | None = None) -> Soil:
 
     Args:
         name: Its name, e.g. ``"dry_sand"``.
-        soils: The soils to look in; None for the presets.
+        soils: Soils by name (default: the presets).
 
     Raises:
-        SoilError: No soil of that name; lists those there are.
+        SoilError: No soil of that name; the text lists the names.
     """
     known = load_soils() if soils is None else soils
     if name in known:
@@ -111,7 +113,7 @@ def _read_soil(name: object, entry: object) -> Soil:
 
 @cache
 def _keys_of(model: str) -> Any:
-    """Return the type of a soil's entry in a file; of any soil's where there is no such model."""
+    """Return the type of a soil's entry in a file; for an unknown model, one with all keys."""
     kinds = get_type_hints(Soil, include_extras=True)
     del kinds["name"]
     common = {key: kinds.pop(key) for key in ("model", "source")}
