@@ -91,7 +91,7 @@ def _bound_points(uncertain, work, shift, bend, least):
 
 @kernel
 def _plane_change(R, spread, dx, dy, z):
-    """Return the largest fall and rise [m] of the underside's plane at (dx, dy, z) from the origin.
+    """Return largest fall and rise [m] of the underside's plane at (dx, dy, z) from the origin.
 
     A rotation by d about an axis a moves the plane's point p by (a x p) d. The rise of the plane
     above a fixed place is the component of this along the plane's normal, over the normal's z.

@@ -41,9 +41,8 @@ OUTPUT_COUNT = 24 + CORNERS
 MIN_LOAD_SHARE = 1e-6
 """Least load [rover weights] in a utilisation, because the load is a divisor."""
 TOGETHER = 2.0
-"""Sum of the squares of the contact angles' deviations [half intervals]. The errors of different
-wheels count as independent, so all angles at their ends at once would be far less probable than
-the map's standard deviations."""
+"""Sum of the squares of the contact angles' deviations, each relative to its end. Errors of
+different wheels count as independent, so all angles at their ends at once are too improbable."""
 MAX_SOILS = 32
 """Largest number of soils on a map, the default included."""
 
@@ -54,8 +53,8 @@ BOX = record_type(
     ("at", float, (INPUT_COUNT,)),  # a point of the box
     ("value", float, (OUTPUT_COUNT,)),  # the outputs at that point
     ("base_value", float, (OUTPUT_COUNT,)),  # the nominal outputs
-    ("gain_low", float, (INPUT_COUNT, OUTPUT_COUNT)),  # change of outputs, one input at its low end
-    ("gain_high", float, (INPUT_COUNT, OUTPUT_COUNT)),  # change of outputs, one at its high end
+    ("gain_low", float, (INPUT_COUNT, OUTPUT_COUNT)),  # output changes, one input at its low end
+    ("gain_high", float, (INPUT_COUNT, OUTPUT_COUNT)),  # output changes, one at its high end
     ("smallest", float, (OUTPUT_COUNT,)),  # smallest outputs
     ("largest", float, (OUTPUT_COUNT,)),  # largest outputs
     ("mu_low", float, (6,)),  # smallest friction coefficient of ground that a wheel may touch

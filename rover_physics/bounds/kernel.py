@@ -1,4 +1,4 @@
-"""Bounds on the prediction at one pose on uncertain ground, and their parallel sweep over poses."""
+"""Bounds on the prediction at a pose on uncertain ground, and their parallel sweep over poses."""
 
 from dataclasses import dataclass
 from typing import Any

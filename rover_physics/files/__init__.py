@@ -1,1 +1,1 @@
-"""Configuration files: where they are, and how they are read and checked."""
+"""Configuration files: location, reading and checks."""

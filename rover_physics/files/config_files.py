@@ -1,4 +1,4 @@
-"""Finds the package's own configuration files in a source checkout or an installed tree."""
+"""Location of the package's own configuration files, in a source checkout or an installed tree."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,17 +11,17 @@ PACKAGE_NAME = "rover_planner"
 def find_config(relative: str) -> Path:
     """Find a file or folder of the package's ``config`` folder.
 
-    A source checkout has ``config/`` beside the package. Installed by pip or colcon it is in
-    ``<prefix>/share/rover_planner/config``, where ``<prefix>`` is some folder above the package.
+    In a source checkout, ``config/`` is next to the package. Installed by pip or colcon, it is
+    ``<prefix>/share/rover_planner/config``, where ``<prefix>`` is a folder above the package.
 
     Args:
         relative: Path below ``config``, with forward slashes, e.g. ``"rovers/lsr1.yaml"``.
 
     Returns:
-        Absolute path of what was found.
+        Absolute path of the file or folder.
 
     Raises:
-        RoverError: Nothing of that name in any of the places searched.
+        RoverError: No such file or folder in any of the searched places.
     """
     searched = []
     for folder in _config_folders():
@@ -37,7 +37,7 @@ def find_config(relative: str) -> Path:
 
 def _config_folders() -> Iterator[Path]:
     """Yield the existing config folders, the one of a source checkout first."""
-    # A linked installation keeps links to the sources: look beside both ends of the link.
+    # A linked installation has links to the sources: both ends of a link are searched.
     here = Path(__file__).absolute()
     packages = dict.fromkeys((here.parents[1], here.resolve().parents[1]))
     for package in packages:

@@ -1,7 +1,7 @@
-"""Rules that values of a configuration file keep, written in the annotations of their types.
+"""Rules for the values of configuration files, written in type annotations.
 
-A field such as ``radius: Annotated[float, number("m", above=0.0)]`` says all there is to say about
-a key: pydantic checks it, and errors quote the rule. pydantic is imported by what reads a file.
+A field such as ``radius: Annotated[float, number("m", above=0.0)]`` defines a key completely:
+pydantic checks it, and errors quote the rule. pydantic is imported only when a file is read.
 """
 
 import math
@@ -12,17 +12,17 @@ from typing import Annotated, Any
 
 @dataclass(frozen=True)
 class Rule:
-    """What a value must be, besides having the type that is annotated."""
+    """A condition on a value, in addition to its annotated type."""
 
     must: str
     """The rule as an error quotes it, after "it must be"."""
     unit: str = ""
-    """Unit of the number, empty where it has none."""
+    """Unit of the number, empty if it has none."""
     holds: Callable[[Any], object] = lambda value: True
-    """Tells whether a value of the right type keeps the rule."""
+    """Returns whether a value of the right type keeps the rule."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Refuse any value that has another type or does not hold in the words of the rule."""
+        """Refuse values of another type or that break the rule; the error quotes the rule."""
         from pydantic_core import core_schema
 
         schema: Any = {**handler(source), "strict": True}
@@ -43,10 +43,10 @@ class Rule:
 
 @dataclass(frozen=True)
 class ListOfMappings:
-    """A list of one mapping or more; each mapping has errors of its own."""
+    """A list of one or more mappings; each mapping has its own errors."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Refuse what is not a list, or empty, before the mappings are looked at."""
+        """Refuse an empty list or another type before the mappings are checked."""
         from pydantic_core import PydanticCustomError, core_schema
 
         def check(value: Any) -> Any:
@@ -59,12 +59,12 @@ class ListOfMappings:
 
 @dataclass(frozen=True, eq=False)
 class Keys:
-    """The keys of a dict: for each the type of its value."""
+    """The keys of a dict, with the type of each value."""
 
     required: Mapping[str, Any]
-    """Keys that must be there."""
+    """Required keys."""
     optional: Mapping[str, Any] = field(default_factory=dict)
-    """Keys that may be there."""
+    """Optional keys."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """Accept a dict with these keys."""
@@ -87,7 +87,7 @@ def number(
     least: float = -math.inf,
     most: float = math.inf,
 ) -> Rule:
-    """Return the rule of a finite number within bounds; `above` itself is outside."""
+    """Return the rule of a finite number within bounds; `above` is an exclusive bound."""
     named = (("above", above), ("at least", least), ("at most", most))
     bounds = " and ".join(f"{name} {bound:g}" for name, bound in named if math.isfinite(bound))
     words = "a number", bounds, f"in {unit}" if unit else ""
@@ -119,6 +119,6 @@ Point = Annotated[
 
 
 def _list_to_tuple(value: Any) -> Any:
-    """Return lists, numpy arrays among them, as tuples, and anything else as it is."""
+    """Return lists and NumPy arrays as tuples, and other values unchanged."""
     value = value.tolist() if hasattr(value, "tolist") else value
     return tuple(value) if isinstance(value, list) else value

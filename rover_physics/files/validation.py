@@ -1,4 +1,4 @@
-"""Reads the contents of a configuration file as a type; each error names the dotted key."""
+"""Validation of the contents of a configuration file; each error names the dotted key."""
 
 import difflib
 import math
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 UNKNOWN_KEY = ("unexpected_keyword_argument", "extra_forbidden", "invalid_key")
-"""Kinds of pydantic's errors that are about a key that is not known."""
+"""Error types of pydantic for unknown keys."""
 MISSING_KEY = "missing"
 RULE_BROKEN = "rule"
 MAX_SHOWN = 60
-"""Most characters of a value or a key that an error shows."""
+"""Largest number of characters of a value or key in an error text."""
 Key = tuple[str | int, ...]
 
 _brief = reprlib.Repr()
@@ -32,12 +32,12 @@ def read_as(kind: Any, data: object, what: str, at: Key = ()) -> Any:
     Args:
         kind: A dataclass or another type whose annotations have the rules of its keys.
         data: The contents as read from YAML.
-        what: What the whole file is, such as "a rover file", for error texts.
-        at: The key where the part is in the file.
+        what: Kind of the whole file for error texts, such as "a rover file".
+        at: Key of the part within the file.
 
     Raises:
-        RoverFileError: A key is missing, unknown or impossible; names the dotted key, the value
-            and the rule.
+        RoverFileError: A key is missing, unknown or invalid; the text names the dotted key, the
+            value and the rule.
     """
     from pydantic import ValidationError
 
@@ -45,19 +45,19 @@ def read_as(kind: Any, data: object, what: str, at: Key = ()) -> Any:
         return _adapter(kind).validate_python(data, extra="forbid")
     except ValidationError as error:
         faults = error.errors(include_url=False, include_context=False)
-    # A misspelt key is both unknown and missing: the unknown one has the suggestion.
+    # A misspelt key is both unknown and missing; the error of the unknown key has a suggestion.
     order = (*UNKNOWN_KEY, MISSING_KEY)
     first = min(faults, key=lambda fault: (fault["type"] not in order, fault["type"] == order[-1]))
     raise RoverFileError(_say(kind, first, what, at))
 
 
 def find_unit(kind: Any, key: Key) -> str:
-    """Return the unit of the number at a key of a type, empty where it has none."""
+    """Return the unit of the number at a key of a type, empty if it has none."""
     return str(_part(kind, key).get("unit", ""))
 
 
 def refuse(key: str, value: object, must: str) -> RoverFileError:
-    """Return the error for an impossible value; `must` says what would be right."""
+    """Return the error for an invalid value; `must` states the rule."""
     return RoverFileError(f"{key} is {describe(value)}; it must be {must}")
 
 
@@ -71,7 +71,7 @@ def errors_of(source: object, kind: type[RoverError] = RoverFileError) -> Iterat
 
 
 def suggest(name: str, known: Sequence[str]) -> str:
-    """Return "did you mean ...? " with the nearest of the known names, empty if none is near."""
+    """Return "did you mean ...? " with the nearest known name, empty if none is near."""
     close = difflib.get_close_matches(name[:MAX_SHOWN], known, n=1)
     return f"did you mean {close[0]}? " if close else ""
 
@@ -112,7 +112,7 @@ def _json_schema(kind: Any) -> dict[str, Any]:
 
 
 def _say(kind: Any, fault: Any, what: str, at: Key) -> str:
-    """Return one line about what pydantic found at fault."""
+    """Return one line about a fault that pydantic has found."""
     found, place = fault["loc"], fault["loc"][:-1]
     key = show_key((*at, *found))
     if fault["type"] == RULE_BROKEN:
@@ -129,7 +129,7 @@ def _say(kind: Any, fault: Any, what: str, at: Key) -> str:
 
 
 def _hint(fault: Any) -> str:
-    """Return what to do about a number that YAML reads as text."""
+    """Return a hint for a number that YAML reads as text."""
     value = fault["input"]
     items = value if isinstance(value, list) else [value]
     if "number" not in fault["msg"] or not any(map(_is_number_as_text, items)):
@@ -148,12 +148,12 @@ def _is_number_as_text(value: object) -> bool:
 
 
 def _names(part: dict[str, Any]) -> Sequence[str]:
-    """Return the keys that a mapping must have; those that it may have if it must have none."""
+    """Return the required keys of a mapping, or its optional keys if none is required."""
     return part.get("required") or tuple(part["properties"])
 
 
 def _part(kind: Any, key: Key) -> dict[str, Any]:
-    """Return the JSON schema of what is at a key of a type."""
+    """Return the JSON schema at a key of a type."""
     schema = _json_schema(kind)
     part = _resolve(schema, schema)
     for name in key:
@@ -166,6 +166,6 @@ def _part(kind: Any, key: Key) -> dict[str, Any]:
 
 
 def _resolve(part: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
-    """Return a part of a JSON schema with its reference followed; of "X or null" X."""
+    """Return a part of a JSON schema with references resolved; "X or null" becomes X."""
     part = part["anyOf"][0] if "anyOf" in part else part
     return schema["$defs"][part["$ref"].rsplit("/", 1)[1]] if "$ref" in part else part

@@ -1,4 +1,4 @@
-"""Reads a YAML file strictly: duplicate keys and unreadable files are errors."""
+"""Strict reading of YAML files: duplicate keys and unreadable files are errors."""
 
 from pathlib import Path
 from typing import Any
@@ -9,13 +9,13 @@ from rover_physics.errors import RoverFileError
 from rover_physics.files.validation import errors_of, show_key
 
 MAX_REASON = 200
-"""Most characters of PyYAML's reason that an error shows."""
+"""Largest number of characters of PyYAML's reason in an error text."""
 BAD_SCALAR = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
-"""What PyYAML raises, besides its own errors, where a value does not fit its tag."""
+"""Exceptions that PyYAML raises, besides its own, for a value that does not fit its tag."""
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """A safe loader that refuses a key which stands twice in one mapping."""
+    """A safe loader that refuses duplicate keys in a mapping."""
 
     def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[Any, Any]:
         seen: dict[str, int] = {}
@@ -33,7 +33,7 @@ class _StrictLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep=deep)
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
-        """Merge other mappings into one; of equal keys only the last stays, which counts."""
+        """Merge other mappings into one; of equal keys, the last one counts."""
         super().flatten_mapping(node)
         pairs: dict[object, object] = {}
         for pair in node.value:
@@ -49,20 +49,20 @@ def read_yaml(path: Path) -> object:
         path: The file.
 
     Returns:
-        What the file holds, made of dicts, lists and scalars; None for an empty file.
+        The contents as dicts, lists and scalars; None for an empty file.
 
     Raises:
-        RoverFileError: Unreadable file, broken YAML, or a key that stands twice.
+        RoverFileError: Unreadable file, invalid YAML, or a duplicate key.
     """
     with errors_of(path):
         return parse_yaml(_read_text(path))
 
 
 def parse_yaml(text: str) -> object:
-    """Return what a YAML text holds, made of dicts, lists and scalars; None for an empty text.
+    """Return the contents of a YAML text as dicts, lists and scalars; None for an empty text.
 
     Raises:
-        RoverFileError: Broken YAML, or a key that stands twice.
+        RoverFileError: Invalid YAML, or a duplicate key.
     """
     try:
         return yaml.load(text, Loader=_StrictLoader)

@@ -1,1 +1,1 @@
-"""The rover: its numbers, its file, its linkage and its manipulator."""
+"""Rover: parameters, rover file, linkage and manipulator."""

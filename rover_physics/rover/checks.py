@@ -1,4 +1,4 @@
-"""Checks that the numbers of a rover fit together to a rover that can stand on flat ground."""
+"""Checks that the parameters of a rover agree and that it can stand on flat ground."""
 
 import math
 
@@ -6,17 +6,17 @@ from rover_physics.files.validation import refuse
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEEL_POSITIONS
 from rover_physics.rover.model import Rover, Suspension
 
-_LEVEL_TOLERANCE = 1e-3  # m, wheels count as level when their heights differ by less
+_LEVEL_TOLERANCE = 1e-3  # m, largest height difference of level wheels
 
 
 def check_rover(rover: Rover) -> None:
-    """Check what holds between several keys of a rover file.
+    """Check the rules between several keys of a rover file.
 
     Args:
         rover: The rover as read; each number is already in its own range.
 
     Raises:
-        RoverFileError: Two or more keys contradict each other; names the one to mend.
+        RoverFileError: Two or more keys contradict each other; the text names the key to correct.
     """
     _check_wheels(rover)
     _check_pivots(rover.suspension)
@@ -28,7 +28,7 @@ def check_rover(rover: Rover) -> None:
 
 
 def _check_wheels(rover: Rover) -> None:
-    """Wheels are ordered rear to front, on the left side, on level ground and apart."""
+    """Check that wheels are ordered rear to front, on the left side, level and apart."""
     wheels = rover.suspension.wheels
     width, diameter = rover.wheel.width, 2.0 * rover.wheel.radius
     for position in WHEEL_POSITIONS:
@@ -57,7 +57,7 @@ def _check_wheels(rover: Rover) -> None:
 
 
 def _check_pivots(suspension: Suspension) -> None:
-    """The rocker pivot is in the body's y axis; each pivot is between what hangs on it."""
+    """Check that the rocker pivot is on the body's y axis and each pivot between its parts."""
     pivot, bogie, wheels = suspension.rocker_pivot, suspension.bogie_pivot, suspension.wheels
     if abs(pivot[0]) > 1e-9 or abs(pivot[2]) > 1e-9:
         raise refuse(
@@ -88,7 +88,7 @@ def _check_pivots(suspension: Suspension) -> None:
 
 
 def _check_joint_limits(suspension: Suspension) -> None:
-    """The angles of flat ground, zero, are within the limits; no joint turns right round."""
+    """Check that angle 0, flat ground, is within the limits and no joint makes a full turn."""
     for name in ("rocker_limits", "bogie_limits"):
         low, high = getattr(suspension, name)
         if not -math.pi < low <= 0.0 <= high < math.pi:
@@ -100,14 +100,14 @@ def _check_joint_limits(suspension: Suspension) -> None:
 
 
 def _check_belly(rover: Rover) -> None:
-    """The belly is above the ground that the wheels stand on."""
+    """Check that the belly is above flat ground."""
     ground = rover.suspension.wheels["rear"][2] - rover.wheel.radius
     if rover.belly.z <= ground:
         raise refuse("belly.z", rover.belly.z, f"above the ground under the wheels, {ground:g} m")
 
 
 def _check_speed(rover: Rover) -> None:
-    """The wheels can turn as fast as the nominal speed asks."""
+    """Check that the wheels can reach the nominal speed."""
     fastest = rover.wheel.max_speed * rover.wheel.radius
     if rover.nominal_speed > fastest:
         raise refuse(
@@ -118,7 +118,7 @@ def _check_speed(rover: Rover) -> None:
 
 
 def _check_balance(rover: Rover) -> None:
-    """The rover stands on flat ground: its centre of mass is over the wheels."""
+    """Check that the rover stands on flat ground, with its centre of mass between the wheels."""
     wheels, masses = rover.suspension.wheels, rover.masses
     if masses.body.mass <= 0.0:
         raise refuse("masses.body.mass", masses.body.mass, "a number above 0 in kg")
@@ -139,7 +139,7 @@ def _check_balance(rover: Rover) -> None:
 
 
 def _check_manipulator(rover: Rover) -> None:
-    """The arm is part of the body's mass, and its joints have names of their own."""
+    """Check that the arm is lighter than the body, and that its joint names are not in use."""
     arm = rover.manipulator
     if arm is None:
         return

@@ -1,4 +1,4 @@
-"""The paper's three-joint arm: its kinematics, and what it and its tool do to the body."""
+"""The paper's three-joint arm: kinematics, mass and load on the body."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ from rover_physics.errors import ModelError
 from rover_physics.rover.model import Manipulator, Rover
 
 JOINT_TOLERANCE = 1e-6
-"""How far [rad] an angle may be beyond the limit of its joint, for rounding."""
+"""Excess of an angle over the limit of its joint [rad] that counts as rounding."""
 
 
 def link_points(arm: Manipulator, angles: np.ndarray) -> np.ndarray:
@@ -33,9 +33,10 @@ def link_points(arm: Manipulator, angles: np.ndarray) -> np.ndarray:
 
 
 def distance_to_reach(arm: Manipulator, point: ArrayLike) -> float:
-    """Return how far [m] a point (3,), body frame, is from what the tip can reach.
+    """Return the distance [m] of a point (3,) [m], body frame, from the reach of the tip.
 
-    Above 0 the point is too far, below 0 too near to the shoulder; 0 where it can be reached.
+    It is above 0 if the point is too far from the shoulder, below 0 if it is too near, and 0 if
+    the tip can reach it. Joint limits are not checked.
     """
     _, upper, fore = arm.link_lengths
     distance = float(np.linalg.norm(_from_shoulder(arm, point)))
@@ -46,8 +47,8 @@ def inverse_kinematics(arm: Manipulator, point: ArrayLike) -> list[np.ndarray]:
     """Return the joint angles (3,) [rad] that bring the tip to a point (3,) [m], body frame.
 
     Elbow up comes first, then elbow down; the arm faces the point. Angles are from -pi to pi, or
-    a whole turn away where that brings them within the joint's limits. The list is empty where
-    the point is out of reach, and lacks the solutions beyond the joint limits.
+    shifted by a full turn if this brings them within the joint's limits. Solutions beyond the
+    joint limits are left out; the list is empty if the point is out of reach.
     """
     if distance_to_reach(arm, point) != 0.0:
         return []
@@ -88,14 +89,14 @@ def body_mass_and_com(
 ) -> tuple[float, np.ndarray]:
     """Return mass [kg] and centre of mass (3,) [m], body frame, of the body with arm and payload.
 
-    The body of the rover file holds the stowed arm, so the arm moves the centre of mass by the
-    difference to its stowed pose; the payload hangs at the tip.
+    The body of the rover file includes the stowed arm, so only the difference to the stowed pose
+    moves the centre of mass. The payload is at the tip.
 
     Args:
         rover: The rover.
         joint_angles: Arm angles [rad] by joint name; joints left out stay stowed, other names
-            are passed over.
-        payload: Mass at the tip [kg]; the rover file's by default.
+            are ignored.
+        payload: Mass at the tip [kg] (default: that of the rover file).
 
     Raises:
         ModelError: An angle that is not finite or beyond its limits, a payload that is negative
@@ -124,13 +125,14 @@ def pack_tool(
     force: ArrayLike | None = None,
     moment: ArrayLike | None = None,
 ) -> np.ndarray:
-    """Return where the arm's tip is and what acts on it: (3, 3), rows tip, force and moment.
+    """Return (3, 3): tip of the arm [m], force [N] and moment [N m] on the tool, body frame.
 
     Args:
         rover: The rover.
         joint_angles: Arm angles [rad] by joint name, as in `body_mass_and_com`.
-        force: (3,) force [N] that the surroundings exert on the tool, body frame.
-        moment: (3,) moment [N m] that they exert on it about the tip, body frame.
+        force: (3,) force of the surroundings on the tool [N], body frame (default: none).
+        moment: (3,) moment of the surroundings on the tool about its tip [N m], body frame
+            (default: none).
 
     Raises:
         ModelError: Force or moment of wrong shape, not finite, or without an arm.
@@ -153,7 +155,7 @@ def as_vector(name: str, given: ArrayLike) -> np.ndarray:
     """Return a vector (3,) of finite numbers.
 
     Raises:
-        ModelError: Anything else; says `name`.
+        ModelError: Anything else; the text says `name`.
     """
     try:
         vector = np.asarray(given, dtype=np.float64)
@@ -165,7 +167,7 @@ def as_vector(name: str, given: ArrayLike) -> np.ndarray:
 
 
 def arm_angles(arm: Manipulator, joint_angles: Mapping[str, float] | None) -> np.ndarray:
-    """Return the angles (3,) [rad] of the arm's joints, stowed where `joint_angles` has none.
+    """Return the joint angles (3,) [rad] of the arm; joints not in `joint_angles` are stowed.
 
     Raises:
         ModelError: An angle that is not finite or beyond the limits of its joint.

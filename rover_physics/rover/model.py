@@ -1,4 +1,4 @@
-"""The rover: geometry, masses, actuators and safety limits; the keys of a rover file."""
+"""Rover parameters: geometry, masses, actuators and safety limits; the keys of a rover file."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -23,18 +23,18 @@ Share = Annotated[float, number("", above=0.0, most=1.0)]
 
 
 def _is_arm(lengths: tuple[float, float, float]) -> bool:
-    """Tell whether three lengths are those of column, upper arm and forearm."""
+    """Return whether three lengths are valid for column, upper arm and forearm."""
     return min(lengths) >= 0.0 and lengths[1] + lengths[2] > 0.0
 
 
 def _are_names(texts: tuple[str, ...]) -> bool:
-    """Tell whether texts are different and none of them empty."""
+    """Return whether texts are different and none of them is empty."""
     return all(text.strip() for text in texts) and len(set(texts)) == len(texts)
 
 
 @dataclass(frozen=True)
 class Wheel:
-    """One wheel with its drive; all six are alike."""
+    """One wheel with its drive; all six are the same."""
 
     radius: Annotated[float, number("m", above=0.0)]
     """Radius in [m]."""
@@ -53,9 +53,9 @@ class Suspension:
     """Pivots and wheel centres of the left side on flat ground, body frame, [m]."""
 
     rocker_pivot: Point
-    """Where the rocker is hinged to the body; the origin is midway between the two pivots."""
+    """Pivot of the rocker on the body; the body origin is midway between both pivots."""
     bogie_pivot: Point
-    """Where the bogie is hinged to the rocker."""
+    """Pivot of the bogie on the rocker."""
     rocker_wheel: Annotated[str, choice("rear", "front")]
     """The wheel on the rocker itself, ``"rear"`` or ``"front"``; the others are on the bogie."""
     wheels: Annotated[dict[str, Point], Keys(dict.fromkeys(WHEEL_POSITIONS, Point))]
@@ -83,10 +83,10 @@ class Part:
 
 @dataclass(frozen=True)
 class Masses:
-    """The parts that carry mass, apart from the wheels."""
+    """The parts with mass, without the wheels."""
 
     body: Part
-    """The body with everything on it, the stowed manipulator included."""
+    """The body with everything on it, including the stowed manipulator."""
     rocker: Part
     """One rocker, without its wheel."""
     bogie: Part
@@ -107,16 +107,16 @@ class Belly:
 
 @dataclass(frozen=True)
 class Limits:
-    """Safety limits that a path is judged by."""
+    """Safety limits for the verdict on a path."""
 
     tilt: Annotated[float, number("rad", above=0.0, most=1.57)]
     """Largest angle between body z and the vertical in [rad]."""
     tip_over_ratio: Annotated[float, number("", least=0.0, most=1.0)]
     """Smallest tip-over angle relative to the one on flat ground."""
     friction_utilisation: Share
-    """Largest share of the friction that a wheel may use."""
+    """Largest friction utilisation of a wheel."""
     torque_saturation: Share
-    """Largest share of the drive torque that a wheel may use."""
+    """Largest torque saturation of a wheel: |torque| over the drive's largest torque."""
     belly_clearance: Annotated[float, number("m", least=0.0)]
     """Smallest height of the belly over the ground in [m]."""
     wheel_drop: Annotated[float, number("m", least=0.0)]
@@ -143,9 +143,9 @@ class Manipulator:
     link_masses: Annotated[
         tuple[Mass, Mass, Mass], Rule("a list of 3 numbers in kg, none of them negative")
     ]
-    """Masses of the same in [kg], each at the middle of its link."""
+    """Masses of column, upper arm and forearm in [kg], each at the middle of its link."""
     stowed: Annotated[tuple[Radians, Radians, Radians], Rule("a list of 3 numbers in rad")]
-    """Joint angles of the stowed pose in [rad], the one that the body's mass centre is for."""
+    """Joint angles of the stowed pose in [rad]; the body's centre of mass holds for this pose."""
     payload: Mass = 0.0
     """Mass at the tip in [kg]."""
     joint_limits: (
@@ -155,7 +155,7 @@ class Manipulator:
         ]
         | None
     ) = None
-    """Lowest and highest angle of each joint in [rad]; None: the joints turn without end."""
+    """Lowest and highest angle of each joint in [rad]; None: no limits."""
 
 
 @dataclass(frozen=True)
@@ -163,11 +163,11 @@ class Rover:
     """A rocker-bogie rover with six wheels and a differential."""
 
     name: Text
-    """What the rover is called."""
+    """Name of the rover."""
     gravity: Annotated[float, number("m/s^2", above=0.0)]
     """Acceleration of gravity in [m/s^2]."""
     wheel: Wheel
-    """The wheel, six times."""
+    """Each of the six wheels."""
     suspension: Suspension
     """Pivots, wheel centres and joint limits."""
     masses: Masses
@@ -175,13 +175,13 @@ class Rover:
     belly: Belly
     """Underside of the body, for its clearance."""
     friction: Annotated[float, number("", above=0.0)]
-    """Coulomb friction coefficient where the terrain says nothing of it."""
+    """Coulomb friction coefficient where the terrain has none."""
     nominal_speed: Annotated[float, number("m/s", above=0.0)]
     """Driving speed in [m/s]."""
     limits: Limits
     """Safety limits."""
     manipulator: Manipulator | None = None
-    """The arm, if there is one."""
+    """The arm; None if there is none."""
 
     @property
     def total_mass(self) -> float:

@@ -1,4 +1,4 @@
-"""How a rover is read from a file: presets, and YAML files with the same keys."""
+"""Rover files: presets, and YAML files with the same keys."""
 
 import os
 from pathlib import Path
@@ -23,7 +23,7 @@ def load_rover(name_or_path: str | Path) -> Rover:
         name_or_path: A preset's name such as ``"lsr1"``, or the path of a YAML file.
 
     Raises:
-        RoverFileError: Neither a preset nor a file, or the file is wrong; names the key.
+        RoverFileError: Neither a preset nor a file, or an invalid file; the text names the key.
     """
     name = str(name_or_path)
     presets = preset_names()
@@ -45,10 +45,10 @@ def rover_from_dict(data: object, source: str) -> Rover:
     Args:
         data: Nested mapping with the keys of a rover file, which are the fields of `Rover`; SI
             units, positions of the left side in the body frame.
-        source: File name or other origin, opens every error text.
+        source: File name or other origin, at the start of every error text.
 
     Raises:
-        RoverFileError: A key is missing, unknown or impossible; names the dotted key.
+        RoverFileError: A key is missing, unknown or invalid; the text names the dotted key.
     """
     with errors_of(source):
         rover: Rover = read_as(Rover, data, "a rover file")

@@ -247,7 +247,7 @@ def height_at_cell(ground, gx, gy):
 
 @kernel
 def _interpolate(elevation, at, columns, u, v):
-    """Return the height [m] at fractions u (columns) and v (rows) from element `at` to the next."""
+    """Return the height [m] at fractions u (column) and v (row) from element `at` to the next."""
     here, above = read_float(elevation, at), read_float(elevation, at + columns)
     lower = here + u * (read_float(elevation, at + 1) - here)
     upper = above + u * (read_float(elevation, at + columns + 1) - above)
