@@ -139,7 +139,7 @@ def _check_balance(rover: Rover) -> None:
 
 
 def _check_manipulator(rover: Rover) -> None:
-    """Check that the arm is lighter than the body, and that its joint names are not in use."""
+    """Check the arm: lighter than the body, stowed within its limits, with joint names unused."""
     arm = rover.manipulator
     if arm is None:
         return

@@ -1,1 +1,1 @@
-"""Traction control: the quadratic program that shares the torques, and contact angles for it."""
+"""Traction control: the quadratic program for the torques, and contact angles for it."""

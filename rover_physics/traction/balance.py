@@ -1,10 +1,9 @@
-"""The balance of a rover whose attitude, suspension and contact angles are measured, as rows.
+"""Equilibrium of a rover with measured attitude, suspension and contact angles, as rows of a QP.
 
-The nine equations of `equilibrium` are kept in the form in which they are solved for what they
-determine: six loads, two lateral terms and the traction of the last wheel as linear functions of
-how much more each other wheel pulls than the last does. The wanted push is d'Alembert's force: the
-rover accelerates forward as if a force on its centre of mass held it back, so that the tractions
-together hold gravity and push by as much.
+The nine equations of `equilibrium` are solved for six loads, two lateral terms and the traction of
+the last wheel, as linear functions of the other wheels' tractions relative to the last one. The
+wanted push enters as d'Alembert's force, backward at the centre of mass. The tractions together
+then hold the rover against gravity and add the push.
 """
 
 from dataclasses import dataclass, field
@@ -41,43 +40,43 @@ from rover_physics.traction.layout import (
 )
 
 FORCE_ROW, MOMENT_ROW = 0, 3
-"""First rows of the forces and of the moments in the equations of `equilibrium`."""
+"""First row of the forces and of the moments in the equations of `equilibrium`."""
 REAR, FRONT = WHEELS.index("rear_right"), WHEELS.index("front_right")
-"""Wheels whose lateral forces give those of all wheels, which are linear along the body."""
+"""Two wheels whose lateral forces determine those of all wheels, which are linear along x."""
 
 
 @dataclass(frozen=True)
 class MeasuredState:
-    """What is measured of a rover at one moment."""
+    """Measured state of a rover at one time."""
 
     roll: float
     """Roll in [rad]."""
     pitch: float
     """Pitch in [rad], positive with the nose down."""
     rocker_angle: float
-    """Angle of the right rocker in [rad]; the left one's is the opposite."""
+    """Angle of the right rocker in [rad]; the left one has the opposite sign."""
     bogie_angles: np.ndarray
     """(2,) angles of right and left bogie in [rad]."""
     contact_angles: np.ndarray
-    """(6,) angles in [rad] from straight below a wheel to where it touches, positive in front."""
+    """(6,) angles from the lowest point of a wheel to its contact in [rad], positive in front."""
     contact_offsets: np.ndarray = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
-    """(6,) where each wheel touches along its axis, from its middle [m]."""
+    """(6,) distances of the contacts from the wheels' middle planes, positive to the left [m]."""
 
 
 MEASURED_BALANCE = record_type(
-    ("A", float, (EQUATIONS, FORCES)),  # coefficients, of order one
+    ("A", float, (EQUATIONS, FORCES)),  # coefficients, of order 1
     ("b", float, (EQUATIONS,)),  # right-hand sides
     ("along", float, (WHEEL_COUNT,)),  # places of the wheels along the body, in rover lengths
     ("force_unit", float),  # a sixth of the weight [N]
 )
-"""The numbers of `BalanceRows` as the kernels read them."""
+"""The equations of `BalanceRows`, for kernels."""
 
 
 @dataclass(frozen=True, eq=False)
 class BalanceRows:
-    """Nine equations A x = b in x = tractions (6), loads (6), s0, s1, all in `force_unit`.
+    """Nine equations A x = b with x = tractions (6), loads (6), s0, s1, all in `force_unit`.
 
-    `layout` has the names of the variables and of the equations.
+    `layout` names the variables and equations.
     """
 
     packed: np.ndarray
@@ -85,7 +84,7 @@ class BalanceRows:
 
     @property
     def A(self) -> np.ndarray:  # noqa: N802
-        """Coefficients (9, 14), of order one."""
+        """Coefficients (9, 14), of order 1."""
         return self.packed["A"][0]
 
     @property
@@ -95,9 +94,9 @@ class BalanceRows:
 
     @property
     def along(self) -> np.ndarray:
-        """Places (6,) of the wheels along the body in lengths of the rover: S_i = s0 + s1 along_i.
+        """Positions (6,) of the wheels along the body, in rover lengths: S_i = s0 + s1 along_i.
 
-        The length is from rear to front axle.
+        The rover length is from rear to front axle.
         """
         return self.packed["along"][0]
 
@@ -108,23 +107,22 @@ class BalanceRows:
 
     @property
     def wheel_speeds(self) -> np.ndarray:
-        """Speeds (6,) of the wheels' centres while the rover drives, relative to their mean.
+        """Speeds (6,) of the wheels' centres over their mean while the rover drives.
 
-        The traction equation is that of virtual work: the tractions, each over the way that its
-        wheel moves, lift and push the rover.
+        They are the coefficients of the traction equation, which is the principle of virtual work.
         """
         return WHEEL_COUNT * self.A[TRACTION_EQUATION, TRACTIONS]
 
     @property
     def equal_pull(self) -> float:
-        """The traction of each wheel where all pull alike, in force units."""
+        """Traction of each wheel if all are equal, in force units."""
         return float(self.b[TRACTION_EQUATION])
 
     def complete(self, tractions: np.ndarray) -> np.ndarray:
-        """Return x (14,) that keeps all nine equations, with the differences between tractions.
+        """Return x (14,) that keeps all nine equations and the differences between tractions.
 
         Args:
-            tractions: (6,) in force units; what all have in common follows from the balance.
+            tractions: (6,) in force units; their common part is replaced to keep the equations.
         """
         x = np.empty(FORCES)
         _complete(self.packed, tractions, x)
@@ -146,7 +144,7 @@ MEASUREMENT = record_type(
     ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
     ("push", float),  # wanted push along body +x [N]
 )
-"""A `MeasuredState` and the wanted push as the kernels read them; x, y, z and yaw are 0."""
+"""A `MeasuredState` and the wanted push, for kernels; x, y, z and yaw are 0."""
 
 BALANCE_WORK = record_type(
     ("measured", MEASUREMENT),
@@ -159,23 +157,23 @@ BALANCE_WORK = record_type(
 
 
 class BalanceWriter:
-    """Writes the balance of one rover, again and again, into its own work space."""
+    """Writes the balance of one rover, repeatedly, into its own work space."""
 
     def __init__(self, rover: Rover, payload: float | None = None):
         """Prepare for a rover.
 
         Args:
             rover: The rover, arm stowed.
-            payload: Mass at the arm's tip [kg] instead of the rover's own.
+            payload: Mass at the arm's tip [kg] (default: that of the rover file).
 
         Raises:
-            ModelError: A payload below zero, or for a rover without an arm.
+            ModelError: A payload below 0, or for a rover without an arm.
         """
         mass, com = body_mass_and_com(rover, payload=payload)
         linkage = pack_linkage(rover, mass, com)
         self._linkages = array_of(linkage)
         self._works = array_of(new_record(BALANCE_WORK, com=_centre_of_mass(linkage)))
-        # Looking up a field of a record takes as long as writing it.
+        # Views are kept because looking up a field of a record is as slow as writing it.
         measured = self._works["measured"]
         self._q, self._push = measured["q"][0], measured["push"]
         self._contact_angles = measured["contact_angles"][0]
@@ -188,11 +186,12 @@ class BalanceWriter:
 
         Args:
             state: Attitude, suspension and contact angles.
-            net_traction: Push along body +x in [N] beyond what holds the rover against gravity.
+            net_traction: Push along body +x in [N], in addition to the force that holds the rover
+                against gravity.
 
         Raises:
-            ModelError: The equations do not determine the forces: the contact angles contradict
-                one another so that the rover could not roll.
+            ModelError: The equations are singular: the contact angles contradict each other, so
+                that the rover could not roll.
         """
         q = self._q
         q[1], q[2], q[3] = state.roll, state.pitch, state.rocker_angle
@@ -220,7 +219,7 @@ def _centre_of_mass(linkage: Any) -> np.ndarray:
 
 @kernel
 def _complete(balances, tractions, x):
-    """Write x (14,) that keeps all nine equations, with these differences of tractions (6,)."""
+    """Write x (14,) that keeps all nine equations and the differences between tractions (6,)."""
     balance = balances[0]
     A, b = balance.A, balance.b
     last = tractions[LAST_WHEEL]
@@ -236,7 +235,7 @@ def _complete(balances, tractions, x):
 
 @kernel
 def _write_balance(linkages, works, balances):
-    """Write the nine equations at the measurement in `works`; False where they are singular."""
+    """Write the nine equations at the state in `works`; return False if they are singular."""
     linkage, work, rows = linkages[0], works[0], balances[0]
     placement, balance, measured = work.placement, work.balance, work.measured
     columns = 1 + FREE_TORQUES
@@ -255,7 +254,7 @@ def _write_balance(linkages, works, balances):
 
 @kernel
 def _write_contacts(radius, work):
-    """Write where wheels of measured contact angles touch."""
+    """Write the contacts of wheels from their measured contact angles."""
     placement, contacts, measured = work.placement, work.contacts, work.measured
     R, forward, up = placement.R, placement.forward, placement.up
     for wheel in range(WHEEL_COUNT):
@@ -288,7 +287,7 @@ def _add_push(linkage, work):
 
 @kernel
 def _write_places(length, placement, along):
-    """Write the places (6,) of the wheels along the body, in lengths of the rover."""
+    """Write the positions (6,) of the wheels along the body, in rover lengths."""
     R, origin, centres = placement.R, placement.origin, placement.centres
     for wheel in range(WHEEL_COUNT):
         along[wheel] = 0.0
@@ -299,7 +298,7 @@ def _write_places(length, placement, along):
 
 @kernel
 def _write_rows(balance, rows):
-    """Write A x = b from the solved balance, which is in weights; A comes as zeros."""
+    """Write A x = b from the solved balance, whose forces are over the weight; A must be zeros."""
     A, b, along = rows.A, rows.b, rows.along
     span = along[FRONT] - along[REAR]
     for column in range(1 + FREE_TORQUES):

@@ -1,12 +1,11 @@
-"""Contact angles from motion: a wheel moves along the ground where it touches.
+"""Contact angles from motion, by an extended Kalman filter (EKF).
 
-The centre of a wheel that rolls without slip moves at its rolling speed along its contact
-tangent, and the links determine how the centres move relative to one another: the wheels of a
-bogie turn about each other at the bogie's rate, the rocker carries bogie and last wheel, the body
-both rockers. That makes ten equations in six contact angles, which an extended Kalman filter (EKF)
-solves as the rover moves. Where no link turns, as on an even slope, the equations do not determine
-the angles. Then the slopes of the lines between neighbouring wheels take their place: the angles
-drift towards them as the rover rolls away from where they were found.
+The centre of a wheel that rolls without slip moves at its rolling speed along its contact tangent.
+The links determine the relative velocities of the centres: a bogie rotates at its own rate, a
+rocker carries a bogie and the last wheel, and the body carries both rockers. This gives ten
+equations in six contact angles, which the EKF solves as the rover moves. If no link rotates, as on
+an even slope, the equations do not determine the angles. The angles then drift towards the slopes
+of the lines between neighbouring wheels, as the rover rolls away from where they were found.
 
 Source: Iagnemma and Dubowsky, "Vehicle wheel-ground contact angle estimation: with application to
 mobile robot traction control", Advances in Robot Kinematics, 2000.
@@ -24,32 +23,32 @@ from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 
 PAIRS = 5
-"""Pairs of wheels whose velocities are compared along body x and z.
+"""Number of wheel pairs whose velocities are compared along body x and z.
 
-On the right side both wheels of the bogie, then the rocker's wheel and the rear one of the bogie;
-the same on the left side; then the wheels of both rockers.
+Right side: both wheels of the bogie, then the rocker's wheel and the rear one of the bogie. Left
+side: the same. Then the wheels of both rockers.
 """
 ROCKER_PAIR = 4
-"""The last of them. What is compared there is the velocity of the rocker pivots."""
+"""Index of the last pair, which compares the velocities of the rocker pivots."""
 MEMORY_DISTANCE = 1.5
-"""Distance after which an angle is forgotten, in wheel radii."""
+"""Distance over which an angle decays towards the slope between wheels [wheel radii]."""
 SLOPE_DEVIATION = 0.35
 """Standard deviation of a contact angle about the slope between its neighbours [rad]."""
 SLIP_DEVIATION = 0.1
-"""Standard deviation of a wheel's speed from its rolling speed, as a share of it."""
+"""Standard deviation of a wheel's speed from its rolling speed, relative to it."""
 GYRO_DEVIATION = 0.005
 """Standard deviation of a turning rate [rad/s]."""
 MIN_ROLLING_RATE = 0.02
 """Rolling rate below which the angles stay as they are [rad/s]."""
 MAX_ANGLE = 1.7
-"""Largest angle [rad]: a wheel on a vertical face, and a little more."""
+"""Largest contact angle [rad], slightly more than on a vertical face."""
 MAX_RESIDUAL = 3.0
-"""Standard deviations beyond which an equation counts less: a wheel that slips violates it."""
+"""Residual [standard deviations] above which an equation counts less, as for a slipping wheel."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactEstimate:
-    """Contact angles and how well they are known."""
+    """Contact angles with their covariance."""
 
     angles: np.ndarray
     """(6,) contact angles [rad], positive where a wheel climbs."""
@@ -61,28 +60,28 @@ class ContactEstimate:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What is measured of a moving rover."""
+    """Measurements of a moving rover."""
 
     roll: float
-    """[rad]"""
+    """Roll [rad]."""
     pitch: float
-    """[rad], positive with the nose down."""
+    """Pitch [rad], positive with the nose down."""
     rocker_angle: float
-    """Of the right rocker [rad]."""
+    """Angle of the right rocker [rad]."""
     bogie_angles: np.ndarray
-    """(2,) right and left [rad]."""
+    """(2,) angles of right and left bogie [rad]."""
     rocker_rate: float
-    """Of the right rocker [rad/s]."""
+    """Rate of the right rocker [rad/s]."""
     bogie_rates: np.ndarray
-    """(2,) right and left [rad/s]."""
+    """(2,) rates of right and left bogie [rad/s]."""
     wheel_rates: np.ndarray
-    """(6,) of the wheel joints [rad/s]."""
+    """(6,) rates of the wheel joints [rad/s]."""
     body_rates: np.ndarray
     """(3,) angular velocity, body frame [rad/s]."""
 
 
 def level_estimate() -> ContactEstimate:
-    """Return zero angles, as uncertain as those of uneven ground."""
+    """Return contact angles of 0 with the deviation of uneven ground."""
     covariance = SLOPE_DEVIATION**2 * np.eye(WHEEL_COUNT)
     return ContactEstimate(np.zeros(WHEEL_COUNT), covariance, "zero")
 
@@ -110,11 +109,11 @@ MOTION = record_type(
     ("wheel_rates", float, (WHEEL_COUNT,)),  # [rad/s]
     ("body_rates", float, (3,)),  # [rad/s]
 )
-"""A `Motion` as the kernels read it."""
+"""A `Motion`, for kernels."""
 
 
 class MotionContactEstimator:
-    """The filter; start it anew where the rover was moved by other means than its wheels."""
+    """The filter; make a new one after the rover was moved by other means than its wheels."""
 
     def __init__(self, rover: Rover):
         """Prepare for a rover on level ground."""
@@ -130,7 +129,7 @@ class MotionContactEstimator:
             )
         )
         self._motions = array_of(new_record(MOTION))
-        # Looking up a field of a record takes as long as writing it.
+        # Views are kept because looking up a field of a record is as slow as writing it.
         state, motion = self._filters[0], self._motions[0]
         self._angles, self._covariance = state.angles, state.covariance
         self._attitude, self._joints = motion.attitude, motion.joints
@@ -139,7 +138,7 @@ class MotionContactEstimator:
 
     @property
     def estimate(self) -> ContactEstimate:
-        """The estimate so far."""
+        """The current estimate."""
         return ContactEstimate(self._angles.copy(), self._covariance.copy(), "motion")
 
     def update(self, motion: Motion, duration: float) -> ContactEstimate:
@@ -176,7 +175,7 @@ def _update(linkages, motions, duration, filters):
 
 @kernel
 def _place(linkage, motion, state):
-    """Write places, turning rates, slopes, and the differences of velocity that the links give."""
+    """Write places, turning rates, slopes and the velocity differences given by the links."""
     wheels, places, known = linkage.wheels, state.places, state.known
     for side in range(2):
         angle = rocker_sign(side) * motion.joints[0]
@@ -217,7 +216,7 @@ def _place(linkage, motion, state):
 
 @kernel
 def _rotate(angle, x, z):
-    """Return the vector (x, z) of body x and z turned about body +y."""
+    """Return the vector (x, z), body frame, rotated about body +y by an angle [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     return c * x + s * z, c * z - s * x
 
@@ -237,7 +236,7 @@ def _write_slopes(places, side, slopes):
 
 @kernel
 def _drift(radius, level, duration, state):
-    """Let the angles tend to the slopes between wheels over the way that each has rolled."""
+    """Move the angles towards the slopes between wheels, by the distance each wheel has rolled."""
     P = state.covariance
     for i in range(WHEEL_COUNT):
         kept = np.exp(-abs(state.speeds[i]) * duration / (MEMORY_DISTANCE * radius))
@@ -253,7 +252,8 @@ def _drift(radius, level, duration, state):
 def _correct(length, level, state):
     """Correct the angles by each equation in turn, all linearised at the same angles.
 
-    `length` [m] is that of the rover, `level` [rad] the direction of the horizontal in body x, z.
+    `length` is the rover's length [m], `level` the direction of the horizontal in the body's x-z
+    plane [rad].
     """
     angles, prior, speeds = state.angles, state.prior, state.speeds
     for i in range(WHEEL_COUNT):
@@ -274,7 +274,7 @@ def _correct(length, level, state):
 
 @kernel
 def _resolve(speed, direction, axis):
-    """Return the velocity along body x (axis 0) or z, and its derivative by the direction."""
+    """Return the velocity along body x (axis 0) or z (1), and its derivative by the direction."""
     along, up = speed * np.cos(direction), speed * np.sin(direction)
     if axis == 0:
         return along, -up
@@ -285,7 +285,7 @@ def _resolve(speed, direction, axis):
 def _take_equation(wheels, slopes, residual, noise, state):
     """Correct by the equation slopes[0] angle_a + slopes[1] angle_b = residual of two wheels.
 
-    `noise` is the variance of the equation; it grows where the residual is far too large.
+    `noise` is the variance of the equation; it is increased if the residual is too large.
     """
     P, gain = state.covariance, state.gain
     a, b = wheels

@@ -1,10 +1,10 @@
-"""What happens when OSQP fails: all wheels get the same torque, and the answer says so.
+"""Fallback if OSQP fails: all wheels get the same torque, and the answer is marked.
 
-`TractionWorkspace.solve` reports a failure: OSQP's status is not "solved", or a variable is not
-finite. `solve_traction` then takes the forces of this file where no program was solved before, and
-marks the answer with `fallback`. A traction controller counts such answers and warns of them on
+`TractionWorkspace.solve` reports a failure if OSQP's status is not "solved" or a variable is not
+finite. If no program was solved before, `solve_traction` takes the forces of this file and marks
+the answer with `fallback`. The traction controller counts such answers and reports them on
 /diagnostics. Equal torques always keep the balance, so the rover drives on, but a wheel may slip
-before the others have given their part.
+while others still have friction in reserve.
 """
 
 import numpy as np

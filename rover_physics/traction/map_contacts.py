@@ -1,9 +1,9 @@
 """Contact angles from a map: where the wheels of a rover of known pose are nearest to the ground.
 
-Attitude and suspension angles are measured, so the wheels' places relative to one another are
-known better than from the map; the height of the body is taken from the map, since odometry
-drifts. A wheel at the foot of a face touches ground and face: it is the face that it has to
-climb, so of several places about equally near, the one farthest ahead counts.
+Attitude and suspension angles are measured, so the relative places of the wheels are more accurate
+than from the map. The height of the body comes from the map, because odometry drifts. A wheel at
+the foot of a face touches both ground and face, and has to climb the face. Of several places that
+are about equally near, the one farthest ahead therefore counts.
 """
 
 import numpy as np
@@ -21,19 +21,20 @@ from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import ContactEstimate
 
 PROFILE_STEPS = 14
-"""Samples of the ground from below a wheel's centre to PROFILE_REACH ahead, as many behind."""
+"""Number of ground samples from below a wheel's centre to PROFILE_REACH ahead; same behind."""
 PROFILE_REACH = 1.25
-"""How far ahead of a wheel's centre and behind it the ground is sampled, in wheel radii."""
+"""Distance ahead of and behind a wheel's centre over which the ground is sampled [wheel radii]."""
 PROFILES, MIDDLE_PROFILE = 3, 1
-"""Profiles of the ground below a wheel: along its right edge, its middle and its left edge."""
+"""Number of ground profiles of a wheel, along its right edge, middle and left edge; index of the
+middle one."""
 NEAREST_TOLERANCE = 0.06
-"""How much farther than the nearest place another one may be that still counts, in wheel radii."""
+"""Extra distance over that of the nearest place up to which a place counts [wheel radii]."""
 MAX_PLACES = 6
-"""Largest number of near places kept of one profile."""
+"""Largest number of near places per profile."""
 ANGLE_DEVIATION = 0.05
-"""Standard deviation of an angle where map and pose are exact [rad]."""
+"""Standard deviation of an angle if map and pose are exact [rad]."""
 CELL_DEVIATION = 0.3
-"""Standard deviation of a place within its cell, in cells."""
+"""Standard deviation of a place within its cell [cells]."""
 
 MAP_SEARCH = record_type(
     ("pose", float, (3,)),  # x, y [m] and yaw [rad] of the body's origin, map frame
@@ -62,7 +63,7 @@ class MapContactFinder:
         self._ground = pack_ground(terrain)
         self._resolution = terrain.resolution
         self._searches = array_of(new_record(MAP_SEARCH))
-        # Looking up a field of a record takes as long as writing it.
+        # Views are kept because looking up a field of a record is as slow as writing it.
         search = self._searches
         self._pose, self._q, self._direction = (
             search["pose"][0],
@@ -80,7 +81,7 @@ class MapContactFinder:
             state: Attitude and suspension; its contact angles are not used.
             pose: (4,) x, y, z [m] and yaw [rad] of the body's origin in the map frame.
             deviation: Standard deviation of x and y [m].
-            forward: Whether the rover drives forward: ahead is in front.
+            forward: Whether the rover drives forward, so that "ahead" is in front.
 
         Raises:
             ModelError: A wheel is beyond the map, over unknown ground, or not near the ground.
@@ -116,7 +117,7 @@ def _find_angles(grounds, linkages, searches):
 
 @kernel
 def _find_median(values):
-    """Return the median of (6,) values, NaN where one is."""
+    """Return the median of values (6,), NaN if one of them is NaN."""
     lower = upper = np.nan
     for i in range(WHEEL_COUNT):
         if values[i] != values[i]:
@@ -133,7 +134,7 @@ def _find_median(values):
 
 @kernel
 def _measure_gaps(ground, linkage, search):
-    """Write how far the ground is off each wheel's middle circle [m], NaN where unknown."""
+    """Write the distance of the ground from each wheel's middle circle [m], NaN if unknown."""
     for wheel in range(WHEEL_COUNT):
         _scan_profile(ground, linkage, search, wheel, MIDDLE_PROFILE)
         search.gaps[wheel] = search.distance[MIDDLE_PROFILE, 0] - linkage.radius
@@ -141,7 +142,7 @@ def _measure_gaps(ground, linkage, search):
 
 @kernel
 def _find_nearest(ground, linkage, search):
-    """Write for each wheel the angle farthest ahead of those where it is about nearest."""
+    """Write for each wheel the angle of the place farthest ahead among its nearest places."""
     direction, angles = search.direction, search.angles
     for wheel in range(WHEEL_COUNT):
         nearest = np.inf
@@ -159,10 +160,10 @@ def _find_nearest(ground, linkage, search):
 
 @kernel
 def _scan_profile(ground, linkage, search, wheel, profile):
-    """Look along the ground below a wheel, in a plane across its axis.
+    """Scan a profile of the ground below a wheel, in a plane normal to its axle.
 
-    Writes into row `profile` of search.distance and search.angle: the nearest place first, then
-    places nearer than their surroundings; infinite where there are no more.
+    Writes into row `profile` of search.distance [m] and search.angle [rad]: the nearest place
+    first, then other local minima of the distance; infinite if there are no more.
     """
     placement, distances, angles = search.placement, search.distance, search.angle
     R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
