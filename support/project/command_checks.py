@@ -13,7 +13,7 @@ import yaml
 from rover_planner.cli import app
 from rover_planner.nodes.programs import PROGRAMS, make_app
 from rover_planner.shell.run_app import run_app
-from support.checkout import TOP, console_scripts, setup_arguments
+from support.project.checkout import TOP, console_scripts, setup_arguments
 
 ROBOT_TOOLS = ("rosdep", "colcon", "ros2", "apt", "sudo")
 """Programs that a robot has and this machine need not have."""
@@ -75,7 +75,8 @@ def _check_parameter(node: str, name: str, value: str) -> None:
     """Hold a parameter against the table of its node."""
     specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
     assert name in specs, f"{node} has no parameter {name}"
-    specs[name].check(yaml.safe_load(value))
+    given = yaml.safe_load(value)
+    specs[name].check(tuple(given) if isinstance(given, list) else given)
 
 
 def _check_python(words: tuple[str, ...]) -> None:
