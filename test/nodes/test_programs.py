@@ -21,6 +21,7 @@ from rover_planner.nodes.traction_controller import main as traction_controller
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.nodes.traverse_server import main as traverse_server
 from support.command_line import REPOSITORY
+from support.project.checkout import console_scripts
 from support.ros_fixtures import domain_id, wait_until
 
 MAINS = {
@@ -175,9 +176,10 @@ def test_ready_says_which_map_there_is(start_server, capfd):
     assert told in capfd.readouterr().err
 
 
-def test_every_program_has_an_entry_point():
+def test_every_program_is_installed_by_its_entry_point():
+    scripts = console_scripts()
     for name in PROGRAMS:
-        assert callable(getattr(start, f"start_{name}"))
+        assert scripts[name] == (start.__name__, f"start_{name}")
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
