@@ -70,6 +70,7 @@ def assert_nothing_left(demo):
     assert demo.token.wait_until_gone() == []
 
 
+@pytest.mark.slow
 def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
     picture = tmp_path / "made" / "demo.png"
     demo = Demo(tmp_path, "--map", map_file, "--out", picture)
@@ -90,6 +91,7 @@ def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
     assert_nothing_left(demo)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 128 + signal.SIGTERM)]
 )
@@ -103,6 +105,7 @@ def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file, number, 
     assert_nothing_left(demo)
 
 
+@pytest.mark.slow
 def test_ctrl_c_to_the_whole_group_during_compilation_ends_everything(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
     demo.wait_for("rover_physics.prediction.sweep")
@@ -113,6 +116,7 @@ def test_ctrl_c_to_the_whole_group_during_compilation_ends_everything(tmp_path, 
     assert_nothing_left(demo)
 
 
+@pytest.mark.slow
 def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
     os.kill(demo.wait_for("rover_planner.nodes.traverse_server"), signal.SIGKILL)

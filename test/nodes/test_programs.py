@@ -160,6 +160,7 @@ def read_until_ready(process):
     raise AssertionError(f"ended with {process.wait()}: {''.join(lines)}")
 
 
+@pytest.mark.slow
 def test_a_misspelt_parameter_of_the_command_line_is_warned_of():
     process = start_program("traverse_server", "--ros-args", "-p", "terain_file:=spirit")
     lines = read_until_ready(process)
@@ -182,6 +183,7 @@ def test_every_program_is_installed_by_its_entry_point():
         assert scripts[name] == (start.__name__, f"start_{name}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_simulator_that_is_told_to_end_while_it_publishes_ends_cleanly(how):
     words = ["--ros-args", "-p", "terrain_file:=spirit", "-p", "start_x:=-46.0"]

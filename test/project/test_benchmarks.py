@@ -29,8 +29,8 @@ SMALL = {
     "walls": {"POSES": 5, "HEIGHTS": (0.3,)},
 }
 """Values of each topic's constants with which it takes seconds."""
-IN_PROCESSES = ("service", "start", "traction")
-"""Topics that start nodes in processes of their own."""
+QUICK = ("fan", "growth", "ingestion", "poses", "view")
+"""Topics that take less than two seconds in the small size."""
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def threads():
 
 def params_of_topics():
     slow = pytest.mark.slow
-    return [pytest.param(t, marks=slow if t in IN_PROCESSES else ()) for t in TOPICS]
+    return [pytest.param(topic, marks=() if topic in QUICK else slow) for topic in TOPICS]
 
 
 @pytest.mark.parametrize("topic", params_of_topics())
