@@ -22,11 +22,11 @@ help: ## list what there is
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/make \1\t\2/' | expand -t 14
 
 .PHONY: demo
-demo: $(READY) ## plan over DDS on a made Mars terrain; MAP=terrain.npz for another
+demo: $(READY) ## plan over DDS on a made Mars terrain; MAP=spirit for Mars, MAP=file.npz for another
 	@$(BIN)/python -m rover_planner demo $(if $(MAP),--map "$(MAP)")
 
 .PHONY: view
-view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP=terrain.npz for another
+view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for demo
 	@$(BIN)/python -m rover_planner view lsr1 $(if $(MAP),"$(MAP)")
 
 .PHONY: test
@@ -35,6 +35,10 @@ test: lint kernels ## lint, type check and all tests
 	$(BIN)/python -m pytest -n auto --dist loadfile $(addprefix --ignore=,$(BROWSER_TESTS)) test
 	echo "== tests of the page, alone: a browser without a graphics card needs all cores"
 	$(BIN)/python -m pytest $(BROWSER_TESTS)
+
+.PHONY: quick
+quick: $(READY) ## the tests that are not slow: under a minute once the kernels are compiled
+	@$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow" test
 
 .PHONY: lint
 lint: $(READY) ## ruff and mypy

@@ -21,6 +21,8 @@ SPACING = 0.25
 """Distance of the poses along a path [m]."""
 TURN = 0.35
 """Largest curvature [1/m]."""
+MAP_CELLS = 1_000
+"""Cells along each side of the map."""
 MAP_ROWS = (100, 180)
 """Rows of the map that are timed; it is alike all over, but for its edges."""
 
@@ -63,9 +65,10 @@ def measure() -> list[Figure]:
 
 
 def measure_map(rover) -> list[Figure]:
-    """Sweep a map of 1,000 x 1,000 cells at 8 headings, row by row, until there is enough."""
-    ground = make_mars_terrain(2, 50.0, 0.05)
-    ground = Terrain(ground.elevation[:1000, :1000], ground.resolution, ground.origin)
+    """Sweep a map at 8 headings, row by row, until there is enough."""
+    ground = make_mars_terrain(2, MAP_CELLS * 0.05, 0.05)
+    elevation = ground.elevation[:MAP_CELLS, :MAP_CELLS]
+    ground = Terrain(elevation, ground.resolution, ground.origin)
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     rates, before = [], peak_memory()
     began = time.perf_counter()
@@ -77,7 +80,7 @@ def measure_map(rover) -> list[Figure]:
             break
         began = time.perf_counter()
     rate, cells = statistics.median(rates), ground.elevation.size
-    name = "map of 1,000 x 1,000 cells"
+    name = f"map of {MAP_CELLS:,} x {MAP_CELLS:,} cells"
     return [
         Figure("map", f"{name}: poses per second, all threads", rate, "1/s", repeats=len(rates)),
         Figure("map", f"{name}: 8 headings take", 8 * cells / rate, "s", repeats=len(rates)),

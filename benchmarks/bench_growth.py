@@ -12,6 +12,15 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
+LENGTHS = (2.5, 5.0, 10.0, 20.0)
+"""Of paths [m]."""
+CANDIDATES = (1, 3, 9)
+"""Largest numbers of candidates of a question."""
+MAP_SIZES = (240, 480, 960)
+"""Cells along each side of a map."""
+RESOLUTIONS = (0.05, 0.02, 0.01)
+"""Cell sizes [m]."""
+
 
 def straight(length: float) -> np.ndarray:
     """Return poses 2 cm apart, straight ahead through the middle of a map."""
@@ -25,7 +34,7 @@ def measure() -> list[Figure]:
     rover = load_rover("lsr1")
     ground = make_mars_terrain(1, 24.0, 0.05)
     per_pose = {}
-    for length in (2.5, 5.0, 10.0, 20.0):
+    for length in LENGTHS:
         poses = straight(length)
         taken = median_time(lambda: sweep_path(rover, ground, poses))  # noqa: B023
         per_pose[length] = taken / len(poses) * 1e6
@@ -38,7 +47,7 @@ def measure() -> list[Figure]:
 
 def _candidates(rover, ground: Terrain) -> list[Figure]:
     figures = []
-    for count in (1, 3, 9):
+    for count in CANDIDATES:
         options = PathQueryOptions(count=count)
         taken = median_time(
             lambda: answer_path_query(rover, ground, (-5, 0, 0), (5, 0, 0), options)  # noqa: B023
@@ -49,10 +58,9 @@ def _candidates(rover, ground: Terrain) -> list[Figure]:
 
 def _maps(rover) -> list[Figure]:
     """The same poses on the same ground, cut out of maps of different size."""
-    whole = make_mars_terrain(3, 48.0, 0.05)
+    whole = make_mars_terrain(3, MAP_SIZES[-1] * 0.05, 0.05)
     poses, times = straight(8.0), []
-    sizes = (240, 480, 960)
-    for cells in sizes:
+    for cells in MAP_SIZES:
         first = (whole.elevation.shape[0] - cells) // 2
         corner = whole.origin[0] + first * whole.resolution
         part = whole.elevation[first : first + cells, first : first + cells]
@@ -60,14 +68,14 @@ def _maps(rover) -> list[Figure]:
         times.append(median_time(lambda: evaluate(model.records, poses), 21))  # noqa: B023
     return [
         Figure("growth", f"map of {cells} x {cells} cells", value / len(poses) * 1e6, "us/pose")
-        for cells, value in zip(sizes, times, strict=True)
+        for cells, value in zip(MAP_SIZES, times, strict=True)
     ]
 
 
 def _samples(rover) -> list[Figure]:
     """The same ground with finer cells: a wheel is sampled as finely as the map."""
     figures = []
-    for resolution in (0.05, 0.02, 0.01):
+    for resolution in RESOLUTIONS:
         model = pack_model(rover, make_mars_terrain(1, 10.0, resolution))
         poses = straight(6.0)
         taken = median_time(lambda: evaluate(model.records, poses), 11) / len(poses) * 1e6  # noqa: B023

@@ -165,7 +165,7 @@ def measure_floor(rover) -> list[Figure]:
         poses = random_poses(reference_ground(name), FLOOR_POSES)
         cells, settled = cells_looked_up(model, poses)
         floor = median_time(lambda: look_up_all(model.ground.records, cells), 21)  # noqa: B023
-        full = median_time(lambda: evaluate(*model, poses), 21)  # noqa: B023
+        full = median_time(lambda: evaluate(model.records, poses), 21)  # noqa: B023
         figures += [
             Figure("floor", f"{name}: look-ups per pose", len(cells) / settled, ""),
             Figure("floor", f"{name}: time of the look-ups", floor / settled * 1e6, "us"),

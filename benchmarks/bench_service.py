@@ -24,6 +24,8 @@ START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
 """Over ground with some rocks: contacts jump here and there, as on most ways."""
 QUESTIONS = 200
 WARM_UP = 20
+NINES = 50
+"""Questions with nine candidates."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +102,9 @@ def _tell(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]
         ("p99", late["server"], "ms", None),
         ("p99 / p50", spread["server"], "x", 2.0),
         ("p50 of an echo of the plan", middle["echo"], "ms", None),
-        ("p99 / p50 of that", spread["echo"], "x", None),
+        ("p99 / p50 of the echo", spread["echo"], "x", None),
         ("p50 of the computation", middle["computation"], "ms", None),
-        ("p99 / p50 of that", spread["computation"], "x", None),
+        ("p99 / p50 of the computation", spread["computation"], "x", None),
         ("p50 - computation - echo", overhead, "ms", 1.0),
         ("answers in a second of waiting", 1.0 / statistics.mean(times["server"]), "1/s", None),
     ]
@@ -116,8 +118,8 @@ def _measure_nine(ground: Terrain) -> list[Figure]:
     with planner_and_processes() as (planner, processes):
         processes.start_server(ground)
         times = []
-        for _ in range(60):
+        for _ in range(NINES + 10):
             time.sleep(ASKERS[0].pause)
             times.append(planner.ask(SERVER, START, GOAL)[1])
     middle = 1e3 * statistics.median(times[10:])
-    return [Figure("service", "p50, nine candidates", middle, "ms", repeats=50)]
+    return [Figure("service", "p50, nine candidates", middle, "ms", repeats=NINES)]

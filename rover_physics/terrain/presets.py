@@ -27,7 +27,7 @@ def find_terrain_file(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if not path.exists():
         raise TerrainError(
-            f"no terrain {str(name_or_path)!r}: it is no file, and the presets are "
+            f"no terrain {str(name_or_path)!r}: there is no such file, and the presets are "
             f"{', '.join(presets)}"
         )
     return path

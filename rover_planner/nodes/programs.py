@@ -114,7 +114,7 @@ def read_words(name: str, words: Sequence[str] | None) -> Any:
         own = remove_ros_args([name, *given])[1:]
     except RuntimeError as error:  # of several classes that rclpy does not export
         raise PlanningError(str(error)) from error
-    return run_app(_make_app(name), name, own)
+    return run_app(make_app(name), name, own)
 
 
 def _refuse_old_remappings(words: Sequence[str]) -> None:
@@ -129,10 +129,10 @@ def _refuse_old_remappings(words: Sequence[str]) -> None:
 
 def print_help(name: str) -> None:
     """Print the help of a node program."""
-    run_app(_make_app(name), name, HELP_WORDS[-1:])
+    run_app(make_app(name), name, HELP_WORDS[-1:])
 
 
-def _make_app(name: str) -> typer.Typer:
+def make_app(name: str) -> typer.Typer:
     """Return the app that reads the words of a program and has its help."""
     program = PROGRAMS[name]
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)

@@ -232,6 +232,11 @@ def main(words: Sequence[str] | None = None) -> int:
         return EXIT_BAD_INPUT
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_OK
+    except Exception:
+        # Whoever is told to stop while publishing fails on a context that has ended.
+        if rclpy.ok():
+            raise
+        return EXIT_OK
     finally:
         if node is not None:
             node.destroy_node()

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-import uuid
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +14,12 @@ from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.processes import ProcessToken
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("matplotlib", reason="needs matplotlib")
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-TOKEN = "ROVER_PLANNER_TEST_RUN"
 
 
 @pytest.fixture
@@ -38,13 +37,12 @@ class Demo:
     """The demo as a process whose descendants are known by a token in their environment."""
 
     def __init__(self, folder, *words):
-        self.token = f"{TOKEN}={uuid.uuid4()}"
-        name, value = self.token.split("=")
+        self.token = ProcessToken()
         self.folder = folder
         self.process = subprocess.Popen(
             [sys.executable, "-m", "rover_planner", "demo", *map(str, words)],
             cwd=REPOSITORY,
-            env=os.environ | {name: value, "PYTHONPATH": str(REPOSITORY)},
+            env=os.environ | self.token.environment | {"PYTHONPATH": str(REPOSITORY)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -56,24 +54,11 @@ class Demo:
         out, err = self.process.communicate(timeout=300)
         return self.process.returncode, out, err
 
-    def running(self, module=""):
-        """List the processes of this demo that run a module, or all of them."""
-        found = []
-        for folder in Path("/proc").glob("[0-9]*"):
-            try:
-                environment = (folder / "environ").read_bytes().decode(errors="replace")
-                command = (folder / "cmdline").read_bytes().decode(errors="replace")
-            except OSError:
-                continue
-            if self.token in environment.split("\0") and module in command:
-                found.append(int(folder.name))
-        return found
-
     def wait_for(self, module):
         """Wait until a process of the demo runs a module; return its number."""
         deadline = time.monotonic() + 240
         while time.monotonic() < deadline:
-            found = self.running(module)
+            found = self.token.find(module)
             if found:
                 return found[0]
             assert self.process.poll() is None, self.process.communicate()
@@ -82,12 +67,10 @@ class Demo:
 
 
 def assert_nothing_left(demo):
-    deadline = time.monotonic() + 10
-    while demo.running() and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert demo.running() == []
+    assert demo.token.wait_until_gone() == []
 
 
+@pytest.mark.slow
 def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
     picture = tmp_path / "made" / "demo.png"
     demo = Demo(tmp_path, "--map", map_file, "--out", picture)
@@ -108,6 +91,7 @@ def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
     assert_nothing_left(demo)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 128 + signal.SIGTERM)]
 )
@@ -121,6 +105,7 @@ def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file, number, 
     assert_nothing_left(demo)
 
 
+@pytest.mark.slow
 def test_ctrl_c_to_the_whole_group_during_compilation_ends_everything(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
     demo.wait_for("rover_physics.prediction.sweep")
@@ -131,6 +116,7 @@ def test_ctrl_c_to_the_whole_group_during_compilation_ends_everything(tmp_path, 
     assert_nothing_left(demo)
 
 
+@pytest.mark.slow
 def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
     os.kill(demo.wait_for("rover_planner.nodes.traverse_server"), signal.SIGKILL)

@@ -105,6 +105,7 @@ def test_the_command_draws_a_picture_of_nine_panels(tmp_path, monkeypatch):
         assert axes.get_lines()[1].get_xdata() == pytest.approx([-200.0, 200.0])
 
 
+@pytest.mark.slow
 def test_the_picture_is_drawn_for_any_rover(tmp_path):
     for rover in rovers():
         draw_figure4(tmp_path / f"{rover.name}.png", rover)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("matplotlib", reason="needs matplotlib")
+from matplotlib.figure import Figure
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -47,24 +48,57 @@ def test_a_picture_shows_accepted_and_refused_answers(tmp_path, rover, holed):
     assert path.stat().st_size > 50_000
 
 
-def test_refused_answers_alone_are_drawn_too(tmp_path, rover, holed):
-    path = tmp_path / "picture.png"
-    draw_answers(path, rover, holed, [ask(rover, holed, "A", (9, 0, 0))])
-    assert path.stat().st_size > 10_000
+@pytest.fixture
+def draw(tmp_path, rover, holed, monkeypatch):
+    """Return a function that draws one answer, and returns the axes of the map and the others."""
+    drawn = []
+    save = Figure.savefig
+    monkeypatch.setattr(
+        Figure, "savefig", lambda self, *a, **k: (drawn.append(self), save(self, *a, **k))
+    )
+
+    def draw_one(labelled):
+        path = tmp_path / "picture.png"
+        draw_answers(path, rover, holed, [labelled])
+        assert path.read_bytes().startswith(b"\x89PNG")
+        on_map = next(axes for axes in drawn[-1].axes if axes.get_xlabel() == "x [m]")
+        return on_map, [axes for axes in drawn[-1].axes if axes is not on_map]
+
+    return draw_one
 
 
-def test_a_start_off_the_map_is_drawn_without_any_settled_pose(tmp_path, rover, holed):
+def paths_of(axes, answer):
+    """Return which candidates of an answer are drawn as lines on a map."""
+    lines = [np.column_stack(line.get_data()) for line in axes.get_lines()]
+    return [
+        any(one.poses.shape[0] == len(line) and np.allclose(line, one.poses[:, :2])
+            for line in lines)
+        for one in answer.candidates
+    ]  # fmt: skip
+
+
+def test_refused_answers_alone_are_drawn_too(draw, rover, holed):
+    labelled = ask(rover, holed, "A", (9, 0, 0))
+    assert not labelled.answer.traversable
+    on_map, others = draw(labelled)
+    assert all(paths_of(on_map, labelled.answer))
+    assert "A" in {text.get_text() for text in on_map.texts}
+    assert any(axes.get_ylabel() == "wheel load [N]" for axes in others)
+
+
+def test_a_start_off_the_map_is_drawn_without_any_settled_pose(draw, rover, holed):
     answer = answer_path_query(rover, holed, (50, 50, 0), (52, 50, 0), COARSE)
-    path = tmp_path / "picture.png"
-    draw_answers(path, rover, holed, [LabelledAnswer("A", "off", answer)])
-    assert path.stat().st_size > 10_000
+    on_map, _ = draw(LabelledAnswer("A", "off", answer))
+    low, high = on_map.get_xlim()
+    assert low < 50.0 and high > 52.0
+    assert "A" in {text.get_text() for text in on_map.texts}
 
 
-def test_a_single_pose_is_drawn(tmp_path, rover, holed):
+def test_a_single_pose_is_drawn(draw, rover, holed):
     answer = answer_path_query(rover, holed, (0, 0, 0), (0, 0, 0), COARSE)
-    path = tmp_path / "picture.png"
-    draw_answers(path, rover, holed, [LabelledAnswer("A", "here", answer)])
-    assert path.stat().st_size > 10_000
+    on_map, _ = draw(LabelledAnswer("A", "here", answer))
+    starts = [line for line in on_map.get_lines() if line.get_markersize() == 17]
+    assert {tuple(line.get_xydata()[0]) for line in starts} == {(0.0, 0.0)}
 
 
 def test_slopes_towards_the_sun_are_brighter():

@@ -85,8 +85,8 @@ def walled(server):
 @pytest.mark.parametrize(
     ("goals", "code", "answers"),
     [
-        ([NEAR], 0, ["yes"]),
-        ([BEYOND], 3, ["no, "]),
+        pytest.param([NEAR], 0, ["yes"], marks=pytest.mark.slow),
+        pytest.param([BEYOND], 3, ["no, "], marks=pytest.mark.slow),
         ([BEYOND, NEAR], 3, ["no, ", "yes"]),
     ],
 )
@@ -98,6 +98,7 @@ def test_a_goal_that_is_not_traversable_has_an_exit_code_of_its_own(walled, goal
         assert line.startswith(f"goal {number}: {answer}")
 
 
+@pytest.mark.slow
 def test_goals_and_candidates_count_from_one_in_json(walled):
     code, out, _ = run_planner(START, NEAR, NEAR, "--json")
     assert code == 0
@@ -108,12 +109,14 @@ def test_goals_and_candidates_count_from_one_in_json(walled):
         assert f"chose {event['answer']['chosen_candidate']}:" in event["answer"]["explanation"]
 
 
+@pytest.mark.slow
 def test_a_question_that_nothing_was_judged_for_is_a_failure(server):
     code, out, err = run_planner(START, NEAR, "--timeout=10")
     assert (code, err) == (1, "")
     assert "goal 1: not judged, " in out
 
 
+@pytest.mark.slow
 def test_a_rover_that_is_not_there_fails_the_drive(walled):
     code, out, err = run_planner(START, NEAR, "--drive", "--timeout=8")
     assert code == 1
@@ -121,6 +124,7 @@ def test_a_rover_that_is_not_there_fails_the_drive(walled):
     assert err == "mission_planner: waited 8 s in vain for a rover on the topic path\n"
 
 
+@pytest.mark.slow
 def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for():
     code, _, err = run_planner(START, NEAR, "--timeout=1")
     assert code == 4

@@ -2,8 +2,10 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 from rclpy.parameter import Parameter
@@ -19,6 +21,7 @@ from rover_planner.nodes.traction_controller import main as traction_controller
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.nodes.traverse_server import main as traverse_server
 from support.command_line import REPOSITORY
+from support.project.checkout import console_scripts
 from support.ros_fixtures import domain_id, wait_until
 
 MAINS = {
@@ -137,19 +140,30 @@ def test_parameters_that_exist_are_not_warned_of(name, ros, capfd):
     assert "does not exist" not in capfd.readouterr().err
 
 
-def test_a_misspelt_parameter_of_the_command_line_is_warned_of():
-    words = ["--ros-args", "-p", "terain_file:=spirit"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rover_planner.nodes.traverse_server", *words],
+def start_program(name, *words):
+    """Start a node program in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", f"rover_planner.nodes.{name}", *words],
         env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "PYTHONUNBUFFERED": "1"},
         stderr=subprocess.PIPE,
         text=True,
     )
-    lines: list[str] = []
+
+
+def read_until_ready(process):
+    """Return the lines that a program logs until it says that it is ready."""
+    lines = []
     for line in process.stderr:
         lines.append(line)
         if "ready" in line:
-            break
+            return lines
+    raise AssertionError(f"ended with {process.wait()}: {''.join(lines)}")
+
+
+@pytest.mark.slow
+def test_a_misspelt_parameter_of_the_command_line_is_warned_of():
+    process = start_program("traverse_server", "--ros-args", "-p", "terain_file:=spirit")
+    lines = read_until_ready(process)
     process.terminate()
     process.communicate(timeout=20)
     assert process.returncode == 0
@@ -163,6 +177,20 @@ def test_ready_says_which_map_there_is(start_server, capfd):
     assert told in capfd.readouterr().err
 
 
-def test_every_program_has_an_entry_point():
+def test_every_program_is_installed_by_its_entry_point():
+    scripts = console_scripts()
     for name in PROGRAMS:
-        assert callable(getattr(start, f"start_{name}"))
+        assert scripts[name] == (start.__name__, f"start_{name}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_simulator_that_is_told_to_end_while_it_publishes_ends_cleanly(how):
+    words = ["--ros-args", "-p", "terrain_file:=spirit", "-p", "start_x:=-46.0"]
+    words += ["-p", "start_y:=-19.5", "-p", "rate:=500.0", "-p", "map_rate:=20.0"]
+    process = start_program("rover_simulator", *words)
+    read_until_ready(process)
+    time.sleep(1.0)
+    process.send_signal(how)
+    _, err = process.communicate(timeout=20)
+    assert (process.returncode, "Traceback" in err) == (0, False), err

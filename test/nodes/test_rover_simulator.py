@@ -126,6 +126,7 @@ def test_soil_and_policy_are_those_of_the_model_that_moves_it(ros, terrain_file)
     assert plant.state().wheel_torques == pytest.approx(model.torque[0], rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
 def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     ros, terrain_file, engine

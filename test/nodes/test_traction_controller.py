@@ -158,6 +158,7 @@ def test_a_node_that_is_stopped_sends_zeros_and_no_more(rover, controller):
     assert controller.statistics.updates == updates
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_process_that_is_told_to_end_sends_zeros_last(rover, how):
     process = subprocess.Popen(

@@ -46,6 +46,7 @@ def read_until(process, text):
     raise AssertionError(f"ended without {text!r}: {''.join(lines)}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_it_says_what_it_does_and_ends_cleanly(start_process, how):
     process = start_process()
@@ -71,6 +72,7 @@ def test_another_process_gets_an_answer(start_process, tmp_path):
         run.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameter", "text"),
     [

@@ -52,6 +52,7 @@ def test_wheels_turn_by_the_way_they_roll():
     assert rates == pytest.approx(np.full(6, 0.6), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_it_stops_before_a_wall_and_says_why_and_can_go_back():
     ground = make_terrain(lambda x, y: waves(x, y) + 0.5 * (x > 1.0), half=3.0)
     plant = QuasiStaticPlant(LSR1, ground, (0.0, 0.0, 0.0))

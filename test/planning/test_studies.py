@@ -48,6 +48,7 @@ def test_the_tallest_step_is_climbed_and_a_little_more_is_not():
     assert not climbs(LSR1, height + 0.004, "equal", 0.6)
 
 
+@pytest.mark.slow
 def test_best_torques_climb_at_least_as_high_as_equal_ones():
     assert tallest_step(LSR1, "optimal", 0.6) >= tallest_step(LSR1, "equal", 0.6)
 

@@ -99,6 +99,7 @@ def test_the_exact_goal_is_preferred_to_its_neighbours():
     assert search.goal_offset == 0.0 and search.alternatives_tried == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.05, 0.3, 0.9])
 def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
     wall = make_terrain(wall_at(2.0))
@@ -110,6 +111,7 @@ def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
     assert judgement.traversable == (tolerance == 0.9)
 
 
+@pytest.mark.slow
 def test_the_nearest_ring_that_can_be_reached_is_taken():
     wall = make_terrain(wall_at(2.0))
     offset = (

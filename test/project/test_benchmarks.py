@@ -2,20 +2,69 @@
 
 import importlib
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
-TOPICS = sorted(path.stem for path in BENCHMARKS.glob("bench_*.py"))
+TOPICS = sorted(path.stem.removeprefix("bench_") for path in BENCHMARKS.glob("bench_*.py"))
+SMALL = {
+    "fan": {"ARCS": (2, 2, 2), "MAP_CELLS": 60, "MAP_ROWS": (0, 40)},
+    "growth": {
+        "LENGTHS": (1.0, 2.0),
+        "CANDIDATES": (1,),
+        "MAP_SIZES": (200, 240),
+        "RESOLUTIONS": (0.05,),
+    },
+    "ingestion": {"CELLS": 60},
+    "mujoco": {"POSES": 2, "MANY": 20},
+    "parts": {"POSES": 20, "REPEATS": 2},
+    "poses": {"POSES": 20, "FLOOR_POSES": 10, "LINES": 2, "SPACING": 0.2},
+    "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2},
+    "start": {"STARTS": 1, "COLD_STARTS": 0},
+    "traction": {"ALONE_TIME": 0.5, "TOGETHER_TIME": 1.0},
+    "view": {},
+    "walls": {"POSES": 5, "HEIGHTS": (0.3,)},
+}
+"""Values of each topic's constants with which it takes seconds."""
+QUICK = ("fan", "growth", "ingestion", "poses", "view")
+"""Topics that take less than two seconds in the small size."""
 
 
-@pytest.mark.parametrize("topic", TOPICS)
-def test_every_topic_can_be_measured(topic):
-    if topic == "bench_mujoco":
+@pytest.fixture
+def threads():
+    """Leave numba with the threads that it had."""
+    numba = pytest.importorskip("numba")
+    before = numba.get_num_threads()
+    yield
+    numba.set_num_threads(before)
+
+
+def params_of_topics():
+    slow = pytest.mark.slow
+    return [pytest.param(topic, marks=() if topic in QUICK else slow) for topic in TOPICS]
+
+
+@pytest.mark.parametrize("topic", params_of_topics())
+def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, capsys, threads):
+    if topic == "mujoco":
         pytest.importorskip("mujoco", reason="install the extra bench")
-    assert callable(importlib.import_module(f"benchmarks.{topic}").measure)
+    module = importlib.import_module(f"benchmarks.bench_{topic}")
+    for name, value in SMALL[topic].items():
+        monkeypatch.setattr(module, name, value)
+    figures = module.measure()
+    names = [(figure.topic, figure.name) for figure in figures]
+    assert names and len(set(names)) == len(names)
+    assert all(math.isfinite(figure.value) for figure in figures)
+    assert any(figure.value > 0.0 for figure in figures)
+    measure = importlib.import_module("benchmarks.measure")
+    measure.write(figures, tmp_path / "results.json")
+    rows = json.loads((tmp_path / "results.json").read_text())
+    assert [(row["topic"], row["name"]) for row in rows] == names
+    measure.show(figures)
+    assert figures[0].topic in capsys.readouterr().out
 
 
 def test_medians_are_of_calls_in_turns():
@@ -59,9 +108,3 @@ def test_the_fan_has_as_many_paths_as_enav(monkeypatch):
     )
     steps = np.linalg.norm(np.diff(fan[:, :, :2], axis=1), axis=2)
     np.testing.assert_allclose(steps, 0.25)
-
-
-def test_a_small_map_is_taken_in_any_order(monkeypatch):
-    ingestion = importlib.import_module("benchmarks.bench_ingestion")
-    monkeypatch.setattr(ingestion, "CELLS", 60)
-    assert all(figure.value > 0.0 for figure in ingestion.measure())

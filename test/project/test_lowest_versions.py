@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rover_planner.nodes.programs import PROGRAMS
-from support.checkout import TOP, copy_checkout, setup_arguments
+from support.project.checkout import TOP, copy_checkout, setup_arguments
 
 LIBRARY = """
 import numpy as np

@@ -17,7 +17,7 @@ from rover_planner.viewer.state.session import ViewSession
 from support.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
 from support.grounds import make_terrain, waves
 
-pytestmark = needs_browser
+pytestmark = [needs_browser, pytest.mark.slow]
 
 LSR1 = load_rover("lsr1")
 AHEAD = (640, 400)

@@ -23,7 +23,7 @@ from support.browser import (
 from support.grounds import make_terrain, waves
 from support.viewer_sessions import ramp
 
-pytestmark = needs_browser
+pytestmark = [needs_browser, pytest.mark.slow]
 
 LSR1 = load_rover("lsr1")
 MIDDLE = (600, 420)

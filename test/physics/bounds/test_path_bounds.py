@@ -38,6 +38,7 @@ def bounds_on(rover, terrain, poses=PATH, sigmas=3.0, **arguments):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
 @pytest.mark.parametrize("ground", ["level", "slope", "rocks", "relief", "step"])
 def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground):

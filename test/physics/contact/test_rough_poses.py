@@ -56,6 +56,7 @@ def test_a_pose_that_does_not_settle_is_refused_as_such():
         assert (codes[~prediction.settled] == "not_settled").all()
 
 
+@pytest.mark.slow
 def test_no_wheel_of_a_settled_pose_is_in_the_air():
     assert len(brute_force_gaps()) >= 990
     assert brute_force_gaps().max() <= 3e-5

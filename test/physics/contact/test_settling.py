@@ -89,6 +89,7 @@ def test_wheels_touch_by_an_independent_dense_look_at_the_circles_of_the_model()
     assert gaps.min() >= -1e-3
 
 
+@pytest.mark.slow
 def test_between_the_circles_of_the_model_no_wheel_is_deep_in_the_ground():
     across = np.linspace(-0.5 * LSR1.wheel.width, 0.5 * LSR1.wheel.width, 33)
     gaps = np.concatenate(
@@ -255,6 +256,7 @@ def test_a_wall_across_the_rover_is_never_settled_by_a_guess():
     assert (prediction.status == PoseStatus.NOT_SETTLED).any()
 
 
+@pytest.mark.slow
 def test_a_rover_never_settles_turned_over():
     ground = fractal(3, roughness=0.5)
     prediction = sweep_path(LSR1, ground, random_poses(3, 600, 1.9))

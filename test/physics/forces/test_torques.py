@@ -17,6 +17,7 @@ LSR1 = load_rover("lsr1")
 few = settings(max_examples=20, deadline=None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("max_torque", [2.0, 0.4])
 @pytest.mark.parametrize("make", [smooth, fractal, rocky])
 def test_no_torques_within_the_limit_need_less_friction(make, max_torque):
@@ -36,6 +37,7 @@ def test_no_torques_within_the_limit_need_less_friction(make, max_torque):
     assert compared >= 4
 
 
+@pytest.mark.slow
 def test_on_the_steps_of_the_reference_no_torques_need_less_friction():
     case = reference_ground("settled_a/step")
     prediction = sweep_path(LSR1, case.terrain, case.poses, SweepOptions(policy="optimal"))

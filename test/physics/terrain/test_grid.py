@@ -394,7 +394,7 @@ def test_a_damaged_entry_is_named(tmp_path):
 def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
     for path in (tmp_path / "none.npz", str(tmp_path / "none.npz")):
         with pytest.raises(
-            TerrainError, match=r"none\.npz': it is no file, and the presets are sp"
+            TerrainError, match=r"none\.npz': there is no such file, and the presets are sp"
         ):
             load_terrain(path)
     with pytest.raises(TerrainError, match="cannot be read: Is a directory"):

@@ -24,6 +24,7 @@ def test_the_planner_calls_the_step_passable_only_with_traction_control():
     assert "passable with traction control" in classes and "impassable" not in classes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "passes"), [(EQUAL_CONTROLLER, False), (MAP_CONTROLLER, True)]
 )

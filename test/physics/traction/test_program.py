@@ -62,6 +62,7 @@ def test_equal_torques_are_those_of_the_sweep():
             assert values == pytest.approx(getattr(prediction, name)[i], abs=1e-9 * LSR1.weight)
 
 
+@pytest.mark.slow
 def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_optimum():
     workspace, writer, short = TractionWorkspace(), BalanceWriter(LSR1), []
     for prediction, i in rough_states(LSR1, 1000):

@@ -26,11 +26,13 @@ def test_there_are_60_drives_of_five_kinds():
     assert {drive.outcome for drive in drives} == {PASSED, "stuck", "tipped"}
 
 
+@pytest.mark.slow
 def test_under_optimal_torques_at_least_54_drives_end_as_judged():
     judged = verdicts("optimal")
     assert sum(verdict.traversable == (drive.outcome == PASSED) for drive, verdict in judged) >= 54
 
 
+@pytest.mark.slow
 def test_nothing_passable_under_equal_torques_got_stuck_or_tipped():
     passable = [drive for drive, verdict in verdicts("equal") if verdict.traversable]
     assert len(passable) >= 8

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-TOP = Path(__file__).resolve().parents[1]
+TOP = Path(__file__).resolve().parents[2]
 MADE = ("*.egg-info", "__pycache__", ".*", "build", "install", "log", "*_output")
 """What is in a checkout and no part of it."""
 

@@ -1,0 +1,49 @@
+"""Processes of a test, known by a token that all of them inherit in their environment."""
+
+import os
+import signal
+import time
+import uuid
+from pathlib import Path
+
+_NAME = "ROVER_PLANNER_TEST_RUN"
+
+
+class ProcessToken:
+    """A mark in the environment of a process and of all that it starts."""
+
+    def __init__(self) -> None:
+        self._value = str(uuid.uuid4())
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What to add to the environment of the first process."""
+        return {_NAME: self._value}
+
+    def find(self, module: str = "") -> list[int]:
+        """Return the numbers of the processes that have a text in their command line."""
+        found = []
+        for folder in Path("/proc").glob("[0-9]*"):
+            try:
+                environment = (folder / "environ").read_bytes().decode(errors="replace")
+                command = (folder / "cmdline").read_bytes().decode(errors="replace")
+            except OSError:
+                continue
+            if f"{_NAME}={self._value}" in environment.split("\0") and module in command:
+                found.append(int(folder.name))
+        return found
+
+    def wait_until_gone(self, seconds: float = 10.0) -> list[int]:
+        """Wait until no process is left; return those that are left in the end."""
+        deadline = time.monotonic() + seconds
+        while self.find() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        return self.find()
+
+    def kill(self) -> None:
+        """End whatever is left."""
+        for number in self.find():
+            try:
+                os.kill(number, signal.SIGKILL)
+            except ProcessLookupError:
+                continue

@@ -1,0 +1,1 @@
+"""What tests of the project as a whole share: the checkout, its pages, their commands."""

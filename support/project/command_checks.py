@@ -1,0 +1,176 @@
+"""Holds commands of the docs against the product without running them: names, options, values."""
+
+import ast
+import importlib
+import importlib.util
+import re
+import shutil
+from typing import Any
+
+import typer
+import yaml
+
+from rover_planner.cli import app
+from rover_planner.nodes.programs import PROGRAMS, make_app
+from rover_planner.shell.run_app import run_app
+from support.project.checkout import TOP, console_scripts, setup_arguments
+
+ROBOT_TOOLS = ("rosdep", "colcon", "ros2", "apt", "sudo")
+"""Programs that a robot has and this machine need not have."""
+
+
+def check_command(words: tuple[str, ...]) -> None:
+    """Fail where a command names a program, file, module, option or parameter that is not there.
+
+    Raises:
+        AssertionError, PlanningError, RoverError: Says what is not there.
+    """
+    while words and re.fullmatch(r"\w+=.*", words[0]):  # NAME=VALUE before the program
+        words = words[1:]
+    if not words:
+        return
+    name, arguments = words[0], words[1:]
+    if name == "rover_planner":
+        _check_subcommand(arguments)
+    elif name in PROGRAMS:
+        _check_node(name, arguments)
+    elif name in ("python", "python3"):
+        _check_python(arguments)
+    elif name == "pip":
+        _check_pip(arguments)
+    elif name == "make":
+        _check_make(arguments)
+    elif name == "ros2":
+        _check_ros2(arguments)
+    elif name.startswith("."):
+        assert (TOP / name).is_file(), f"no file {name}"
+    else:
+        builtin = name in ("cd", "source", "kill", "wait", "export", "echo")
+        assert builtin or name in ROBOT_TOOLS or shutil.which(name), f"no program {name}"
+
+
+def _check_subcommand(words: tuple[str, ...]) -> None:
+    """Let the parser of a subcommand of rover_planner read its words."""
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    if words == ("--help",):
+        return
+    assert words and words[0] in commands, f"rover_planner has no command {words[:1]}"
+    if "--help" in words or words[1:] == ("COMMAND",):
+        return
+    commands[words[0]].make_context(words[0], list(words[1:]))
+
+
+def _check_node(name: str, words: tuple[str, ...]) -> None:
+    """Let the parser of a node program read its words, and its table the parameters."""
+    own, ros = _split_at(words, "--ros-args")
+    if "--help" not in own:
+        run_app(make_app(name), name, own)
+    assert set(ros[0::2]) <= {"-p", "-r"}, f"{name} {' '.join(ros)}"
+    for option, value in zip(ros[0::2], ros[1::2], strict=True):
+        if option == "-p":
+            _check_parameter(name, *value.split(":="))
+
+
+def _check_parameter(node: str, name: str, value: str) -> None:
+    """Hold a parameter against the table of its node."""
+    specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
+    assert name in specs, f"{node} has no parameter {name}"
+    given = yaml.safe_load(value)
+    specs[name].check(tuple(given) if isinstance(given, list) else given)
+
+
+def _check_python(words: tuple[str, ...]) -> None:
+    """Look for the module that is run, and compile a script of one word."""
+    if words[0] == "-c":
+        ast.parse(words[1])
+        return
+    assert words[0] == "-m", f"python {' '.join(words)}"
+    module, arguments = words[1], words[2:]
+    if module in ROBOT_TOOLS:
+        return
+    assert importlib.util.find_spec(module) is not None, f"no module {module}"
+    if module == "benchmarks.run":
+        for topic in arguments:
+            assert (TOP / "benchmarks" / f"bench_{topic}.py").is_file(), f"no topic {topic}"
+    if module == "rover_planner":
+        _check_subcommand(arguments)
+
+
+def _check_pip(words: tuple[str, ...]) -> None:
+    """Look for constraints, extras and packages that are installed."""
+    extras = setup_arguments()["extras_require"]
+    locked = (TOP / "constraints.txt").read_text(encoding="utf-8")
+    assert words[0] == "install", f"pip {' '.join(words)}"
+    rest = list(words[1:])
+    while rest:
+        word = rest.pop(0)
+        if word == "-c":
+            file = rest.pop(0)
+            assert (TOP / file).is_file() or file == "locked.txt", f"no file {file}"
+        elif match := re.fullmatch(r"(?:\.|rover_planner)(?:\[([\w,]+)\])?", word):
+            assert set((match[1] or "").split(",")) - {""} <= set(extras), word
+        elif not word.startswith("-"):
+            assert re.search(rf"^{re.escape(word)}==", locked, re.MULTILINE), f"{word} not locked"
+
+
+def _check_make(words: tuple[str, ...]) -> None:
+    """Look for targets and variables in the Makefile."""
+    makefile = (TOP / "Makefile").read_text(encoding="utf-8")
+    for word in words:
+        variable, _, value = word.partition("=")
+        if value:
+            assert re.search(rf"\$\({variable}\)|^{variable} \?=", makefile, re.MULTILINE), word
+        else:
+            assert re.search(rf"^{word}:", makefile, re.MULTILINE), f"no target {word}"
+
+
+def _check_ros2(words: tuple[str, ...]) -> None:
+    """Look for what the ros2 command is asked to start, to call or to set."""
+    verb, rest = words[0], words[1:]
+    if verb == "run":
+        assert rest[0] == "rover_planner" and rest[1] in console_scripts(), rest
+        _check_node(rest[1], rest[2:])
+    elif verb == "launch":
+        _check_launch(rest)
+    elif verb == "param":
+        assert rest[0] in ("set", "get"), rest
+        if rest[0] == "set":
+            _check_parameter(rest[1].lstrip("/"), rest[2], rest[3])
+    else:
+        assert (verb, rest[0]) == ("service", "call"), words
+        _check_call(*rest[1:4])
+
+
+def _check_launch(words: tuple[str, ...]) -> None:
+    """Look for a launch file and its arguments."""
+    assert words[0] == "rover_planner", words
+    text = (TOP / "launch" / words[1]).read_text(encoding="utf-8")
+    for word in words[2:]:
+        assert f'"{word.split(":=")[0]}"' in text, f"{words[1]} has no argument {word}"
+
+
+def _check_call(service: str, kind: str, request: str = "{}") -> None:
+    """Look for a service and its type, and put the request into a message of it."""
+    package, _, name = kind.split("/")
+    node, _, topic = service.strip("/").partition("/")
+    assert f"~/{topic}" in PROGRAMS[node].topics, f"{node} serves no {topic}"
+    message = getattr(importlib.import_module(f"{package}.srv"), name).Request()
+    _fill(message, yaml.safe_load(request))
+
+
+def _fill(message: Any, values: dict[str, Any]) -> None:
+    """Write values into a message; a wrong name or type is an error."""
+    for name, value in values.items():
+        assert hasattr(message, name), f"{type(message).__name__} has no field {name}"
+        if isinstance(value, dict):
+            _fill(getattr(message, name), value)
+        else:
+            setattr(message, name, value)
+
+
+def _split_at(words: tuple[str, ...], mark: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the words before and behind a mark."""
+    if mark not in words:
+        return words, ()
+    place = words.index(mark)
+    return words[:place], words[place + 1 :]

@@ -1,0 +1,114 @@
+"""Code blocks of README and docs: read from the page, and the words of their commands."""
+
+import itertools
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from support.project.checkout import TOP
+
+PAGES = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
+_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_MARK = re.compile(r"<!-- not run: (.+) -->\n\Z")
+_SEPARATORS = {"&", "&&", ";", "|", "||"}
+_REDIRECTIONS = {"<", ">", ">>"}
+
+
+@dataclass(frozen=True)
+class Block:
+    """A code block of a page."""
+
+    page: str
+    """Path of the page from the top of the checkout."""
+    line: int
+    """Line of the page where its text begins."""
+    language: str
+    """What stands behind the opening backquotes."""
+    text: str
+    """What it holds."""
+    not_run: str
+    """Why the page says that it is not run, in a comment before it; empty without one."""
+    output: str | None
+    """What it prints, where a block of text follows at once; else None."""
+
+    def __str__(self) -> str:
+        """Return page and line, as tools write them."""
+        return f"{self.page}:{self.line}"
+
+
+@dataclass(frozen=True)
+class Command:
+    """A simple command of a shell block."""
+
+    words: tuple[str, ...]
+    """Its words, quotes and redirections removed."""
+    in_background: bool
+    """Whether & follows."""
+
+
+def read_blocks(page: Path, top: Path = TOP) -> list[Block]:
+    """Return the blocks of a page in sh and Python, from top to bottom."""
+    text = page.read_text(encoding="utf-8")
+    found = list(_FENCE.finditer(text))
+    blocks = []
+    for match, following in itertools.zip_longest(found, found[1:]):
+        if match[1] not in ("sh", "python"):
+            continue
+        mark = _MARK.search(text[: match.start()])
+        at_once = following is not None and not text[match.end() : following.start()].strip()
+        output = following[2] if at_once and following[1] == "text" else None
+        blocks.append(
+            Block(
+                page.relative_to(top).as_posix(),
+                text[: match.start()].count("\n") + 2,
+                match[1],
+                match[2],
+                mark[1] if mark else "",
+                output,
+            )
+        )
+    return blocks
+
+
+def split_commands(text: str) -> list[Command]:
+    """Return the simple commands of a shell script that has no control structures."""
+    commands: list[Command] = []
+    for tokens in _tokens_of_lines(text):
+        words: list[str] = []
+        for token in [*tokens, ";"]:
+            if token in _SEPARATORS:
+                if words:
+                    commands.append(Command(_without_redirections(words), token == "&"))
+                words = []
+            else:
+                words.append(token)
+    return commands
+
+
+def _tokens_of_lines(text: str) -> Iterator[list[str]]:
+    """Yield words and operators of each line; a line that ends within quotes goes on."""
+    pending = ""
+    for line in text.replace("\\\n", " ").splitlines():
+        pending += line + "\n"
+        lexer = shlex.shlex(pending, posix=True, punctuation_chars=True)
+        lexer.whitespace_split = True
+        try:
+            yield list(lexer)
+        except ValueError:  # a quote is open
+            continue
+        pending = ""
+    assert not pending, f"quotes that nobody closes: {pending}"
+
+
+def _without_redirections(words: list[str]) -> tuple[str, ...]:
+    """Return words without > and < and the files behind them."""
+    kept = []
+    rest = iter(words)
+    for word in rest:
+        if word in _REDIRECTIONS:
+            next(rest, None)
+        else:
+            kept.append(word)
+    return tuple(kept)

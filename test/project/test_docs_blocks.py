@@ -1,0 +1,255 @@
+"""The code blocks of README and docs run as they are written, from top to bottom of each page.
+
+A page gets an empty folder, and the programs of this checkout by their names. What cannot run
+here is listed in NOT_RUN; it is read by the parsers of the product all the same.
+"""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+from support.processes import ProcessToken
+from support.project.checkout import TOP, console_scripts
+from support.project.command_checks import check_command
+from support.project.doc_blocks import PAGES, Block, Command, read_blocks, split_commands
+from support.ros_fixtures import domain_id
+
+NOT_RUN = {
+    ("make",): "makes an environment and runs the tests; each target has tests of its own",
+    ("pip",): "installs; test_lowest_versions installs in an environment of its own",
+    ("ros2",): "PyPI does not have the ros2 command",
+    ("rosdep",): "is for a robot that has ROS 2 from apt",
+    ("source",): "is for a robot that has ROS 2 from apt",
+    ("python3", "-m", "colcon"): "is for a robot that has ROS 2 from apt",
+    ("python", "-m", "benchmarks"): "takes minutes; test_benchmarks runs each topic small",
+    ("rover_planner", "view"): "serves a page until Ctrl-C; the tests in test/viewer serve it",
+    ("rover_planner", "study"): "takes minutes; test_studies runs small ones",
+}
+"""How commands begin that are not run here, and why; a block with one of them is not run."""
+SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
+"""Programs that run until they are told to stop."""
+LONGEST = 300.0
+"""Longest time for a block [s]."""
+
+BLOCKS = [block for page in PAGES for block in read_blocks(page)]
+PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
+
+
+def begins_with(command: Command, start: tuple[str, ...]) -> bool:
+    """Tell whether a command begins with words, the last of which may go on after a dot."""
+    words = [*command.words[: len(start) - 1]]
+    words += [word.split(".")[0] for word in command.words[len(start) - 1 : len(start)]]
+    return tuple(words) == start
+
+
+def find_reason(block: Block) -> str:
+    """Return why a block is not run here, empty if it is."""
+    if block.language == "python":
+        return ""
+    commands = split_commands(block.text)
+    return next(
+        (why for start, why in NOT_RUN.items() if any(begins_with(c, start) for c in commands)),
+        "",
+    )
+
+
+def test_there_are_blocks_to_run():
+    run = [block for block in BLOCKS if not find_reason(block)]
+    assert {block.language for block in run} == {"sh", "python"}
+    assert "README.md" in {block.page for block in run}
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=str)
+def test_a_block_names_only_what_there_is(block):
+    if block.language == "python":
+        ast.parse(block.text)
+        return
+    checked = subprocess.run(["bash", "-n"], input=block.text, capture_output=True, text=True)
+    assert (checked.returncode, checked.stderr) == (0, "")
+    for command in split_commands(block.text):
+        check_command(command.words)
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=str)
+def test_what_a_page_says_is_not_run_cannot_run_here(block):
+    if block.not_run:
+        assert find_reason(block), f"{block} says {block.not_run!r}; no command says so"
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=str)
+def test_a_server_in_a_block_runs_in_the_background(block):
+    if block.language == "sh" and not find_reason(block):
+        for command in split_commands(block.text):
+            assert command.words[0] not in SERVERS or command.in_background, command.words
+
+
+@pytest.fixture
+def programs(tmp_path) -> Path:
+    """Return a folder with the programs of this checkout, as its setup.py names them."""
+    folder = tmp_path / "programs"
+    folder.mkdir()
+    for name, (module, function) in console_scripts().items():
+        text = f"import sys\nfrom {module} import {function}\nsys.exit({function}())\n"
+        (folder / name).write_text(f"#!{sys.executable}\n{text}")
+    (folder / "python").write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    for path in folder.iterdir():
+        path.chmod(0o755)
+    return folder
+
+
+class Reader:
+    """A person at a shell in an empty folder, who runs one block after another."""
+
+    def __init__(self, folder: Path, programs: Path):
+        self.folder = folder
+        self.grace = 20.0
+        """How long processes may take to end after their block [s]."""
+        self.token = ProcessToken()
+        self.environment = os.environ | self.token.environment | {
+            "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONPATH": str(TOP),
+            "PYTHONUNBUFFERED": "1",
+            "ROS_DOMAIN_ID": str(domain_id()),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        }  # fmt: skip
+
+    def run(self, block: Block) -> None:
+        """Run a block; what it says on stdout, its exit code and its processes must be right."""
+        shell = block.language == "sh"
+        # Job control, as at a prompt, so that `kill %1` ends what a job started too.
+        text = f"set -m -e -o pipefail\n{block.text}" if shell else block.text
+        script = self._aside("script")
+        script.write_text(text, encoding="utf-8")
+        with open(self._aside("out"), "w") as out, open(self._aside("err"), "w") as err:
+            ended = subprocess.run(
+                ["bash" if shell else sys.executable, str(script)],
+                cwd=self.folder,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=err,
+                timeout=LONGEST,
+                start_new_session=True,
+            )
+        left = self.token.wait_until_gone(self.grace)
+        out_text, err_text = self._aside("out").read_text(), self._aside("err").read_text()
+        said = f"{block}\n{out_text}\n{err_text}"
+        assert ended.returncode == 0, said
+        assert "Traceback" not in said and "[FATAL]" not in said, said
+        assert not left, f"processes are left by {said}"
+        if block.output is not None:
+            assert lines_of(out_text) == lines_of(block.output), said
+
+    def _aside(self, name: str) -> Path:
+        """Return a file beside the reader's folder, which holds what blocks write alone."""
+        return self.folder.parent / name
+
+
+def lines_of(text: str) -> list[str]:
+    return [line.rstrip() for line in text.strip().splitlines()]
+
+
+@pytest.fixture
+def reader(tmp_path, programs):
+    """Return a reader in a fresh folder; whatever is left at the end is killed."""
+    folder = tmp_path / "work"
+    folder.mkdir()
+    person = Reader(folder, programs)
+    yield person
+    person.token.kill()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES_TO_RUN)
+def test_the_blocks_of_a_page_run_as_written(page, reader):
+    for block in BLOCKS:
+        if block.page == page and not find_reason(block):
+            reader.run(block)
+
+
+def page_with(tmp_path, text) -> list[Block]:
+    """Return the blocks of a page of this text, as if it were README."""
+    path = tmp_path / "page.md"
+    path.write_text(text)
+    return read_blocks(path, tmp_path)
+
+
+def test_blocks_are_read_with_marks_and_outputs(tmp_path):
+    first, second = page_with(
+        tmp_path,
+        "# Page\n\n<!-- not run: installs -->\n```sh\npip install .\n```\n\nand\n\n"
+        "```python\nprint(1)\n```\n\n```text\n1\n```\n",
+    )
+    assert (first.language, first.not_run, first.output) == ("sh", "installs", None)
+    assert (second.language, second.not_run, second.output) == ("python", "", "1\n")
+    assert str(first) == "page.md:5" and str(second) == "page.md:11"
+
+
+def test_commands_are_split_as_a_shell_does():
+    text = "a --b 'c d' > e &  # it's a comment\nf \\\n  g && h \"i\n  j\" | k; l\n"
+    assert split_commands(text) == [
+        Command(("a", "--b", "c d"), True),
+        Command(("f", "g"), False),
+        Command(("h", "i\n  j"), False),
+        Command(("k",), False),
+        Command(("l",), False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "missing"),
+    [
+        ("rover_planner predict lsr1 a b c --colour red", "--colour"),
+        ("rover_planner dance", "dance"),
+        ("rover_planner view lsr1 spirit --start 0 0", "--start"),
+        ("mission_planner --start 0,0 --goal 1,0,0", "'0,0' is no pose"),
+        ("mission_planner --goal 1,0,0", "--start"),
+        ("traverse_server --ros-args -p terain_file:=a.npz &", "terain_file"),
+        ("traverse_server --ros-args -p friction:=1 &", "friction"),
+        ("ros2 run rover_planner traverse_servr", "traverse_servr"),
+        ("ros2 launch rover_planner simulation.launch.py terain:=a", "terain"),
+        ("ros2 service call /traverse_server/may_traverse nav_msgs/srv/GetPlan", "may_traverse"),
+        ("ros2 service call /traverse_server/load_map nav_msgs/srv/LoadMap '{url: a}'", "url"),
+        ("ros2 param set /traverse_server fricton 0.6", "fricton"),
+        ("make demonstration", "demonstration"),
+        ("make demo MAPP=spirit", "MAPP"),
+        ("pip install -c constraint.txt .", "constraint.txt"),
+        ("pip install '.[everything]'", "everything"),
+        ("pip install rover_solver", "rover_solver"),
+        ("python -m benchmarks.run starts", "starts"),
+        ("python -m benchmarks.ran", "benchmarks.ran"),
+        ("python -c 'import'", "invalid syntax"),
+        (".ci/locks", ".ci/locks"),
+        ("rover_planer view", "rover_planer"),
+    ],
+)
+def test_what_is_not_there_is_named(text, missing):
+    (command,) = split_commands(text)
+    with pytest.raises(Exception, match=missing.replace(".", r"\.").replace("'", ".")):
+        check_command(command.words)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("false\ntrue\n", "returncode=1"),
+        ("sleep 60 &\n", "processes are left"),
+        ("rover_planner predict lsr1 none.npz none.npz out.npz\n", "none.npz"),
+    ],
+)
+def test_a_block_that_fails_or_leaves_processes_is_found(text, said, reader):
+    reader.grace = 1.0
+    with pytest.raises(AssertionError, match=said):
+        reader.run(Block("page.md", 1, "sh", text, "", None))
+
+
+def test_an_output_that_is_another_one_is_found(reader):
+    block = Block("page.md", 1, "sh", "echo yes\n", "", "no\n")
+    with pytest.raises(AssertionError):
+        reader.run(block)
