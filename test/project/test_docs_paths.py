@@ -47,7 +47,7 @@ def is_file_name(word: str) -> bool:
 
 
 def exists(word: str, page: Path) -> bool:
-    """Tell whether a file name is one of the tree: from the top, beside the page, or by its end."""
+    """Tell whether a file is there: from the top, beside the page, or somewhere by its name."""
     if (TOP / word).exists() or (TOP / page).parent.joinpath(word).exists():
         return True
     return "/" not in word and any(
