@@ -1,0 +1,189 @@
+"""What README and docs name exists: files, modules, links, options, and rooms in import order."""
+
+import ast
+import importlib.util
+import re
+import runpy
+from collections.abc import Iterator
+from pathlib import Path
+from unittest import mock
+
+import pytest
+
+TOP = Path(__file__).resolve().parents[2]
+PAGES = sorted(
+    path.relative_to(TOP)
+    for path in [TOP / "README.md", TOP / "CHANGELOG.md", *(TOP / "docs").rglob("*.md")]
+)
+CODE = re.compile(r"`([^`\n]+)`")
+PACKAGES = ("rover_physics", "rover_planner", "msg_adapters", "support", "benchmarks")
+SUFFIXES = (".py", ".md", ".yaml", ".npz", ".png", ".xml", ".txt")
+MADE = ("mars.npz", "poses.npz", "out.npz", "map.npz", "terrain.npz", "rough.npz", "figure4.png")
+"""Files that a reader makes or brings."""
+WRITTEN = ("demo_output/", "bench_output/", "studies/")
+"""Folders that commands write."""
+
+
+def read(page: Path) -> str:
+    return (TOP / page).read_text(encoding="utf-8")
+
+
+def current_text(page: Path) -> str:
+    """Return a page without old names: the first column of "Renamed", and past releases."""
+    text = read(page)
+    if page.name == "CHANGELOG.md":
+        text = text.split("## [0.1.0]")[0]
+        text = re.sub(r"^\| [^|]* (?=\|)", "", text, flags=re.MULTILINE)
+    return text
+
+
+def code_spans(page: Path) -> set[str]:
+    """Return what stands in `backquotes` outside of fenced blocks."""
+    return set(CODE.findall(re.sub(r"^```.*?^```", "", current_text(page), flags=re.M | re.S)))
+
+
+def is_file_name(word: str) -> bool:
+    return bool(re.fullmatch(r"[\w./-]*\w\.\w+", word)) and word.endswith(SUFFIXES)
+
+
+def exists(word: str, page: Path) -> bool:
+    """Tell whether a file is there: from the top, beside the page, or somewhere by its name."""
+    if (TOP / word).exists() or (TOP / page).parent.joinpath(word).exists():
+        return True
+    return "/" not in word and any(
+        path.name == word and not any(part.startswith(".") for part in path.parts)
+        for folder in (*PACKAGES, "config", "docs", "test", "examples", "launch")
+        for path in (TOP / folder).rglob(word)
+    )
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_file_that_a_page_names_exists(page):
+    named = {word for word in code_spans(page) if is_file_name(word)}
+    missing = {
+        word
+        for word in named
+        if word not in MADE and not word.startswith(WRITTEN) and not exists(word, page)
+    }
+    assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_folder_that_a_page_names_exists(page):
+    tops = (*PACKAGES, "config", "docs", "examples", "launch", "test")
+    named = {word for word in code_spans(page) if re.fullmatch(r"[\w./-]+/", word)}
+    named = {word for word in named if word.split("/")[0] in tops}
+    assert not {word for word in named if not (TOP / word).is_dir()}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_link_of_a_page_leads_to_a_file(page):
+    links = re.findall(r"\]\(([^)#]+)\)", read(page))
+    local = [link for link in links if "://" not in link]
+    assert not [link for link in local if not (TOP / page).parent.joinpath(link).exists()]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_dotted_name_that_a_page_names_exists(page):
+    words = {word.split("(")[0] for word in re.findall(r"[\w.]+\(?", current_text(page))}
+    dotted = {word.rstrip(".") for word in words if word.split(".")[0] in PACKAGES and "." in word}
+    dotted = {word for word in dotted if not word.endswith((".py", ".md"))}
+    assert not {name for name in dotted if not is_module_or_name(name)}
+
+
+def is_module_or_name(dotted: str) -> bool:
+    """Tell whether a dotted name is a module, or is defined or imported at the top of one."""
+    parts = dotted.split(".")
+    if TOP.joinpath(*parts).is_dir() or TOP.joinpath(*parts).with_suffix(".py").is_file():
+        return True
+    module = TOP.joinpath(*parts[:-1])
+    path = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
+    return (
+        path.is_file()
+        and re.search(rf"\b{re.escape(parts[-1])}\b", path.read_text(encoding="utf-8")) is not None
+    )
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_module_that_a_page_runs_can_be_run(page):
+    for name in re.findall(r"python -m ((?:rover_|benchmarks)[\w.]*)", read(page)):
+        spec = importlib.util.find_spec(name.rstrip("."))
+        assert spec is not None and spec.origin, name
+        path = Path(spec.origin)
+        if path.name == "__init__.py":
+            path = path.with_name("__main__.py")
+        text = path.read_text(encoding="utf-8")
+        assert "__main__" in text or path.name == "__main__.py", name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_make_target_that_a_page_names_is_in_the_makefile(page):
+    targets = re.findall(r"^(\w+):", (TOP / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    named = set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE))
+    assert named <= set(targets)
+
+
+def options_of_the_commands() -> dict[str, set[str]]:
+    """Return the options of each subcommand of rover_planner."""
+    import typer
+
+    from rover_planner.cli import app
+
+    group = typer.main.get_command(app)
+    return {
+        name: {option for parameter in command.params for option in parameter.opts}
+        for name, command in group.commands.items()
+    }
+
+
+def test_the_page_of_the_command_line_has_every_command_and_option():
+    text = read(Path("docs/command_line.md"))
+    for name, options in options_of_the_commands().items():
+        assert re.search(rf"^\| `{name}[ `]", text, re.MULTILINE), name
+        for option in options:
+            if option.startswith("--"):
+                assert f"`{option}" in text, f"{name} {option}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_option_that_a_page_gives_to_a_command_exists(page):
+    known = options_of_the_commands()
+    for command, rest in re.findall(r"rover_planner (\w+)([^`\n#]*)", current_text(page)):
+        if command in known:
+            asked = set(re.findall(r"(?<!\w)--[a-z][\w-]*", rest))
+            assert asked <= known[command], f"rover_planner {command}"
+
+
+def rooms_of_readme(package: str) -> list[str]:
+    """Return the rooms of a package in the order of README's table."""
+    table = read(Path("README.md")).split(f"| `{package}/` |", 1)[1].split("\n\n", 1)[0]
+    return re.findall(r"^\| `(\w+)/`", table, re.MULTILINE)
+
+
+def imports_between_rooms(package: str) -> Iterator[tuple[str, str]]:
+    """Yield pairs of rooms of which the first imports the second."""
+    for path in (TOP / package).rglob("*.py"):
+        room = path.relative_to(TOP / package).parts[0]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                parts = node.module.split(".")
+                if parts[0] == package and len(parts) > 1 and parts[1] != room:
+                    yield room, parts[1]
+
+
+@pytest.mark.parametrize("package", ["rover_physics", "rover_planner"])
+def test_readme_lists_every_room_after_the_rooms_that_it_imports(package):
+    rooms = rooms_of_readme(package)
+    folders = {path.parent.name for path in (TOP / package).glob("*/__init__.py")}
+    assert set(rooms) == folders
+    for room, other in imports_between_rooms(package):
+        if room in rooms and other in rooms:
+            assert rooms.index(other) < rooms.index(room), f"{room} imports {other}"
+
+
+def test_every_node_and_command_that_is_installed_is_in_the_docs():
+    with mock.patch("setuptools.setup") as setup:
+        runpy.run_path(str(TOP / "setup.py"))
+    scripts = setup.call_args.kwargs["entry_points"]["console_scripts"]
+    text = "".join(read(page) for page in PAGES)
+    assert not [line for line in scripts if f"`{line.split(' = ')[0]}" not in text]
