@@ -12,7 +12,7 @@ ENGINES = (QUASI_STATIC, MUJOCO)
 
 @dataclass(frozen=True)
 class RoverSimulatorParameters(ParameterTable):
-    """Parameters of `/rover_simulator`; each field says what it means."""
+    """Parameters of `/rover_simulator`; the fields document themselves."""
 
     rover: str = parameter(
         "lsr1", "Rover that is simulated: a preset's name or a rover file.", read_only=True

@@ -15,7 +15,7 @@ from rover_planner.parameters.table import ParameterTable, parameter
 
 @dataclass(frozen=True)
 class TractionControllerParameters(ParameterTable):
-    """Parameters of `/traction_controller`; each field says what it means."""
+    """Parameters of `/traction_controller`; the fields document themselves."""
 
     rover: str = parameter("lsr1", "Rover that is driven: a preset's name or a rover file.")
     joints: tuple[str, ...] = parameter(

@@ -19,7 +19,7 @@ REFUSE, INTERPOLATE = "refuse", "interpolate"
 
 @dataclass(frozen=True)
 class TraverseServerParameters(ParameterTable):
-    """Parameters of `/traverse_server`; each field says what it means."""
+    """Parameters of `/traverse_server`; the fields document themselves."""
 
     rover: str = parameter("lsr1", "Rover to ask about: a preset's name or a rover file.")
     friction: float = parameter(
