@@ -62,9 +62,7 @@ def read_mission(
     ],
     goal: Annotated[
         list[Pose],
-        typer.Option(
-            parser=read_pose, metavar="X,Y,YAW", help="Goal; may be given repeatedly."
-        ),
+        typer.Option(parser=read_pose, metavar="X,Y,YAW", help="Goal; may be given repeatedly."),
     ],
     map_name: Annotated[
         str | None,

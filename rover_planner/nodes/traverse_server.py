@@ -93,7 +93,7 @@ class TraverseServer(Node):
         self.create_subscription(Path, "~/path", self._take_path, topic_qos())
 
     def _load_first_map(self) -> str:
-        """Load the map of the parameter terrain_file, if it is set; return the parameter's value."""
+        """Load the map of the parameter terrain_file, if it is set; return the file name."""
         file = self._values.terrain_file
         if file:
             try:

@@ -14,7 +14,7 @@ def max_torque_parameter() -> float:
     """Return the field of the parameter max_torque [N m]."""
     return parameter(
         0.0,
-        "Largest torque of a wheel; 0 takes the rover file's.",
+        "Largest torque of a wheel; 0 uses that of the rover file.",
         unit="N m",
         bounds=(0.0, 1e6),
     )
@@ -24,7 +24,7 @@ def payload_parameter() -> float:
     """Return the field of the parameter payload [kg]; `payload_or_none` reads its value."""
     return parameter(
         OWN_PAYLOAD,
-        "Mass at the tip of the manipulator; -1 takes the rover file's.",
+        "Mass at the tip of the manipulator; -1 uses that of the rover file.",
         unit="kg",
         bounds=(OWN_PAYLOAD, 1e6),
     )
@@ -50,7 +50,7 @@ def map_resolution_parameter() -> float:
     """Return the field of the parameter map_resolution [m]."""
     return parameter(
         0.0,
-        "Cell size for clouds; 0 takes their spacing where they are a regular grid.",
+        "Cell size for clouds; 0 uses the spacing of their points, which must be a regular grid.",
         unit="m",
         bounds=(0.0, 10.0),
     )

@@ -161,7 +161,7 @@ class _Curve:
         return bool(turns_within(self._slope, self._speed, float(min_radius)))
 
     def sample(self, waypoint_spacing: float) -> np.ndarray:
-        """Sample equidistant poses (n, 3) along the curve, at most `waypoint_spacing` [m] apart."""
+        """Sample equidistant poses (n, 3), at most `waypoint_spacing` [m] apart."""
         ends, middles = self._speed[::2], self._speed[1::2]
         pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
         driven = np.concatenate([[0.0], np.cumsum(pieces)])

@@ -88,7 +88,7 @@ def _drive(start, word, pieces, radius, waypoint_spacing):
 
 
 def _advance(x, y, yaw, turn, s):
-    """Return the pose after s [radii] along a left (turn 1) or right (-1) unit arc or a line (0)."""
+    """Return the pose after s [radii] along a left (turn 1) or right (-1) arc or a line (0)."""
     if turn == 0.0:
         return x + s * np.cos(yaw), y + s * np.sin(yaw), yaw + 0.0 * s
     after = yaw + turn * s

@@ -13,10 +13,15 @@ from rover_planner.errors import PlanningError
 Pose = tuple[float, float, float]
 
 _STARTS = 200
+"""Largest number of places that are tried as a start."""
 _RAYS = 72
+"""Directions in which the clear distance from a start is measured: every 5 degrees."""
 _VIEWS = 721
+"""Directions in which the known ground around the start is measured: every half degree."""
 _HALF_CONE = np.deg2rad(50.0)
+"""Half angle of the cone ahead of the start that holds the goals on plain ground [rad]."""
 _WIDE_CONE = np.deg2rad(75.0)
+"""Half angle of the cone ahead of the start that holds the goal off the map [rad]."""
 
 
 @dataclass(frozen=True)
@@ -211,7 +216,7 @@ def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
 
 
 def _choose_rough(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the most difficult place with known ground all the way; places ahead are preferred."""
+    """Choose the most difficult place with known ground all the way, preferably ahead."""
     distance, turn = _polar(ground, start)
     bearings = np.linspace(-np.pi, np.pi, _VIEWS)
     known = np.isfinite(ground.slope)
@@ -222,7 +227,7 @@ def _choose_rough(ground: _Ground, start: Pose) -> Pose | None:
 
 
 def _choose_steep(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the steepest known ground; places ahead are preferred."""
+    """Choose the steepest known ground, preferably ahead."""
     distance, turn = _polar(ground, start)
     score = ground.slope * (1 - turn / (2 * np.pi))
     score = np.where(distance <= 1.2 * ground.reach, score, -np.inf)

@@ -10,8 +10,11 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import MAX_WAYPOINTS
 
 _RING_STEP = 0.1
+"""Largest distance between rings [m], if MAX_RINGS allows it."""
 _MAX_RINGS = 4
+"""Largest number of rings: each goal costs an evaluation."""
 _RING_GOALS = 8
+"""Goals on each ring: every 45 degrees."""
 
 
 def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:

@@ -192,7 +192,7 @@ def _check_paths(
 
 
 def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
-    """Choose the traversable candidate with the lowest cost; the first one if several are equal."""
+    """Choose the traversable candidate with the lowest cost; of equal ones the first."""
     indices = range(len(candidates))
     passable = [k for k in indices if candidates[k].verdict.traversable]
     if passable:

@@ -61,7 +61,7 @@ class ReachQuery:
         self._target = point
 
     def refuse_target(self, reason: str) -> None:
-        """Discard the target, so that later queries do not use an outdated one; keep the reason."""
+        """Discard the target and keep the reason; later queries must not use an outdated one."""
         self._target = None
         self._target_refusal = f"the last target was refused: {reason}"
 

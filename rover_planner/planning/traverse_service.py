@@ -46,7 +46,7 @@ class TraverseService:
 
     @property
     def terrain(self) -> Terrain | None:
-        """The last valid map, with small gaps interpolated if the settings say so; None if none."""
+        """The last valid map, with small gaps interpolated if so set; None if there is none."""
         return self._terrain
 
     @property
@@ -77,7 +77,7 @@ class TraverseService:
         self._path = poses
 
     def refuse_path(self, reason: str) -> None:
-        """Discard the path, so that later queries do not use an outdated one; keep the reason."""
+        """Discard the path and keep the reason; later queries must not use an outdated one."""
         self._path = None
         self._path_refusal = f"the last path was refused: {reason}"
 
