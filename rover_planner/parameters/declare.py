@@ -53,7 +53,7 @@ def follow_changes(
 
     Args:
         node: A node that has declared the table.
-        current: Returns the values in force.
+        current: Returns the current values.
         accept: Called with all values before a change; raises if the combination is invalid.
         apply: Called with all values after a change.
 

@@ -35,7 +35,7 @@ class TraverseService:
 
     @property
     def settings(self) -> ServiceSettings:
-        """The settings in force."""
+        """The current settings."""
         return self._settings
 
     @settings.setter

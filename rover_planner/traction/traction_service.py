@@ -81,7 +81,7 @@ class TractionUpdate:
     """The result of one update."""
 
     torques: Floats
-    """(6,) torques to command, wheel order [N m]; zero where there is a fault."""
+    """(6,) torques to command, wheel order [N m]; zero if there is a fault."""
     fault: str
     """Reason for zero torques; empty if there is no fault."""
     warning: str
@@ -145,7 +145,7 @@ class TractionService:
 
     @property
     def settings(self) -> TractionSettings:
-        """The settings in force."""
+        """The current settings."""
         return self._settings
 
     @settings.setter
