@@ -1,1 +1,1 @@
-"""Benchmarks: what the product costs, and how it compares with MuJoCo."""
+"""Benchmarks: run time and memory of the product, and comparisons with MuJoCo."""

@@ -1,4 +1,4 @@
-"""Whole sets of poses: JPL's ENav fan of 1,694 paths, and a map of a million cells."""
+"""Times large sets of poses: JPL's ENav fan of 1,694 paths, and a map of a million cells."""
 
 import resource
 import statistics
@@ -14,21 +14,21 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 ARCS = (14, 11, 11)
-"""ENav's tree: so many curvatures on the first, second and third part of a path."""
+"""Number of curvatures on the first, second and third arc of a path, as in ENav."""
 REACH = 6.0
 """Length of a path [m]."""
 SPACING = 0.25
-"""Distance of the poses along a path [m]."""
+"""Distance between poses along a path [m]."""
 TURN = 0.35
 """Largest curvature [1/m]."""
 MAP_CELLS = 1_000
 """Cells along each side of the map."""
 MAP_ROWS = (100, 180)
-"""Rows of the map that are timed; it is alike all over, but for its edges."""
+"""First and last row of the part that is timed; the map is uniform except at its edges."""
 
 
 def enav_fan(start: float) -> np.ndarray:
-    """Return poses (40656, 3) of 14 x 11 x 11 paths of three arcs, 24 each, from x = start [m]."""
+    """Return poses (40656, 3): 14 x 11 x 11 paths of three arcs, 24 poses each, from x = start."""
     steps = round(REACH / SPACING)
     counts = [np.linspace(-TURN, TURN, count) for count in ARCS]
     first, second, third = (grid.ravel() for grid in np.meshgrid(*counts, indexing="ij"))
@@ -90,5 +90,5 @@ def measure_map(rover) -> list[Figure]:
 
 
 def peak_memory() -> float:
-    """Return the largest memory that this process has had [MB]."""
+    """Return the peak memory of this process so far [MB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

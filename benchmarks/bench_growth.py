@@ -1,4 +1,4 @@
-"""How the cost of a path grows with its length, the candidates, the map and the samples."""
+"""Measures how run time grows with path length, candidates, map size and wheel samples."""
 
 import numba
 import numpy as np
@@ -23,13 +23,13 @@ RESOLUTIONS = (0.05, 0.02, 0.01)
 
 
 def straight(length: float) -> np.ndarray:
-    """Return poses 2 cm apart, straight ahead through the middle of a map."""
+    """Return poses (n, 3), 2 cm apart on a straight line through the middle of a map."""
     x = np.arange(-0.5 * length, 0.5 * length, 0.02)
     return np.column_stack([x, 0.0 * x, 0.0 * x])
 
 
 def measure() -> list[Figure]:
-    """Measure the growth; ratios are of times per pose, so 1 is linear."""
+    """Measure the growth. Ratios compare times per pose, so 1 means linear growth."""
     numba.set_num_threads(1)
     rover = load_rover("lsr1")
     ground = make_mars_terrain(1, 24.0, 0.05)
@@ -73,7 +73,7 @@ def _maps(rover) -> list[Figure]:
 
 
 def _samples(rover) -> list[Figure]:
-    """The same ground with finer cells: a wheel is sampled as finely as the map."""
+    """Measure the same ground with finer cells; a wheel is sampled at the map's resolution."""
     figures = []
     for resolution in RESOLUTIONS:
         model = pack_model(rover, make_mars_terrain(1, 10.0, resolution))

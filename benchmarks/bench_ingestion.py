@@ -1,4 +1,4 @@
-"""A map of a million points as it arrives, until the first question can be answered from it."""
+"""Times a map message of a million points, until the first query can be answered from it."""
 
 import array
 import time
@@ -15,12 +15,14 @@ from rover_planner.planning.traverse_service import TraverseService
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 CELLS = 1_000
+"""Cells along each side of the map."""
 RESOLUTION = 0.05
+"""Cell size [m]."""
 """Cell size [m]."""
 
 
 def make_map() -> Terrain:
-    """Return a map with gaps, as sensors leave them."""
+    """Return a map with gaps like those in sensor data."""
     ground = make_mars_terrain(2, CELLS * RESOLUTION, RESOLUTION)
     elevation = ground.elevation[:CELLS, :CELLS].copy()
     elevation[np.random.default_rng(0).random(elevation.shape) < 0.02] = np.nan
@@ -28,7 +30,7 @@ def make_map() -> Terrain:
 
 
 def scatter(cloud: PointCloud2) -> PointCloud2:
-    """Return the points of a cloud out of order and off their cells."""
+    """Return the cloud with its points shuffled and moved off their cell centres."""
     rng = np.random.default_rng(1)
     points = rng.permutation(np.frombuffer(cloud.data, "<f4").reshape(-1, 3))
     points[:, :2] += rng.uniform(-0.5 * RESOLUTION, 0.5 * RESOLUTION, (len(points), 2))
@@ -39,7 +41,7 @@ def scatter(cloud: PointCloud2) -> PointCloud2:
 
 
 def measure() -> list[Figure]:
-    """Measure a cloud that comes row by row, and one that comes in any order."""
+    """Measure a cloud ordered by rows and a cloud in random order."""
     settings = load_service_settings(TraverseServerParameters())
     service = TraverseService(settings)
     cloud = terrain_to_point_cloud(make_map(), "map")

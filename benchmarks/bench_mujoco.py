@@ -1,4 +1,4 @@
-"""The same poses by MuJoCo: how long it takes to drop a rover and let it settle there."""
+"""Compares settling times with MuJoCo, which drops a rover and waits until it is at rest."""
 
 import statistics
 import time
@@ -19,7 +19,7 @@ from rover_physics.status import PoseStatus
 POSES = 15
 """Poses on each ground."""
 MANY = 4_000
-"""Poses over which ours is timed; 15 take too little."""
+"""Poses for timing this project's model; 15 poses take too little time to measure."""
 
 
 @lru_cache(maxsize=1)
@@ -43,7 +43,7 @@ def drop(ground, poses: np.ndarray) -> tuple[list[Settled], list[float]]:
 
 
 def compare(ground, settled: list[Settled]) -> float:
-    """Return the median over poses of how far the worst wheel centre is from ours [mm]."""
+    """Return the largest wheel centre error of each pose, median over all poses [mm]."""
     poses = np.array([rest.pose for rest in settled])
     ours = evaluate(pack_model(rover(), ground).records, poses)
     off = [
@@ -55,7 +55,7 @@ def compare(ground, settled: list[Settled]) -> float:
 
 
 def measure() -> list[Figure]:
-    """Measure both on three grounds; at the poses where MuJoCo's rover came to rest."""
+    """Measure both on three grounds, at the poses where MuJoCo's rover came to rest."""
     numba.set_num_threads(1)
     figures = []
     for name in ("flat", "rocks", "fractal"):

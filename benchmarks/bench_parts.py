@@ -1,4 +1,4 @@
-"""Where the time of settling a pose goes: its parts, each timed at poses that are settled."""
+"""Times each part of settling a pose, at poses that are settled."""
 
 from collections.abc import Callable
 
@@ -18,13 +18,15 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 
 POSES = 2_000
+"""Random poses on each ground."""
 REPEATS = 15
+"""Repeats of each measurement: differences of times need many."""
 compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 
 
 @compiled
 def do_nothing(model, work):
-    """Leave the rover placed."""
+    """Do nothing; this is the baseline with the rover placed."""
 
 
 @compiled
@@ -36,28 +38,28 @@ def guess(model, work):
 
 @compiled
 def sample(model, work):
-    """Hold all samples of the rims against the ground."""
+    """Compare all samples of the rims with the ground."""
     for wheel in range(6):
         scan_rim(model, work, wheel, SearchScope.QUICK)
 
 
 @compiled
 def look(model, work):
-    """Hold all samples against the ground, and search around the nearest."""
+    """Compare all samples with the ground, and search around the nearest ones."""
     for wheel in range(6):
         find_contact(model, work, wheel, SearchScope.QUICK)
 
 
 @compiled
 def look_and_step(model, work):
-    """Work out a step of Newton's method, too, but for its solution."""
+    """Do the same, and compute the derivatives of a Newton step without solving it."""
     look(model, work)
     write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.SLOPED, work.J)
 
 
 @compiled
 def look_near(model, work):
-    """Search around the nearest places once more, as after a step."""
+    """Search around the nearest samples once more, as after a Newton step."""
     look(model, work)
     for wheel in range(6):
         find_contact(model, work, wheel, SearchScope.NEAR)
@@ -65,7 +67,7 @@ def look_near(model, work):
 
 @compiled
 def verify(model, work):
-    """Verify that no other place of the rims is nearer."""
+    """Verify that no other point of the rims is nearer."""
     look(model, work)
     for wheel in range(6):
         find_contact(model, work, wheel, SearchScope.FULL)
@@ -73,7 +75,7 @@ def verify(model, work):
 
 @compiled
 def verify_again(model, work):
-    """Verify it once more at the circles that came near."""
+    """Verify it again at the circles that came near the ground."""
     verify(model, work)
     for wheel in range(6):
         find_contact(model, work, wheel, SearchScope.AGAIN)
@@ -98,11 +100,11 @@ PARTS = {
     "the same at circles that came near": (verify_again, verify),
     "mean contacts": (share_load, verify),
 }
-"""What is told: a part, and the one whose time is taken off."""
+"""By name: a kernel, and the kernel whose time is subtracted from its time."""
 
 
 def loop_over_poses(part: Callable) -> Callable:
-    """Return a kernel that places the rover at settled poses and does `part` there."""
+    """Return a kernel that places the rover at settled poses and runs `part` at each of them."""
 
     @compiled
     def run(models, poses, q, works):

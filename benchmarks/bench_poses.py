@@ -1,4 +1,4 @@
-"""Time of a pose on one core: settling alone, both torque policies, and the look-up floor."""
+"""Times a pose on one core: settling, both torque policies, and the necessary look-ups."""
 
 import numba
 import numpy as np
@@ -16,19 +16,22 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import find_block_max, height_inside
 
 POSES = 4_000
+"""Poses on each ground for the times of a pose."""
 FLOOR_POSES = 400
+"""Poses on each ground for the look-ups, which are collected in Python."""
 LINES = 20
+"""Straight paths on each ground for the warm start."""
 SPACING = 0.02
-"""Way between poses of a line [m]."""
+"""Distance between poses of a line [m]."""
 MARGIN = 0.9
-"""Way from the edge of the ground to where lines begin and end [m]."""
+"""Distance between the edge of the ground and the ends of the lines [m]."""
 OTHER_POSE = 1e-3
-"""Difference of height [m] or angles [rad] from which on a pose is another one."""
+"""Difference in height [m] or angle [rad] above which two poses count as different."""
 
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 def settle_all(models, poses, works, results):
-    """Settle the rover at poses (n, 3) and do nothing else."""
+    """Settle the rover at poses (n, 3), without forces or limits."""
     for i in range(len(poses)):
         set_pose(poses, i, works[0])
         results[i].status = settle(models[0], works[0])
@@ -37,7 +40,7 @@ def settle_all(models, poses, works, results):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 def settle_along(models, poses, works, results):
-    """Settle the rover at poses (n, 3) of a path, each from the one before it."""
+    """Settle the rover at poses (n, 3) of a path, each starting from the result before it."""
     for i in range(len(poses)):
         set_pose(poses, i, works[0])
         if i > 0 and results[i - 1].status == PoseStatus.SETTLED:
@@ -49,7 +52,7 @@ def settle_along(models, poses, works, results):
 
 @numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 def look_up_all(grounds, cells):
-    """Look up the heights at `cells` (n, 2) and return the highest."""
+    """Return the largest height at `cells` (n, 2) [m]."""
     ground, highest = grounds[0], -np.inf
     for k in range(len(cells)):
         highest = max(highest, height_inside(ground, cells[k, 0], cells[k, 1]))
@@ -64,11 +67,11 @@ def run_settling(model: PackedModel, poses: np.ndarray, kernel=settle_all) -> np
 
 
 def cells_looked_up(model: PackedModel, poses: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return the cells (n, 2) at which heights must be known to tell that settled wheels touch.
+    """Return the cells (n, 2) whose heights are needed to verify contact, and the settled poses.
 
-    Of each wheel these are all samples of its rim but those that even the highest ground around
-    it stays below: whatever finds the pose, it has to look there once. Also returns the number
-    of settled poses.
+    For each wheel these are the rim samples that are not above the highest ground around the
+    wheel. Any algorithm that finds the pose must read these heights at least once. The second
+    value is the number of settled poses.
     """
     results = evaluate(model.records, poses)
     ground, samples = model.record.ground, model.record.samples
@@ -95,7 +98,7 @@ def cells_looked_up(model: PackedModel, poses: np.ndarray) -> tuple[np.ndarray, 
 
 
 def measure() -> list[Figure]:
-    """Measure settling, full evaluation and the floor."""
+    """Measure settling, full evaluation and the necessary look-ups."""
     numba.set_num_threads(1)
     rover = load_rover("lsr1")
     figures = []
@@ -125,7 +128,7 @@ def measure() -> list[Figure]:
 
 
 def measure_warm_start(rover) -> list[Figure]:
-    """Measure settling from rest against settling from the neighbour, on lines of poses."""
+    """Compare a cold start with a warm start from the neighbouring pose, on lines of poses."""
     figures = []
     for name in ("flat", "rocks", "fractal"):
         ground = reference_ground(name)
@@ -148,7 +151,7 @@ def measure_warm_start(rover) -> list[Figure]:
 
 
 def lines_of_poses(ground: Terrain) -> list[np.ndarray]:
-    """Return straight paths across a ground, a pose each SPACING."""
+    """Return straight paths across a ground, with poses every SPACING."""
     low, high = ground.bounds[0] + MARGIN, ground.bounds[1] - MARGIN
     x = np.arange(low, high, SPACING)
     return [
@@ -158,7 +161,7 @@ def lines_of_poses(ground: Terrain) -> list[np.ndarray]:
 
 
 def measure_floor(rover) -> list[Figure]:
-    """Measure a full evaluation against the look-ups that it can't do without."""
+    """Compare a full evaluation with the look-ups that every algorithm needs."""
     figures = []
     for name in ("flat", "rocks"):
         model = pack_model(rover, reference_ground(name))

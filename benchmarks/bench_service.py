@@ -1,9 +1,9 @@
-"""`~/can_traverse` over DDS between two processes: 10 m, 2 cm between waypoints.
+"""Times `~/can_traverse` over DDS between two processes: 10 m, 2 cm between waypoints.
 
-In turns are asked: the server, a node that answers at once with the same plan, and the same
-question in this process without ROS. All of it twice: after a pause, as by a planner that asks
-now and then (processors sleep and caches have cooled meanwhile), and at once, as by a planner that
-asks again as soon as the answer is there.
+Three answers are timed in turns: the server's, that of a node that returns the same plan without
+computing it, and the same query in this process without ROS. Everything is measured twice: with a
+pause before each query (processors sleep and caches are cold), and without a pause, as by a
+planner that sends the next query as soon as it has an answer.
 """
 
 import statistics
@@ -21,30 +21,32 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 ECHO = "/echo/can_traverse"
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
-"""Over ground with some rocks: contacts jump here and there, as on most ways."""
+"""Poses x, y [m], yaw [rad]. The path crosses some rocks, so that contact points jump."""
 QUESTIONS = 200
+"""Timed queries to each responder."""
 WARM_UP = 20
+"""Queries before these that are not timed."""
 NINES = 50
 """Questions with nine candidates."""
 
 
 @dataclass(frozen=True)
 class Asker:
-    """How a planner asks."""
+    """The timing of a planner's queries."""
 
     name: str
-    """What figures call it."""
+    """Name in the table."""
     pause: float
-    """Time between an answer and the next question [s]."""
+    """Time between an answer and the next query [s]."""
     in_a_row: int
-    """Questions to one before it is the turn of the next."""
+    """Queries to one responder before the next one takes its turn."""
 
 
 ASKERS = (Asker("after a pause", 0.03, 1), Asker("at once", 0.0, 20))
 
 
 def make_service(ground: Terrain, parameters: TraverseServerParameters) -> TraverseService:
-    """Return the service of a server without ROS."""
+    """Return the service that a server uses, without ROS."""
     service = TraverseService(load_service_settings(parameters))
     service.take_terrain(ground)
     return service
@@ -53,7 +55,7 @@ def make_service(ground: Terrain, parameters: TraverseServerParameters) -> Trave
 def ask_in_turns(
     planner: Planner, service: TraverseService, asker: Asker
 ) -> dict[str, list[float]]:
-    """Return the times [s] of server, echo and computation."""
+    """Return the times [s] of "server", "echo" and "computation"."""
     ways: dict[str, Callable[[], object]] = {
         "server": lambda: planner.ask(SERVER, START, GOAL),
         "echo": lambda: planner.ask(ECHO, START, GOAL),
@@ -63,7 +65,7 @@ def ask_in_turns(
     for _ in range((WARM_UP + QUESTIONS) // asker.in_a_row):
         for name, ask in ways.items():
             if not asker.pause:
-                ask()  # does not count: it comes after another's turn
+                ask()  # not counted: the caches hold another responder's data
             times[name] += [_time(ask, asker.pause) for _ in range(asker.in_a_row)]
     return {name: taken[WARM_UP:] for name, taken in times.items()}
 
@@ -76,7 +78,7 @@ def _time(ask: Callable[[], object], pause: float) -> float:
 
 
 def measure() -> list[Figure]:
-    """Measure one path either way, and a fan of nine."""
+    """Measure one path with and without a pause, and a fan of nine."""
     ground = make_mars_terrain(1, 24.0, 0.05)
     service = make_service(ground, TraverseServerParameters(candidate_count=1))
     figures = []
@@ -114,7 +116,7 @@ def _tell(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]
 
 
 def _measure_nine(ground: Terrain) -> list[Figure]:
-    """Measure the question with the default of nine candidates."""
+    """Measure the query with the default of nine candidates."""
     with planner_and_processes() as (planner, processes):
         processes.start_server(ground)
         times = []

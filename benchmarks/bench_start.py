@@ -1,7 +1,7 @@
-"""From starting the server to its first answer, with nothing compiled and with all in the cache.
+"""Times the start of the server up to its first answer, without and with cached kernels.
 
-The caller finds the service by DDS discovery, which is part of the time. The cold start compiles
-into a folder of its own, so the kernels that are in use stay cached.
+The time includes DDS discovery. The cold start compiles into a separate folder, so that the
+cached kernels remain in place.
 """
 
 import statistics
@@ -14,6 +14,7 @@ from benchmarks.planner_process import SERVER, memory_of, planner_and_processes
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 STARTS = 5
+"""Warm starts, of which the median counts."""
 COLD_STARTS = 1
 
 
@@ -32,7 +33,7 @@ def start_and_ask(**environment: str) -> tuple[float, float]:
 
 
 def measure() -> list[Figure]:
-    """Measure one cold start, and warm ones after one that does not count."""
+    """Measure one cold start, then warm starts; the first warm start is not counted."""
     start_and_ask()
     starts = [start_and_ask() for _ in range(STARTS)]
     warm, memory = (statistics.median(values) for values in zip(*starts, strict=True))

@@ -1,8 +1,8 @@
-"""Updates of the traction controller: alone, and at 100 Hz for a minute beside a busy server.
+"""Times updates of the traction controller: alone, and for a minute beside a busy server.
 
-Alone, the node gets the measurements of a drive over rocks, and CPU time is measured. Then
-simulator, controller and server run in processes of their own; the controller's diagnostics hold
-the time of its updates (estimate, build, solve, publish), by the clock, and the cycles it missed.
+Alone, the node gets the measurements of a drive over rocks; CPU time is measured. Then simulator,
+controller and server run in separate processes. The controller's diagnostics report the elapsed
+time of its updates (estimate, build, solve, publish) and the number of missed cycles.
 """
 
 import threading
@@ -35,9 +35,9 @@ TOGETHER_TIME = 60.0
 ALONE_TIME = 20.0
 """Time for which updates are measured alone [s]."""
 PRIORITY = 50
-"""Priority of the controller (SCHED_FIFO), as in ros2_control; none where it is not granted."""
+"""Real-time priority (SCHED_FIFO) of the controller, as in ros2_control, if it is granted."""
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
-"""Poses of the question that the server answers: x, y [m], yaw [rad]."""
+"""Poses of the query that keeps the server busy: x, y [m], yaw [rad]."""
 
 
 class DiagnosticsReader:
@@ -53,7 +53,7 @@ class DiagnosticsReader:
                 self.values = {item.key: item.value for item in status.values}
 
     def wait_for_updates(self, count: int, timeout: float = 120.0) -> dict[str, float]:
-        """Return the numbers among the values once so many updates were made."""
+        """Return the numeric values once `count` updates were made; wait `timeout` [s] at most."""
         end = time.monotonic() + timeout
         while float(self.values.get("updates", 0)) < count:
             if time.monotonic() > end:
@@ -69,12 +69,12 @@ class DiagnosticsReader:
 
 
 def measure() -> list[Figure]:
-    """Measure updates alone, then beside everything else."""
+    """Measure updates alone, then beside simulator and server."""
     return measure_alone() + measure_together()
 
 
 def measure_alone() -> list[Figure]:
-    """Measure a node that updates and publishes at its rate, on a drive over rocks."""
+    """Measure a node that updates and publishes at RATE, on a drive over rocks."""
     prediction, motions, duration = drive_states(load_rover("lsr1"), rocky(1))
     assert prediction.settled.all(), "the rover must settle everywhere on the way"
     context = Context()
@@ -100,7 +100,7 @@ def measure_alone() -> list[Figure]:
 
 
 def _blend(before: Motion, after: Motion, share: float) -> Motion:
-    """Return the measurement between two moments."""
+    """Return a measurement interpolated between two others; `share` is 0 to 1."""
     pairs = ((getattr(before, f.name), getattr(after, f.name)) for f in fields(Motion))
     return Motion(*((1.0 - share) * first + share * second for first, second in pairs))
 
@@ -147,6 +147,6 @@ def measure_together() -> list[Figure]:
 
 
 def _ask_on(planner: Planner, stop: threading.Event) -> None:
-    """Ask one question after another until told to stop."""
+    """Send one query after another until `stop` is set."""
     while not stop.is_set():
         planner.ask(SERVER, START, GOAL)

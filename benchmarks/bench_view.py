@@ -1,4 +1,4 @@
-"""How soon the page has a new verdict after the rover was changed: 10 m, 501 waypoints."""
+"""Times a new verdict of the page after a change of the rover: 10 m, 501 waypoints."""
 
 import time
 
@@ -9,7 +9,7 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 
 def measure() -> list[Figure]:
-    """Change the friction to and fro, and count the paths' candidates judged anew after that."""
+    """Measure the new verdict after changes of friction and of wheel radius."""
     ground = make_mars_terrain(1, 24.0, 0.05)
     session = ViewSession(load_rover("lsr1"), ground, (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0))
     values = iter([0.6, 0.8] * 100)

@@ -1,4 +1,4 @@
-"""Where the rover can't stand: poses along walls, and questions across one."""
+"""Times poses where the rover cannot stand: along walls, and queries across a wall."""
 
 import numpy as np
 
@@ -11,12 +11,14 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 
 POSES = 300
+"""Random poses near each wall."""
 HEIGHTS = (0.3, 0.5, 1.0)
+"""Heights of the walls [m]."""
 """Of the walls [m]."""
 
 
 def wall(height: float, resolution: float, half: float) -> Terrain:
-    """Return level ground up to a wall that winds along y at x = 0."""
+    """Return level ground with a winding step up along y at x = 0; all arguments in [m]."""
     axis = np.arange(-half, half + resolution, resolution)
     x, y = np.meshgrid(axis, axis)
     return Terrain(
@@ -25,7 +27,7 @@ def wall(height: float, resolution: float, half: float) -> Terrain:
 
 
 def measure() -> list[Figure]:
-    """Measure poses near walls of several heights, then questions."""
+    """Measure poses near walls of several heights, then queries across a wall."""
     rng = np.random.default_rng(0)
     poses = np.column_stack([rng.uniform(-1.0, 1.0, (POSES, 2)), rng.uniform(-3.1, 3.1, POSES)])
     figures = []

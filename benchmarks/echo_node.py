@@ -1,6 +1,6 @@
-"""A node that answers GetPlan at once: what a service costs that has nothing to work out.
+"""A node that answers GetPlan with a stored plan, to measure the cost of the service alone.
 
-Run as python -m benchmarks.echo_node PLAN, with the serialised nav_msgs/Path to answer with.
+Run as python -m benchmarks.echo_node PLAN, where PLAN is a file with a serialised nav_msgs/Path.
 """
 
 import sys
@@ -17,7 +17,7 @@ SERVICE = "/echo/can_traverse"
 
 
 def main() -> None:
-    """Answer until told to stop."""
+    """Answer until interrupted."""
     plan = deserialize_message(FilePath(sys.argv[1]).read_bytes(), Path)
     rclpy.init()
     node = Node("echo")

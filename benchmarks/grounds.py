@@ -12,7 +12,7 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 ROOT = Path(__file__).resolve().parents[1]
 REFERENCE = ROOT / "test" / "data" / "settled_a.npz"
 MARGIN = 0.8
-"""Distance of the poses from the map's edge [m]."""
+"""Distance of the poses from the map's edge [m]: the rover stays on the map."""
 
 
 def reference_ground(name: str) -> Terrain:
@@ -23,7 +23,7 @@ def reference_ground(name: str) -> Terrain:
 
 
 def all_grounds() -> dict[str, Terrain]:
-    """Return flat, rocks, fractal, a made Mars terrain, and a real map where there is one."""
+    """Return grounds by name: flat, rocks, fractal, a generated Mars terrain, and a real map."""
     grounds = {name: reference_ground(name) for name in ("flat", "rocks", "fractal")}
     grounds["Mars-like"] = make_mars_terrain(1)
     folder = Path(os.environ.get("ROVER_TERRAIN_DIR", ROOT.parent / "shared" / "terrain"))
@@ -33,7 +33,7 @@ def all_grounds() -> dict[str, Terrain]:
 
 
 def random_poses(ground: Terrain, count: int) -> np.ndarray:
-    """Return poses (count, 3) anywhere on the ground, all headings."""
+    """Return random poses (count, 3) on the ground with random headings."""
     rng = np.random.default_rng(0)
     xmin, xmax, ymin, ymax = ground.bounds
     low, high = (xmin + MARGIN, ymin + MARGIN), (xmax - MARGIN, ymax - MARGIN)
@@ -42,7 +42,7 @@ def random_poses(ground: Terrain, count: int) -> np.ndarray:
 
 
 def straight_paths(ground: Terrain, count: int) -> np.ndarray:
-    """Return about `count` poses along straight paths, 2 cm apart."""
+    """Return about `count` poses (n, 3) along straight paths, 2 cm apart."""
     xmin, xmax, ymin, ymax = ground.bounds
     along = np.arange(xmin + MARGIN, min(xmax - MARGIN, xmin + MARGIN + 10.0), 0.02)
     across = np.linspace(ymin + MARGIN, ymax - MARGIN, max(2, count // len(along)))

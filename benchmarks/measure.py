@@ -1,6 +1,6 @@
-"""How benchmarks measure and report: medians of repeats, one table, one JSON file.
+"""Measurement and reports of benchmarks: medians of repeats, one table, one JSON file.
 
-What is compared is called in turns in one run, so that a busy machine slows both down.
+Functions that are compared run in turns, so that other load on the machine affects all of them.
 """
 
 import json
@@ -15,8 +15,9 @@ from rich.console import Console
 from rich.table import Table
 
 REPEATS = 5
+"""Default number of repeats of a measurement."""
 WIDTH = 140
-"""Columns of the table where it goes to no terminal."""
+"""Width of the table in characters when the output is not a terminal."""
 
 
 @dataclass(frozen=True)
@@ -24,25 +25,25 @@ class Figure:
     """One measured number."""
 
     topic: str
-    """What part of the product it is about."""
+    """Part of the product, such as "pose"."""
     name: str
     """What was measured."""
     value: float
     """Median of the repeats."""
     unit: str
-    """Its unit; "x" for a ratio of two numbers measured in the same run."""
+    """Unit; "x" for a ratio of two numbers measured in the same run."""
     target: float | None = None
-    """What it should be; None where it is for information."""
+    """Target; None if there is none."""
     at_least: bool = False
-    """Whether the target is the least that will do; else the most."""
+    """Whether the target is a minimum; otherwise it is a maximum."""
     against: str = ""
-    """What a ratio or a difference is against, measured in turns with it."""
+    """Reference of a ratio or difference, measured in turns with it."""
     repeats: int = REPEATS
-    """How many repeats it is the median of; 1 for what is counted, not timed."""
+    """Number of repeats; 1 for counts."""
 
     @property
     def met(self) -> bool | None:
-        """Whether the target is met, None without one."""
+        """Whether the target is met; None without a target."""
         if self.target is None:
             return None
         return self.value >= self.target if self.at_least else self.value <= self.target
@@ -53,10 +54,10 @@ def median_time(
     repeats: int = REPEATS,
     clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """Return the median time [s] of a call after one that warms up.
+    """Return the median time [s] of a call; the first call warms up and is not counted.
 
-    The default clock counts what the process used, so that other programs on the machine disturb
-    least; it counts all threads, so time several threads with `time.perf_counter`.
+    The default clock is the CPU time of the process, which other programs on the machine affect
+    least. It adds up all threads; use `time.perf_counter` to time several threads.
     """
     return median_times([function], repeats, clock)[0]
 
@@ -66,7 +67,7 @@ def median_times(
     repeats: int = REPEATS,
     clock: Callable[[], float] = time.process_time,
 ) -> list[float]:
-    """Return the median time [s] of each function, called in turns; the clock as `median_time`."""
+    """Return the median time [s] of each function, called in turns; see `median_time`."""
     for function in functions:
         function()
     times: list[list[float]] = [[] for _ in functions]
@@ -79,7 +80,7 @@ def median_times(
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """Return the smallest of the values that at least a share (0 to 1) of them do not exceed."""
+    """Return the quantile of the values for a share of 0 to 1, without interpolation."""
     ordered = sorted(values)
     return ordered[max(0, math.ceil(share * len(ordered)) - 1)]
 

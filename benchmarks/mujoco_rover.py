@@ -1,4 +1,4 @@
-"""The rover in MuJoCo: dropped onto a height field, it settles; a question asked the slow way."""
+"""The rover in MuJoCo: it is dropped onto a height field and simulated until it is at rest."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 
 TIMESTEP = 1e-3
-"""Time step [s]; at 2 ms and more the rover trembles on contacts as stiff as these."""
+"""Time step [s]; with 2 ms or more the rover oscillates on contacts of this stiffness."""
 DROP = 0.02
-"""Clearance of the lowest wheel from the highest ground around at the start [m]."""
+"""Initial clearance between the lowest wheel and the highest ground around the rover [m]."""
 AT_REST = 1e-3
 """Speed [m/s, rad/s] of all degrees of freedom below which the rover counts as settled."""
 LONGEST = 10.0
-"""Simulated time after which a rover counts as not settled [s]."""
+"""Simulated time after which a rover that still moves counts as not settled [s]."""
 SIDES = (("right", -1.0), ("left", 1.0))
 
 
@@ -30,15 +30,15 @@ class Settled:
     """A rover at rest."""
 
     pose: np.ndarray
-    """(3,) x, y [m] and yaw [rad] where it came to rest."""
+    """(3,) x, y [m] and yaw [rad] at rest."""
     wheel_centres: np.ndarray
     """(6, 3) [m]."""
     steps: int
-    """Time steps that took."""
+    """Number of time steps until it was at rest."""
 
 
 class DroppedRover:
-    """A rover above a terrain, to be dropped at any pose."""
+    """A rover above a terrain that can be dropped at any pose."""
 
     def __init__(self, rover: Rover, terrain: Terrain):
         self._rover, self._terrain = rover, terrain
@@ -51,7 +51,7 @@ class DroppedRover:
         self._wheels = np.array(wheels)
 
     def settle(self, x: float, y: float, yaw: float) -> Settled | None:
-        """Drop the rover, level, from just above the ground, and wait until it is at rest."""
+        """Drop the level rover from just above the ground; return None if it does not settle."""
         model, data = self._model, self._data
         mujoco.mj_resetData(model, data)
         data.qpos[:3] = x, y, self._height_of_start(x, y)
@@ -65,7 +65,7 @@ class DroppedRover:
         return None
 
     def _height_of_start(self, x: float, y: float) -> float:
-        """Return the height of the body [m] at which no wheel touches yet."""
+        """Return a height of the body [m] at which no wheel touches the ground."""
         terrain, suspension = self._terrain, self._rover.suspension
         reach = max(np.hypot(*wheel[:2]) for wheel in suspension.wheels.values())
         reach += 2.0 * self._rover.wheel.radius
@@ -83,10 +83,10 @@ class DroppedRover:
 
 
 def describe(rover: Rover, terrain: Terrain) -> str:
-    """Return the MJCF of a rover over a terrain; the heights are to be filled in.
+    """Return the MJCF of a rover over a terrain, without the heights of the terrain.
 
-    Rockers, bogies and wheels hang on hinges, an equality of the two rocker angles is the
-    differential, and the wheels have brakes, so that the rover stays where it is dropped.
+    Rockers, bogies and wheels are connected by hinges. An equality constraint between the rocker
+    angles models the differential. The wheels are braked, so that the rover does not roll away.
     """
     z, (x1, x2), (y1, y2) = rover.belly.z, rover.belly.x, rover.belly.y
     half = 0.5 * (x2 - x1), 0.5 * (y2 - y1), 0.04
@@ -121,7 +121,7 @@ def describe(rover: Rover, terrain: Terrain) -> str:
 
 
 def _describe_side(rover: Rover, side: str, sign: float) -> str:
-    """Return the rocker of one side with all that hangs on it."""
+    """Return the MJCF of one side: rocker, bogie and wheels."""
     suspension, masses = rover.suspension, rover.masses
     mirror = np.array([1.0, sign, 1.0])
     rocker_pivot = mirror * suspension.rocker_pivot

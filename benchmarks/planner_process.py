@@ -1,4 +1,4 @@
-"""A mission planner for benchmarks: asks nodes in other processes, and times their answers."""
+"""A planner client for benchmarks that queries nodes in other processes and times them."""
 
 import contextlib
 import os
@@ -29,7 +29,7 @@ TIMEOUT = 300.0
 
 
 class Planner:
-    """Asks services for plans from a thread of its own."""
+    """Calls services for plans; its node spins in a separate thread."""
 
     def __init__(self) -> None:
         self._context = Context()
@@ -43,11 +43,11 @@ class Planner:
 
     @property
     def node(self) -> Node:
-        """The node that asks."""
+        """The client node."""
         return self._node
 
     def ask(self, service: str, start, goal) -> tuple[Path, float]:
-        """Return the plan of a service from start to goal, (3,) each, and the time it took [s]."""
+        """Return a plan between poses (3,), x, y [m], yaw [rad], and the response time [s]."""
         if service not in self._clients:
             self._clients[service] = self._node.create_client(GetPlan, service)
         client = self._clients[service]
@@ -73,7 +73,7 @@ class Planner:
 
 
 class Processes:
-    """Starts nodes in processes of their own."""
+    """Starts nodes in separate processes."""
 
     def __init__(
         self, children: list[ChildProcess], folder: FilePath, environment: Mapping[str, str]
@@ -98,9 +98,10 @@ class Processes:
     def start_rover(
         self, terrain: Terrain, rate: float, start: Sequence[float], priority: int = 0
     ) -> None:
-        """Start a simulated rover that drives straight on, and the controller of its torques.
+        """Start a simulated rover that drives straight ahead, and its traction controller.
 
-        `priority` is the controller's parameter realtime_priority.
+        `start` is x, y [m], yaw [rad]; `rate` [Hz] and `priority` are the controller's parameters
+        rate and realtime_priority.
         """
         file = self._folder / "rover_terrain.npz"
         save_terrain(file, terrain)
@@ -138,9 +139,9 @@ class Processes:
 
 @contextlib.contextmanager
 def planner_and_processes(**environment: str) -> Iterator[tuple[Planner, Processes]]:
-    """Yield a planner, and what starts nodes for it; all of them end with the block.
+    """Yield a planner and a starter of nodes; all nodes are stopped at the end of the block.
 
-    The nodes have the environment of this process and what is given here.
+    The nodes get the environment of this process plus the given variables.
     """
     with tempfile.TemporaryDirectory() as folder, stopping_children() as children:
         planner = Planner()
@@ -151,7 +152,7 @@ def planner_and_processes(**environment: str) -> Iterator[tuple[Planner, Process
 
 
 def memory_of(child: ChildProcess) -> float:
-    """Return the largest memory that a process has had so far [MB]."""
+    """Return the peak memory of a process so far [MB]."""
     status = FilePath(f"/proc/{child.pid}/status").read_text()
     line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
     return int(line.split()[1]) / 1024

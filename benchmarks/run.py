@@ -1,7 +1,7 @@
-"""Run all benchmarks, print one table and write it as JSON: `make bench`.
+"""Runs all benchmarks, prints one table and writes it as JSON: `make bench`.
 
 Run from the repository: python -m benchmarks.run [topic ...]; the topics are the files bench_*.py.
-Each runs in a process of its own, so that none disturbs another's memory or threads.
+Each runs in a separate process, so that memory and threads of one do not affect another.
 """
 
 import importlib
@@ -20,7 +20,7 @@ RESULTS = HERE.parent / "bench_output" / "results.json"
 
 
 def run_topic(name: str) -> list[Figure]:
-    """Run one benchmark in a process of its own."""
+    """Run one benchmark in a separate process."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "figures.json"
         command = [sys.executable, "-m", "benchmarks.run", "--only", name, str(out)]
@@ -30,7 +30,7 @@ def run_topic(name: str) -> list[Figure]:
 
 
 def main(arguments: list[str]) -> int:
-    """Run what is asked for, or everything."""
+    """Run the named topics, default all."""
     if arguments[:1] == ["--only"]:
         write(importlib.import_module(f"benchmarks.{arguments[1]}").measure(), Path(arguments[2]))
         return 0

@@ -1,12 +1,13 @@
-"""Two versions of the project asked the same: do predictions, verdicts, bounds and torques agree?
+"""Compares predictions, verdicts, bounds and torques of two versions of the project.
 
 Run from the repository, with another checkout of it:
     python -m benchmarks.same_bits OTHER_CHECKOUT [--python OTHER_CHECKOUT/.venv/bin/python]
 
-Each version answers in a process of its own, over the reference grounds and the map of Spirit's
+Each version computes in a separate process, on the reference grounds and the map of Spirit's
 landing site: both presets, both torque policies, soil, arm and tool load, uncertain heights, and
-quadratic programs at random measured states. The table names every array that differs, by how
-much, and how many verdicts changed. Exit code 1 if any number differs by more than TOLERANCE.
+quadratic programs at random measured states. The output names every array that differs and its
+difference, and counts the verdicts that changed. The exit code is 1 if any number differs by more
+than TOLERANCE.
 """
 
 import argparse
@@ -24,7 +25,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCE = 1e-12
-"""Relative difference above which numbers count as different: a few roundings."""
+"""Relative difference above which numbers count as different; allows for rounding errors."""
 PLACES = {
     "load_rover": ("rover_physics.rover.rover_file", "rover_physics.rover"),
     "Terrain": ("rover_physics.terrain.grid", "rover_physics.terrain"),
@@ -39,16 +40,16 @@ PLACES = {
     "TractionWorkspace": ("rover_physics.traction.solver", "rover_physics.traction_solver"),
     "solve_traction": ("rover_physics.traction.solver", "rover_physics.traction_solver"),
 }
-"""Where each name is found, in this version first, then in version 0.1."""
+"""Module of each name in this version, then in version 0.1."""
 BOUND_STATUSES_BEFORE = (
     "BOUNDED", "NOT_SETTLED", "ON_EDGE", "UNKNOWN_NEAR", "OFF_MAP_NEAR", "SINGULAR",
 )  # fmt: skip
-"""Names of the status of bounds by its code in version 0.1."""
+"""Names of the status codes of bounds in version 0.1."""
 ARM = {"arm_yaw": 0.3, "arm_shoulder": 0.2, "arm_elbow": 0.6}
 
 
 def find(name: str) -> Any:
-    """Return a name of the version that runs, None where it has none of that name."""
+    """Return the object of that name in the version that runs, None if there is none."""
     for place in PLACES[name]:
         try:
             return getattr(importlib.import_module(place), name)
@@ -58,7 +59,7 @@ def find(name: str) -> Any:
 
 
 def ask(function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Call a function with options as the version that runs takes them."""
+    """Call a function and pass the options in the form that the running version expects."""
     sigmas = {"sigmas": options.pop("sigmas")} if "sigmas" in options else {}
     kind = find("SweepOptions")
     if kind is None:
@@ -67,7 +68,7 @@ def ask(function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
 
 
 def read_grounds() -> Iterator[tuple[str, Any, np.ndarray]]:
-    """Yield a label, a terrain, and poses on it: of the reference cases, then a straight path."""
+    """Yield label, terrain and poses (n, 3): the reference cases, then a straight path."""
     terrain_of = find("Terrain")
     for file in ("settled_a", "settled_b"):
         with np.load(ROOT / "test" / "data" / f"{file}.npz") as entries:
@@ -94,7 +95,7 @@ def straight(length: float) -> np.ndarray:
 
 
 def list_cases(rover: str) -> dict[str, dict[str, Any]]:
-    """Return the options that are asked for, by label."""
+    """Return the options of each case, by label."""
     cases: dict[str, dict[str, Any]] = {
         "equal": {},
         "optimal": {"policy": "optimal"},
@@ -113,7 +114,7 @@ def list_cases(rover: str) -> dict[str, dict[str, Any]]:
 
 
 def answer_all() -> dict[str, np.ndarray]:
-    """Return all answers of the version that runs, by label."""
+    """Return all results of the version that runs, by label."""
     found: dict[str, np.ndarray] = {}
     for rover_name in ("lsr1", "m2020"):
         rover = find("load_rover")(rover_name)
@@ -134,7 +135,7 @@ def answer_all() -> dict[str, np.ndarray]:
 
 
 def note_judged(found: dict[str, np.ndarray], label: str, prediction: Any, verdict: Any) -> None:
-    """Note all arrays of a prediction, those between its waypoints, and its verdict."""
+    """Store all arrays of a prediction and of its crossings, and the verdict."""
     note_arrays(found, label, prediction)
     if prediction.between is not None:
         note_arrays(found, f"{label} | between", prediction.between)
@@ -147,14 +148,14 @@ def note_judged(found: dict[str, np.ndarray], label: str, prediction: Any, verdi
 
 
 def note_arrays(found: dict[str, np.ndarray], label: str, record: Any) -> None:
-    """Note all numeric arrays of a record."""
+    """Store all numeric arrays of a record under `label`."""
     for name, value in vars(record).items():
         if isinstance(value, np.ndarray) and value.dtype != object:
             found[f"{label} | {name}"] = np.array(value)
 
 
 def name_bound_status(code: int) -> str:
-    """Return the name of a status of bounds; version 0.1 numbered them in another way."""
+    """Return the name of a status of bounds; version 0.1 had other codes."""
     kind = find("BoundStatus")
     return str(kind(code).name) if kind else BOUND_STATUSES_BEFORE[code]
 
@@ -162,7 +163,7 @@ def name_bound_status(code: int) -> str:
 def note_uncertain(
     found: dict[str, np.ndarray], where: str, rover: Any, terrain: Any, paths: dict
 ) -> None:
-    """Note the bounds where all heights are uncertain by 4 mm."""
+    """Store the bounds for a standard deviation of 4 mm of all heights."""
     std = np.where(np.isfinite(terrain.elevation), 0.004, np.nan)
     uncertain = find("Terrain")(
         terrain.elevation, terrain.resolution, terrain.origin, elevation_std=std
@@ -174,7 +175,7 @@ def note_uncertain(
 
 
 def note_scores(found: dict[str, np.ndarray], where: str, rover: Any, terrain: Any) -> None:
-    """Note the scores of poses anywhere on a ground."""
+    """Store the scores of random poses on a ground."""
     rng = np.random.default_rng(3)
     xmin, xmax, ymin, ymax = terrain.bounds
     places = rng.uniform((xmin, ymin), (xmax, ymax), (2_500, 2))
@@ -183,7 +184,7 @@ def note_scores(found: dict[str, np.ndarray], where: str, rover: Any, terrain: A
 
 
 def note_programs(found: dict[str, np.ndarray], name: str, rover: Any) -> None:
-    """Note the torques that the quadratic program shares at random measured states."""
+    """Store the torques of the quadratic program at random measured states."""
     rng = np.random.default_rng(7)
     writer, workspace = find("BalanceWriter")(rover), find("TractionWorkspace")()
     numbers = []
@@ -204,7 +205,7 @@ def note_programs(found: dict[str, np.ndarray], name: str, rover: Any) -> None:
 
 
 def note_reach(found: dict[str, np.ndarray]) -> None:
-    """Note what the arm reaches from a pose on rocks."""
+    """Store the arm's reach from a pose on rocks."""
     rover = find("load_rover")("lsr1")
     terrain = next(terrain for label, terrain, _ in read_grounds() if label == "settled_a/rocks")
     rng = np.random.default_rng(9)
@@ -214,14 +215,14 @@ def note_reach(found: dict[str, np.ndarray]) -> None:
 
 
 def ask_reach(rover: Any, terrain: Any, target: np.ndarray) -> Any:
-    """Ask whether the arm reaches a point and pushes there with 5 N."""
+    """Return whether the arm reaches a point (3,) [m] and can push there with 5 N."""
     judge = find("judge_reach")
     name = "tool_force" if find("SweepOptions") is None else "force"
     return judge(rover, terrain, (0.0, 0.0, 0.3), target, **{name: (0.0, 0.0, 5.0)})
 
 
 def compare(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> int:
-    """Print what differs; return how many arrays differ by more than roundings."""
+    """Print the differences; return how many arrays differ by more than TOLERANCE."""
     numbers = same = rounded = 0
     differing: list[str] = []
     for label in sorted(before.keys() | after.keys()):
@@ -246,7 +247,7 @@ def compare(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> int:
 
 
 def measure_difference(old: np.ndarray, new: np.ndarray) -> float:
-    """Return the largest relative difference; infinite where text, shape or NaN differ."""
+    """Return the largest relative difference; infinity if text, shape or NaN differ."""
     if old.shape != new.shape or old.dtype.kind not in "fiub" or new.dtype.kind not in "fiub":
         return np.inf
     old, new = old.astype(float), new.astype(float)
@@ -258,7 +259,7 @@ def measure_difference(old: np.ndarray, new: np.ndarray) -> float:
 
 
 def run_version(python: str, checkout: Path, out: Path) -> dict[str, np.ndarray]:
-    """Let a checkout answer in a process of its own and return what it wrote."""
+    """Run a checkout in a separate process and return the arrays that it wrote."""
     environment = {**os.environ, "PYTHONPATH": str(checkout)}
     command = [python, str(Path(__file__).resolve()), "--write", str(out)]
     subprocess.run(command, check=True, env=environment, cwd=checkout)
@@ -267,7 +268,7 @@ def run_version(python: str, checkout: Path, out: Path) -> dict[str, np.ndarray]
 
 
 def main() -> int:
-    """Ask both versions and compare, or answer for one."""
+    """Run both versions and compare, or write the results of one."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
     parser.add_argument("other", nargs="?", type=Path, help="a checkout of the other version")
     parser.add_argument("--python", default=sys.executable, help="interpreter of the other one")

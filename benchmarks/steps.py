@@ -1,6 +1,7 @@
-"""Which steps a rover climbs in MuJoCo, by the height of its bogie pivot. See docs/studies.md.
+"""Finds the steps that a rover climbs in MuJoCo for several heights of its bogie pivot.
 
-Run from the repository, with pivots in m if not all: python -m benchmarks.steps [Z ...]
+Run from the repository: python -m benchmarks.steps [Z ...], with heights of the pivot in m,
+default PIVOTS. The results are in docs/studies.md.
 """
 
 import sys
@@ -13,16 +14,16 @@ from rover_planner.studies.rover_keys import vary
 
 PIVOTS = (-0.14, -0.08, -0.03, 0.05)
 HEIGHTS = (0.07, 0.075, 0.08, 0.085, 0.09, 0.10)
-"""Steps that are tried [m]."""
+"""Heights of the steps [m]."""
 FRICTION = 0.5
 SPEED, LONGEST = 0.05, 100.0
-"""Of the drive [m/s], and the time after which a rover counts as stopped [s]."""
+"""Speed of the drive [m/s], and the longest time of a drive [s]."""
 START, END = -0.75, 0.65
-"""Places of the body before and behind the step [m]."""
+"""x of the body at the start, and beyond the step where the drive has succeeded [m]."""
 
 
 def climb(rover: Rover, height: float) -> float:
-    """Return where the body of a rover is when it is up, or its time is [m]."""
+    """Return x of the body [m] when the rover has passed END or its time is up."""
     plant = MujocoPlant(rover, step_ground(rover, height), (START, 0.0, 0.0), FRICTION)
     for _ in range(round(LONGEST / 0.1)):
         plant.drive(SPEED, 0.0, 0.1)

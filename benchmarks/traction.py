@@ -1,4 +1,4 @@
-"""Wheel torques in closed loop in MuJoCo: speed servos, equal torques, the quadratic program.
+"""Closed-loop drives in MuJoCo with speed servos, equal torques and the quadratic program.
 
 Run from the repository: python -m benchmarks.traction [--quick] [--out FOLDER]
 It needs the extra `bench`. Its results are in docs/traction.md.
@@ -30,21 +30,21 @@ from support.rough_grounds import bouldered, fractal
 PERIOD = 0.02
 """Period of the controllers [s]."""
 SPEED = 0.06
-"""Speed of the drives [m/s]: twice the rover's own, so that they take half the time."""
+"""Speed of the drives [m/s]: twice the rover's nominal speed, to halve the run time."""
 START, END = -1.2, 1.2
 """x of the body's origin at the start and at the end of a drive [m]."""
 MAX_DURATION_RATIO = 2.0
-"""Time after which a rover counts as stuck, over the duration of a drive at SPEED."""
+"""Time after which a rover counts as stuck, as a multiple of the time at SPEED."""
 MAX_TILT = 1.2
 """Tilt from which a rover counts as tipped over [rad]."""
 MAX_OFFSET = 1.0
 """Distance from the x axis from which a rover counts as lost [m]."""
 MIN_LOAD = 0.02
-"""Load from which the utilisation of a wheel counts, in sixths of the weight."""
+"""Load above which the utilisation of a wheel counts, in sixths of the weight."""
 SERVO_CONTROLLER, EQUAL_CONTROLLER = "servo", "equal"
 MOTION_CONTROLLER, MAP_CONTROLLER = "optimal", "optimal, map"
 CONTROLLERS = (SERVO_CONTROLLER, EQUAL_CONTROLLER, MOTION_CONTROLLER, MAP_CONTROLLER)
-"""Speed servos, equal torques, the program with contact angles from motion, and from the map."""
+"""Speed servos, equal torques, and the QP with contact angles from motion or from the map."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Drive:
-    """Result of a drive; means are over time and wheels, to the end or to where it stuck."""
+    """Result of a drive; means are over time and wheels, up to the end or where it got stuck."""
 
     passed: bool
     """Whether the rover reached the end."""
@@ -75,24 +75,24 @@ class Drive:
     duration: float
     """Duration [s]."""
     mean_utilisation: float
-    """Mean over time of the largest utilisation of all wheels."""
+    """Mean over time of the largest friction utilisation of the six wheels."""
     peak_utilisation: float
-    """95th percentile of the same."""
+    """95th percentile over time of the largest friction utilisation."""
     slip: float
-    """Distance that a tread slid over the ground [m], mean of the wheels."""
+    """Distance that a tread slid over the ground [m], mean of the six wheels."""
     torque: float
-    """Mean size of a wheel's torque [N m]."""
+    """Mean absolute wheel torque [N m]."""
     torque_squared: float
     """Mean square of a wheel's torque [(N m)^2]."""
     energy: float
-    """Mechanical work of the motors, without what they recover [J]."""
+    """Mechanical work of the motors [J]; negative power counts as zero."""
 
 
 Controller = Callable[[MujocoRover], np.ndarray]
 
 
 def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain) -> Controller:
-    """Return a function that advances the plant by a period and returns its torques."""
+    """Return a function that advances the plant by PERIOD and returns its torques (6,) [N m]."""
     if name == SERVO_CONTROLLER:
         rates = np.full(6, SPEED / rover.wheel.radius)
         return lambda plant: plant.servo(rates, PERIOD)
@@ -118,8 +118,8 @@ def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain
 def drive(obstacle: Obstacle, name: str, trace: list | None = None) -> Drive:
     """Drive the rover lsr1 over an obstacle with a controller.
 
-    A row for each period is appended to `trace`: time [s], x [m], loads (6) [N], torques (6)
-    [N m], peak utilisation.
+    If `trace` is given, each period appends a row to it: time [s], x [m], loads (6) [N],
+    torques (6) [N m], peak utilisation.
     """
     rover, ground = load_rover("lsr1"), make_ground(obstacle)
     plant = MujocoRover(rover, ground, (START, 0.0, 0.0), obstacle.friction)
@@ -176,11 +176,11 @@ OBSTACLES = (
 ROUGH = ("rocks", "relief")
 """Kinds of rough ground."""
 QUICK_STEP = 5
-"""--quick drives over one of so many obstacles."""
+"""With --quick, every so many-th obstacle is driven over."""
 
 
 def drive_all(obstacles: Sequence[Obstacle]) -> dict[tuple[Obstacle, str], Drive]:
-    """Drive over all obstacles with all controllers, a process per core."""
+    """Drive over all obstacles with all controllers, using one process per core."""
     jobs = [(obstacle, name) for obstacle in obstacles for name in CONTROLLERS]
     context = multiprocessing.get_context("spawn")
     with (
@@ -195,7 +195,7 @@ def drive_all(obstacles: Sequence[Obstacle]) -> dict[tuple[Obstacle, str], Drive
 
 
 def compare(drives: dict[tuple[Obstacle, str], Drive], kinds: Sequence[str]) -> dict[str, dict]:
-    """Return for each controller sums over the obstacles that all controllers passed."""
+    """Return, by controller, sums over the obstacles that all controllers passed."""
     obstacles = [
         obstacle
         for obstacle, name in drives
@@ -223,7 +223,7 @@ def compare(drives: dict[tuple[Obstacle, str], Drive], kinds: Sequence[str]) -> 
 
 
 def show_drives(drives: dict[tuple[Obstacle, str], Drive]) -> Table:
-    """Return a row for each drive."""
+    """Return a table with one row per drive."""
     table = Table(title="LSR-1 in MuJoCo, 2.4 m at 6 cm/s")
     headings = ("obstacle", "controller", "end [m]", "utilisation mean", "95 %", "slip [m]",
                 "torque [N m]", "energy [J]")  # fmt: skip
@@ -240,7 +240,7 @@ def show_drives(drives: dict[tuple[Obstacle, str], Drive]) -> Table:
 
 
 def show_sums(sums: dict[str, dict], title: str) -> Table:
-    """Return a row for each controller, with its differences from the servos."""
+    """Return a table with one row per controller, with its differences from the servos."""
     table = Table(title=title)
     headings = ("controller", "passed", "lost", "slip [m]", "torque [N m]", "energy [J]",
                 "utilisation")  # fmt: skip
@@ -262,7 +262,7 @@ def show_sums(sums: dict[str, dict], title: str) -> Table:
 
 
 def draw_sums(sums: dict[str, dict], picture: Path) -> None:
-    """Draw slip, torque, energy and utilisation of the controllers over those of the servos."""
+    """Draw slip, torque, energy and utilisation of the controllers relative to the servos."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -283,7 +283,7 @@ def draw_sums(sums: dict[str, dict], picture: Path) -> None:
 
 
 def main() -> None:
-    """Drive, print tables, and write JSON and a picture."""
+    """Run the drives, print tables, and write JSON and a picture."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--quick", action="store_true", help=f"only every {QUICK_STEP}th obstacle")
     parser.add_argument("--out", type=Path, default=Path("bench_output"))

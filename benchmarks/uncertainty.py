@@ -1,4 +1,4 @@
-"""How often maps drawn at random leave the bounds: the tables of docs/uncertainty.md.
+"""Counts how often values on random maps leave their bounds: the tables of docs/uncertainty.md.
 
 Run from the repository: python -m benchmarks.uncertainty [maps per case]
 """
@@ -27,15 +27,17 @@ from support.uncertain_grounds import (
 )
 
 MAPS = 40
+"""Default number of random maps per case."""
 STDS = (0.001, 0.005)
 """Standard deviations of the heights [m]."""
 FACES = (0.3, 0.8, 1.0, 1.15, 1.3, 1.6)
-"""Heights of faces in wheel radii."""
+"""Heights of steep faces in wheel radii, below and above one radius."""
 REPEATS = 5
+"""Time measurements, of which the least counts."""
 
 
 def correlation_lengths(rover: Rover) -> dict[str, float]:
-    """Return the distances [m] over which errors are alike, by name."""
+    """Return the correlation lengths of the height errors [m], by name."""
     wheels = rover.suspension.wheels
     return {
         "each cell": 0.0,
@@ -64,7 +66,7 @@ def draw_all(console: Console, maps: int) -> dict[tuple[str, ...], Outcome]:
 
 
 def show_by_case(outcomes: dict[tuple[str, ...], Outcome]) -> Table:
-    """Return how often a waypoint left its bounds, summed over each property of the cases."""
+    """Return a table of waypoints outside their bounds, summed over each property of the cases."""
     table = Table(title="Waypoints with anything outside of its bounds, three sigma")
     for heading in ("cases", "waypoints", "outside", "per 1000", "without bounds"):
         table.add_column(heading, justify="left" if heading == "cases" else "right")
@@ -82,7 +84,7 @@ def show_by_case(outcomes: dict[tuple[str, ...], Outcome]) -> Table:
 
 
 def show_by_value(outcomes: dict[tuple[str, ...], Outcome]) -> Table:
-    """Return how often each value left its bounds, and how wide these are."""
+    """Return a table of how often each value left its bounds, and the width of the bounds."""
     table = Table(title="Each value; width is that of the bounds over the range drawn")
     for heading in ("value", "outside", "width: median", "cell", "wheel", "wheelbase"):
         table.add_column(heading, justify="left" if heading == "value" else "right")
@@ -102,7 +104,7 @@ def show_by_value(outcomes: dict[tuple[str, ...], Outcome]) -> Table:
 
 
 def show_faces(maps: int) -> Table:
-    """Return how often waypoints leave their bounds on the way over faces, and lack bounds."""
+    """Return a table of waypoints outside their bounds, and without bounds, on steep faces."""
     table = Table(title="Straight over a face, waypoints every 3 cm, by its height in wheel radii")
     headings = ("rover", "height", "std", "waypoints", "outside", "per 1000", "without bounds")
     for heading in headings:
@@ -127,7 +129,7 @@ def show_faces(maps: int) -> Table:
 
 
 def show_times() -> Table:
-    """Return the time of the bounds per waypoint on one core."""
+    """Return a table of the time of the bounds per waypoint on one core."""
     numba.set_num_threads(1)
     table = Table(title="Time per waypoint on one core in us, least of five")
     for heading in ("rover", "ground", "policy", "sweep", "bounds"):
@@ -157,7 +159,7 @@ def _least(function) -> float:
 
 
 def main() -> None:
-    """Draw, measure and print."""
+    """Draw the maps, measure and print the tables."""
     maps = int(sys.argv[1]) if len(sys.argv) > 1 else MAPS
     outcomes = draw_all(Console(stderr=True), maps)
     console = Console()

@@ -1,4 +1,4 @@
-"""The model against MuJoCo, as tables: settled cases and drives. See docs/validation.md.
+"""Compares the model with MuJoCo in tables: settled cases and drives (docs/validation.md).
 
 Run from the repository: python -m benchmarks.validate
 """
@@ -13,7 +13,7 @@ from support.reference_drives import PASSED, Drive, judge_drives
 
 
 def settled_errors() -> dict[str, np.ndarray]:
-    """Return absolute errors of all settled cases by what they are of, in their units."""
+    """Return absolute errors of all settled cases by quantity; the name has the unit."""
     errors: dict[str, list[np.ndarray]] = {}
     weight = load_rover("lsr1").weight
     for case, prediction in reference_predictions():
@@ -48,7 +48,7 @@ def settled_table() -> Table:
 
 
 def drives_table(policy: str) -> Table:
-    """Return the drives that end otherwise than judged under `policy` as a table."""
+    """Return a table of the drives whose outcome differs from the verdict under `policy`."""
     rows, agree, wrongly_passed = [], 0, 0
     for drive, _, verdict in judge_drives(policy):
         if verdict.traversable == (drive.outcome == PASSED):

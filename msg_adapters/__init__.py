@@ -1,1 +1,1 @@
-"""ROS messages to numpy and back: pure functions, one file per kind of message."""
+"""Conversions between ROS messages and numpy: pure functions, one file per kind of message."""

@@ -1,4 +1,4 @@
-"""Commands: the wanted speed of the rover in, joint efforts and values per wheel out."""
+"""Converts command messages: reads the commanded speed, writes joint efforts and wheel values."""
 
 import array
 import math
@@ -14,10 +14,10 @@ from rover_physics.names import WHEEL_JOINTS, WHEELS
 
 
 def twist_to_speeds(twist: TwistStamped) -> tuple[float, float]:
-    """Return forward speed [m/s] and yaw rate [rad/s]; other components are not looked at.
+    """Return forward speed [m/s] and yaw rate [rad/s]; other components are ignored.
 
     Raises:
-        MessageError: one of them is not finite.
+        MessageError: One of them is not finite.
     """
     forward, yaw = twist.twist.linear.x, twist.twist.angular.z
     if not (math.isfinite(forward) and math.isfinite(yaw)):
@@ -28,10 +28,10 @@ def twist_to_speeds(twist: TwistStamped) -> tuple[float, float]:
 
 
 def joint_order(joints: Sequence[str]) -> NDArray[np.int64]:
-    """Return for each of the named joints the wheel (6,) that it drives.
+    """Return the index (6,) of the wheel that each named joint drives.
 
     Raises:
-        MessageError: the names are not those of the six wheel joints, each once.
+        MessageError: The names are not those of the six wheel joints, each once.
     """
     if sorted(joints) != sorted(WHEEL_JOINTS):
         raise MessageError(
@@ -41,12 +41,12 @@ def joint_order(joints: Sequence[str]) -> NDArray[np.int64]:
 
 
 def effort_commands(torques: NDArray[np.float64], order: NDArray[np.int64]) -> Float64MultiArray:
-    """Write torques (6,) [N m] in wheel order as efforts in the order of `joint_order`."""
+    """Convert torques (6,) [N m] in wheel order into efforts; `order` comes from `joint_order`."""
     return Float64MultiArray(data=_doubles(torques[order]))
 
 
 def wheel_values(values: NDArray[np.float64], rows: str = "") -> Float64MultiArray:
-    """Write values (6,), or (k, 6) with a name for its rows, as an array with labelled dims."""
+    """Convert values (6,), or (k, 6) with a label for rows, into an array with labelled dims."""
     message = Float64MultiArray(data=_doubles(values))
     dims = [MultiArrayDimension(label="wheel", size=len(WHEELS), stride=len(WHEELS))]
     if rows:
@@ -56,7 +56,7 @@ def wheel_values(values: NDArray[np.float64], rows: str = "") -> Float64MultiArr
 
 
 def set_values(message: Float64MultiArray, values: NDArray[np.float64]) -> None:
-    """Put other values of the same shape into a message; a new one takes longer than sending."""
+    """Replace the values of a message by others of the same shape, faster than a new message."""
     message.data = _doubles(values)
 
 

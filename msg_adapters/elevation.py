@@ -1,9 +1,9 @@
-"""Elevation map messages: PointCloud2 and OccupancyGrid against Terrain.
+"""Converts elevation maps: PointCloud2 to Terrain and back, Terrain to OccupancyGrid.
 
-The points of a cloud are read where they stand in the message. Where they are a regular grid row
-by row, their heights are the terrain; else each point falls into the cell whose centre is nearest.
-A cloud that is a regular grid, in whatever order, keeps its own cells, so that a terrain published
-as a cloud comes back as it was.
+Points are read from the message without a copy. If they form a regular grid row by row, their
+heights become the terrain directly. Otherwise each point is assigned to the nearest cell centre.
+A regular grid in any order keeps its own cells, so that a terrain that is published as a cloud is
+read back unchanged.
 """
 
 import array
@@ -55,13 +55,13 @@ class CloudPoints:
 
 
 def read_points(cloud: PointCloud2) -> CloudPoints:
-    """Read the points of a cloud, whatever its layout.
+    """Read the points of a cloud of any layout.
 
     Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
     and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64.
 
     Raises:
-        MessageError: no points, a field missing or of another datatype, or lengths that disagree.
+        MessageError: No points, a field missing or of another datatype, or lengths that disagree.
     """
     points = _view_points(cloud)
     columns = {name: points[name].astype(np.float64).ravel() for name in points.dtype.names or ()}
@@ -78,20 +78,19 @@ def terrain_from_point_cloud(
     """Grid a cloud onto square cells; a cell without a point is unknown (NaN).
 
     Args:
-        cloud: Points in the map frame, z up [m]. Points with NaN or infinite height are unknown
-            ground; with NaN or infinite x or y they are left out.
-        resolution: Cell size [m]. 0 takes the spacing of the points, which must then form a
-            regular grid along x and y. Irregular points fall on cells centred on multiples of
-            the resolution.
-        cell_height: What becomes of several points in one cell. "max" keeps the top of every
-            obstacle, as a verdict about safety should; it lifts noisy ground by about the noise
-            and narrows a ditch by up to a cell. "mean" is unbiased on plain ground and lowers
-            the edges of obstacles.
+        cloud: Points in the map frame, z up [m]. A point without a finite height is unknown
+            ground. A point without finite x and y is ignored.
+        resolution: Cell size [m]. 0 uses the spacing of the points, which must then form a
+            regular grid along x and y. Irregular points need a resolution above 0; their cells
+            are centred on multiples of it.
+        cell_height: How the points of a cell are combined. "max" keeps the top of every obstacle,
+            which is safe; it raises noisy ground by about the noise and narrows a ditch by up
+            to a cell. "mean" is unbiased on plain ground and lowers the edges of obstacles.
 
     Raises:
-        MessageError: the cloud cannot be read, has no valid point, is no regular grid although
-            the resolution is to be detected, or would make a map of more than MAX_CELLS.
-        TerrainError: the cells make no terrain.
+        MessageError: The cloud cannot be read, has no valid point, is not a regular grid
+            although the resolution is 0, or needs more than MAX_CELLS cells.
+        TerrainError: The cells do not form a valid terrain.
     """
     if cell_height not in CELL_HEIGHTS:
         raise MessageError(f"cell_height is {cell_height!r}; it must be one of {CELL_HEIGHTS}")
@@ -105,12 +104,12 @@ def terrain_from_point_cloud(
 
 
 def _is_wanted(grid: CellGrid, resolution: float) -> bool:
-    """Tell whether a detected grid is what was asked for, 0 asking for any."""
+    """Return whether a detected grid has the requested resolution; 0 accepts any."""
     return resolution == 0.0 or abs(grid.resolution - resolution) <= 1e-3 * resolution
 
 
 def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
-    """Take the points as they come for cells."""
+    """Make a terrain whose cells are the points of a raster."""
     elevation = raster.arrange(points["z"])
     unknown = ~np.isfinite(elevation)
     if unknown.all():
@@ -134,7 +133,7 @@ def _make_terrain(
     friction: NDArray[np.float64] | None,
     std: NDArray[np.float64] | None,
 ) -> Terrain:
-    """Return the terrain of layers that were made for it: sealed, so that none is copied."""
+    """Make a terrain of new layers without copying them; they become read-only."""
     layers = [None if layer is None else seal_array(layer) for layer in (friction, std)]
     return Terrain(
         seal_array(elevation), grid.resolution, grid.origin, layers[0], elevation_std=layers[1]
@@ -142,7 +141,7 @@ def _make_terrain(
 
 
 def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str) -> Terrain:
-    """Let each point fall into the cell whose centre is nearest."""
+    """Make a terrain of irregular points; each is assigned to the nearest cell centre."""
     placed = np.isfinite(points.xyz[:, :2]).all(axis=1)
     known = placed & np.isfinite(points.xyz[:, 2])
     if not known.any():
@@ -161,7 +160,7 @@ def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str
     elevation = combine(cells, points.xyz[known, 2], grid, cell_height)
     friction = None
     if points.friction is not None:
-        # The lowest coefficient of a cell counts; not finite ones say nothing.
+        # A cell takes its lowest finite friction coefficient.
         values = np.where(np.isfinite(points.friction), points.friction, np.nan)[known]
         friction = -combine(cells, -values, grid, "max")
     std = None
@@ -176,13 +175,13 @@ def terrain_to_point_cloud(
     stamp=None,
     datatype: int = PointField.FLOAT32,
 ) -> PointCloud2:
-    """Write a terrain as an organised cloud, one point per cell, row 0 first.
+    """Convert a terrain into an organised cloud, one point per cell, row 0 first.
 
     Args:
         terrain: Unknown cells become points with NaN height, so that the shape is kept.
         frame_id: Frame of the map.
         stamp: builtin_interfaces/Time, zero if None.
-        datatype: PointField.FLOAT32 (what viewers show; heights are rounded to it) or FLOAT64.
+        datatype: PointField.FLOAT32, which viewers can show and which rounds heights, or FLOAT64.
     """
     rows, columns = terrain.elevation.shape
     layers = [name for name in LAYERS if getattr(terrain, name) is not None]
@@ -210,10 +209,10 @@ def terrain_to_point_cloud(
 
 
 def terrain_to_occupancy_grid(terrain: Terrain, frame_id: str, stamp) -> OccupancyGrid:
-    """Say which cells of a terrain are known (0) and which are not (-1).
+    """Convert a terrain into a grid of known (0) and unknown (-1) cells.
 
-    The origin is the corner of cell [0, 0], as nav_msgs/MapMetaData asks, half a cell from the
-    terrain's own origin, which is that cell's centre.
+    The origin is the corner of cell [0, 0], as nav_msgs/MapMetaData requires. It is half a cell
+    away from the terrain's own origin, which is the centre of that cell.
     """
     grid = OccupancyGrid()
     grid.header.frame_id = frame_id
@@ -229,7 +228,7 @@ def terrain_to_occupancy_grid(terrain: Terrain, frame_id: str, stamp) -> Occupan
 
 
 def _view_points(cloud: PointCloud2) -> NDArray[np.void]:
-    """Return the points (height, width) where they stand in a cloud, by the names of fields."""
+    """Return a structured view (height, width) of the points in a cloud, by field name."""
     row_step = _check_layout(cloud)
     names = ["x", "y", "z"]
     fields = {field.name: field for field in cloud.fields}

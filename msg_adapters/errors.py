@@ -1,5 +1,5 @@
-"""The error of every message that cannot be understood."""
+"""The error that invalid messages raise."""
 
 
 class MessageError(Exception):
-    """A message with something missing, impossible or in another frame; the text names it."""
+    """A message with a missing or invalid field or a wrong frame; the text names it."""

@@ -1,13 +1,13 @@
-"""The one frame of a map: what arrives in another is refused, since nothing is transformed."""
+"""Checks the frame of messages: only the map frame is accepted, nothing is transformed."""
 
 from msg_adapters.errors import MessageError
 
 
 def check_frame(frame_id: str, map_frame: str, what: str) -> None:
-    """Refuse a message in any other frame than the map's.
+    """Check that a message is in the map frame.
 
     Raises:
-        MessageError: the frame is empty or another one; the text says which is right.
+        MessageError: The frame is empty or differs; the text names the right one.
     """
     if frame_id != map_frame:
         given = f"in frame {frame_id!r}" if frame_id else "without a frame_id"

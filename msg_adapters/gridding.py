@@ -1,7 +1,7 @@
-"""Square cells for the points of a cloud: found where they are a regular grid, else laid out.
+"""Square cells for the points of a cloud, from a detected regular grid or a given resolution.
 
-Points that come row by row, as most maps do, are recognised as they stand in the message; for
-points in any other order all of them are sorted along x and along y.
+Points in row order, as in most maps, are recognised without a copy. Points in any other order are
+sorted along x and along y.
 """
 
 import math
@@ -13,20 +13,17 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 
-CELL_HEIGHTS = ("max", "mean")
-"""Names of what becomes of several points in one cell."""
-
 MAX_CELLS = 25_000_000
-"""Largest map built from a cloud; one stray point far away must not take the memory."""
+"""Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
 
 CELL_HEIGHTS = ("max", "mean")
-"""Ways to choose the height of a cell with several points."""
+"""Ways to combine several points of a cell into its height."""
 
 _MIN_FILL = 0.05
-"""Least share of a detected grid's cells that have a point; below it the spacing is a chance."""
+"""Smallest share of cells with a point in a detected grid; below it the spacing is accidental."""
 
 _MAX_OFF_CENTRE = 0.02
-"""Largest distance of a regular grid's points from their cell centres, in cells."""
+"""Largest distance between a regular grid's points and their cell centres [cells]."""
 
 
 @dataclass(frozen=True)
@@ -39,26 +36,26 @@ class CellGrid:
     rows: int
 
     def cells(self, xy):
-        """Return the column and row of points (n, 2)."""
+        """Return the column (n,) and row (n,) of points (n, 2) [m]."""
         index = np.rint((xy - self.origin) / self.resolution).astype(np.int64)
         return index[:, 0], index[:, 1]
 
 
 @dataclass(frozen=True)
 class Raster:
-    """A regular grid whose points come row by row, or column by column."""
+    """A regular grid whose points are stored row by row or column by column."""
 
     grid: CellGrid
-    """The cells, of which each has one point."""
+    """The cells; each has one point."""
     shape: tuple[int, int]
-    """Shape (h, w) of the points as they come."""
+    """Shape (h, w) of the points in the message."""
     by_columns: bool
-    """Whether y, not x, changes from one point to the next."""
+    """Whether y, not x, changes from one point of a message row to the next."""
     falling: tuple[bool, bool]
-    """Whether x and y fall along the points."""
+    """Whether x and y decrease along the points."""
 
     def arrange(self, values: NDArray[Any]) -> NDArray[np.float64]:
-        """Return the values of the points as (rows, columns), both ascending."""
+        """Return values (h, w) of the points as (rows, columns), with x and y ascending."""
         values = values.reshape(self.shape)
         values = values.T if self.by_columns else values
         x_step, y_step = (-1 if falls else 1 for falls in self.falling)
@@ -66,7 +63,7 @@ class Raster:
 
 
 def detect_raster(x: NDArray[Any], y: NDArray[Any]) -> Raster | None:
-    """Find the regular grid that points (h, w) are, as they stand row by row, or None."""
+    """Return the regular grid of points (h, w) [m] in message order, None if there is none."""
     by_columns = x.size > 1 and y.flat[0] != y.flat[1]
     inner, outer = (y, x) if by_columns else (x, y)
     if inner.shape[0] == 1:
@@ -93,11 +90,11 @@ def detect_raster(x: NDArray[Any], y: NDArray[Any]) -> Raster | None:
 
 
 def detect_grid(xy: NDArray[np.float64], precision: float) -> CellGrid | None:
-    """Find the regular grid along x and y that the points (n, 2) lie on, or None.
+    """Detect the regular grid along x and y of points (n, 2); return None if there is none.
 
     Args:
         xy: Points in any order [m].
-        precision: Their rounding error [m].
+        precision: Rounding error of the coordinates [m].
     """
     noise = 4.0 * precision
     grid = _fit_grid(xy[:, 0], xy[:, 1], len(xy), noise)
@@ -111,7 +108,7 @@ def detect_grid(xy: NDArray[np.float64], precision: float) -> CellGrid | None:
 
 
 def rounding_error(*coordinates: NDArray[Any]) -> float:
-    """Return the rounding error [m] of coordinates, in their own type; others than finite pass."""
+    """Return the rounding error [m] of coordinates in their type; ignores NaN and infinity."""
     extent = 1.0
     for values in coordinates:
         extent = max(extent, float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))
@@ -120,7 +117,7 @@ def rounding_error(*coordinates: NDArray[Any]) -> float:
 
 
 def _fit_grid(x, y, points: int, noise: float) -> CellGrid | None:
-    """Fit cells to the values that x and y of a number of points take, or None."""
+    """Fit cells to the distinct x and y values of a number of points; return None if none fit."""
     along_x, along_y = _detect_axis(x, noise), _detect_axis(y, noise)
     if along_x is None or along_y is None:
         return None
@@ -140,12 +137,12 @@ def _fit_grid(x, y, points: int, noise: float) -> CellGrid | None:
 
 
 def _tolerance(resolution: float, noise: float) -> float:
-    """Return how far from the cell centres the points of a regular grid may be [m]."""
+    """Return the largest distance of a regular grid's points from their cell centres [m]."""
     return max(_MAX_OFF_CENTRE * resolution, noise)
 
 
 def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, float] | None:
-    """Return the first value and the spacing of equidistant values (0 for one value), or None."""
+    """Return start and spacing of equidistant values, spacing 0 for one value; else None."""
     ordered = np.sort(values)
     starts = np.concatenate([[True], np.diff(ordered) > noise])
     distinct = ordered[starts]
@@ -162,7 +159,7 @@ def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, floa
 
 
 def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CellGrid:
-    """Return cells centred on multiples of the resolution that hold the points (n, 2)."""
+    """Return cells for points (n, 2) [m], centred on multiples of the resolution [m]."""
     first = np.rint(xy.min(axis=0) / resolution)
     last = np.rint(xy.max(axis=0) / resolution)
     counts = last - first + 1.0
@@ -180,7 +177,7 @@ def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CellGrid:
 
 
 def combine(cells, values, grid: CellGrid, how: str) -> NDArray[np.float64]:
-    """Combine the values of each cell; NaN where there is none."""
+    """Combine the values (n,) of each cell; NaN in cells without a value."""
     size = grid.rows * grid.columns
     if how == "max":
         combined = np.full(size, np.nan)
@@ -193,13 +190,13 @@ def combine(cells, values, grid: CellGrid, how: str) -> NDArray[np.float64]:
 
 
 def typical_spacing(xy: NDArray[np.float64]) -> float:
-    """Return a cell size [m] at which most cells within the points (n, 2) would have one."""
+    """Return a cell size [m] at which most cells would contain one of the points (n, 2)."""
     area = float(np.prod(np.ptp(xy, axis=0)))
     return 2.0 * math.sqrt(area / len(xy))
 
 
 def _round_within(value: float, tolerance: float) -> float:
-    """Return the shortest decimal within a tolerance of a value: 0.0500000003 is 0.05."""
+    """Return the shortest decimal within a tolerance of a value: 0.05 for 0.0500000003."""
     for digits in range(13):
         rounded = round(value, digits)
         if abs(rounded - value) <= tolerance:

@@ -1,4 +1,4 @@
-"""Inertial measurements: the attitude and the turning rates of the body."""
+"""Reads IMU messages: the attitude and angular velocity of the body."""
 
 import math
 from dataclasses import dataclass
@@ -11,26 +11,26 @@ from msg_adapters.errors import MessageError
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 
 NOT_MEASURED = -1.0
-"""First element of a covariance of what the sensor does not measure."""
+"""First element of a covariance in sensor_msgs/Imu if the quantity is not measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class Attitude:
-    """What an inertial unit, mounted along the body's axes, says of the body."""
+    """Attitude of the body, measured by an IMU whose axes are those of the body."""
 
     roll: float
     """[rad]"""
     pitch: float
-    """[rad], positive with the nose down."""
+    """Pitch [rad], positive with the nose down."""
     rates: NDArray[np.float64] | None
-    """(3,) angular velocity, body frame [rad/s]; None where it is not measured."""
+    """(3,) angular velocity, body frame [rad/s]; None if it is not measured."""
 
 
 def imu_to_attitude(imu: Imu) -> Attitude:
-    """Read attitude and turning rates; the yaw of the orientation is not used.
+    """Read attitude and angular velocity; the yaw of the orientation is ignored.
 
     Raises:
-        MessageError: no orientation, one that is no rotation, or values that are not finite.
+        MessageError: No orientation, no unit quaternion, or values that are not finite.
     """
     if imu.orientation_covariance[0] == NOT_MEASURED:
         raise MessageError(

@@ -1,4 +1,4 @@
-"""Joint state messages: measured joint angles and their rates by name."""
+"""Reads joint state messages: measured joint angles and rates by name."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -11,23 +11,23 @@ _PLURALS = {"position": "positions", "velocity": "velocities"}
 
 
 def joint_positions(state: JointState, wanted: Collection[str]) -> dict[str, float]:
-    """Return the positions [rad] of the wanted joints that a message carries, by name.
+    """Return the positions [rad] of the wanted joints in a message, by name.
 
-    Joints that are not wanted are not looked at. A message without positions (only velocities or
-    efforts, say) carries none.
+    Other joints are ignored. The result is empty if the message has no positions, for example
+    only velocities or efforts.
 
     Raises:
-        MessageError: position has another length than name, a wanted joint is named twice, or
+        MessageError: position has another length than name, a wanted joint occurs twice, or
             its position is not finite.
     """
     return _read_by_name(state, state.position, "position", "angle in rad", wanted)
 
 
 def joint_velocities(state: JointState, wanted: Collection[str]) -> dict[str, float]:
-    """Return the velocities [rad/s] of the wanted joints that a message carries, by name.
+    """Return the velocities [rad/s] of the wanted joints in a message, by name.
 
     Raises:
-        MessageError: as `joint_positions`, of velocity.
+        MessageError: As in `joint_positions`, about velocity.
     """
     return _read_by_name(state, state.velocity, "velocity", "rate in rad/s", wanted)
 

@@ -1,4 +1,4 @@
-"""Markers for a viewer: the path coloured by class, where it fails, the wheels' contacts."""
+"""Writes markers for RViz: the path coloured by class, its first failure, wheel contacts."""
 
 from collections.abc import Sequence
 
@@ -36,15 +36,15 @@ def path_markers(
     stamp,
     waypoint_classes: Sequence[str] = (),
 ) -> MarkerArray:
-    """Draw a judged path; the first marker clears what was drawn before.
+    """Return markers of a judged path; the first one deletes the markers drawn before.
 
     Args:
-        prediction: PathPrediction of n waypoints.
-        reasons: (n,) why each waypoint cannot be passed, empty where it can.
-        rows: Waypoints to draw; the first that fails is always drawn.
+        prediction: Prediction of n waypoints.
+        reasons: (n,) reason why each waypoint is not passable, empty if passable.
+        rows: Indices of waypoints to draw; the first failing waypoint is always drawn.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
-        waypoint_classes: (n,) classes, for the colours; without them the reasons count.
+        waypoint_classes: (n,) classes, which set the colours; without them the reasons do.
     """
     markers = cleared_markers(frame_id, stamp)
     positions = _drawable_positions(prediction)
@@ -64,7 +64,7 @@ def path_markers(
 
 
 def _colour(reason: str, traversability_class: str) -> ColorRGBA:
-    """Return the colour of a waypoint, by its class where that is known."""
+    """Return the colour of a waypoint by its class, or by its reason if the class is unknown."""
     return (
         _COLOURS[traversability_class]
         if traversability_class
@@ -75,14 +75,14 @@ def _colour(reason: str, traversability_class: str) -> ColorRGBA:
 
 
 def cleared_markers(frame_id: str, stamp) -> MarkerArray:
-    """Clear what was drawn before."""
+    """Return a marker that deletes all markers drawn before."""
     marker = _marker("", Marker.CUBE, frame_id, stamp)
     marker.action = Marker.DELETEALL
     return MarkerArray(markers=[marker])
 
 
 def _marker(namespace: str, kind: int, frame_id: str, stamp) -> Marker:
-    """Start a marker that stays until the next path is drawn."""
+    """Return an empty marker that stays until the next path is drawn."""
     marker = Marker(ns=namespace, type=kind, action=Marker.ADD)
     marker.header.frame_id = frame_id
     marker.header.stamp = stamp
@@ -90,7 +90,7 @@ def _marker(namespace: str, kind: int, frame_id: str, stamp) -> Marker:
 
 
 def _path_line(positions, colours, frame_id: str, stamp) -> Marker:
-    """Draw the path as a line with a colour at each waypoint."""
+    """Return the path as a line with a colour at each waypoint."""
     line = _marker("path", Marker.LINE_STRIP, frame_id, stamp)
     line.scale.x = _LINE_WIDTH
     line.points = _points(positions)
@@ -99,7 +99,7 @@ def _path_line(positions, colours, frame_id: str, stamp) -> Marker:
 
 
 def _contact_points(contacts, frame_id: str, stamp) -> Marker:
-    """Draw where the wheels touch the ground, contacts (m, 6, 3)."""
+    """Return points at the wheels' contacts (m, 6, 3) [m]."""
     spheres = _marker("contact_points", Marker.SPHERE_LIST, frame_id, stamp)
     spheres.scale.x = spheres.scale.y = spheres.scale.z = _CONTACT_SIZE
     spheres.color = CONTACT
@@ -109,7 +109,7 @@ def _contact_points(contacts, frame_id: str, stamp) -> Marker:
 
 
 def _failing_pose(position, yaw: float, frame_id: str, stamp) -> Marker:
-    """Draw an arrow along the heading where the rover cannot go on."""
+    """Return an arrow along the heading of the first failing pose."""
     arrow = _marker("failing_pose", Marker.ARROW, frame_id, stamp)
     arrow.pose.position = _points([position])[0]
     turn = arrow.pose.orientation
@@ -120,7 +120,7 @@ def _failing_pose(position, yaw: float, frame_id: str, stamp) -> Marker:
 
 
 def _failing_text(position, reason: str, frame_id: str, stamp) -> Marker:
-    """Write the reason above the failing pose."""
+    """Return a text marker with the reason, above the failing pose."""
     text = _marker("reason", Marker.TEXT_VIEW_FACING, frame_id, stamp)
     text.pose.position = _points([position])[0]
     text.pose.position.z += _TEXT_ABOVE
@@ -131,7 +131,7 @@ def _failing_text(position, reason: str, frame_id: str, stamp) -> Marker:
 
 
 def _drawable_positions(prediction: PathPrediction) -> NDArray[np.float64]:
-    """Return (n, 3) positions; where a pose did not settle, at the height last known."""
+    """Return (n, 3) positions; poses that did not settle get the last known height."""
     positions = np.column_stack([prediction.poses[:, :2], prediction.position[:, 2]])
     known = np.flatnonzero(np.isfinite(positions[:, 2]))
     if len(known) == 0:
@@ -143,5 +143,5 @@ def _drawable_positions(prediction: PathPrediction) -> NDArray[np.float64]:
 
 
 def _points(positions) -> list[Point]:
-    """Return (m, 3) positions [m] as messages."""
+    """Convert positions (m, 3) [m] into messages."""
     return [Point(x=x, y=y, z=z) for x, y, z in np.asarray(positions).tolist()]

@@ -1,4 +1,4 @@
-"""Odometry messages: where the rover is on the map, and how well that is known."""
+"""Reads odometry messages: the rover's pose on the map and its standard deviation."""
 
 import math
 
@@ -12,10 +12,10 @@ from rover_physics.numerics.quaternions import rpy_from_xyzw
 
 
 def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.float64], float]:
-    """Return (4,) x, y, z [m] and yaw [rad] of the body, and the deviation of x and y [m].
+    """Return x, y, z [m], yaw [rad] (4,) of the body, and the standard deviation of x, y [m].
 
     Raises:
-        MessageError: another frame, values that are not finite, or no rotation.
+        MessageError: Another frame, values that are not finite, or no unit quaternion.
     """
     check_frame(odometry.header.frame_id, map_frame, "odometry")
     place, q = odometry.pose.pose.position, odometry.pose.pose.orientation

@@ -1,4 +1,4 @@
-"""Path and pose messages: PoseStamped and Path against arrays of x, y, yaw."""
+"""Converts PoseStamped and Path messages to arrays of x, y, yaw and back."""
 
 import math
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ from rover_physics.numerics.quaternions import forward_from_xyzw, xyzw_from_rpy,
 from rover_physics.prediction.path_prediction import PathPrediction
 
 _NORM_TOLERANCE = 0.01
-"""How far the squared length of a quaternion may be from 1, as in tf2."""
+"""Largest deviation of a quaternion's squared length from 1, as in tf2."""
 
 _MIN_LEVEL = 1e-3
-"""Least horizontal share of the forward axis for which a heading is defined."""
+"""Smallest horizontal part of the forward axis (a unit vector) for which a heading is defined."""
 
 
 def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> float:
@@ -44,10 +44,10 @@ def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> fl
 
 
 def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:
-    """Return (3,) x, y [m] and yaw [rad] of a pose; its z, roll and pitch are not used.
+    """Return (3,) x, y [m] and yaw [rad] of a pose; z, roll and pitch are ignored.
 
     Raises:
-        MessageError: a position or orientation that is not finite, or no unit quaternion.
+        MessageError: Position or orientation is not finite, or no unit quaternion.
     """
     x, y = pose.position.x, pose.position.y
     if not (math.isfinite(x) and math.isfinite(y)):
@@ -63,7 +63,7 @@ def stamped_pose_to_array(
     """Return (3,) x, y [m] and yaw [rad] of a pose in the map frame.
 
     Raises:
-        MessageError: another frame, or a pose that `pose_to_array` refuses.
+        MessageError: Another frame, or a pose that `pose_to_array` refuses.
     """
     check_frame(stamped.header.frame_id, map_frame, what)
     return pose_to_array(stamped.pose, what)
@@ -72,11 +72,11 @@ def stamped_pose_to_array(
 def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
     """Return (n, 3) x, y [m] and yaw [rad] of a path's poses.
 
-    The path's own header counts; poses may leave their frame empty. The orientation of each pose
-    is the heading of the body there, whichever way the path runs.
+    The frame of the path's header must be the map frame; the frames of poses may be empty. The
+    heading is that of each pose's orientation, not the direction of the path.
 
     Raises:
-        MessageError: no poses, another frame, or a pose that `pose_to_array` refuses.
+        MessageError: No poses, another frame, or a pose that `pose_to_array` refuses.
     """
     check_frame(path.header.frame_id, map_frame, "path")
     if not path.poses:
@@ -90,12 +90,12 @@ def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
 
 
 def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArray[np.intp]:
-    """Choose poses about `spacing` [m] apart along a path, always the first and the last.
+    """Choose poses about `spacing` [m] apart along a path, including the first and the last.
 
     Args:
         poses: (n, 2) or wider; columns 0 and 1 are x and y [m].
-        spacing: Distance to keep between chosen poses [m]; 0 keeps all.
-        always: Indices of further poses to choose.
+        spacing: Distance between chosen poses [m]; 0 keeps all.
+        always: Indices of other poses that are chosen in any case.
 
     Returns:
         (m,) ascending indices of the chosen poses.
@@ -112,9 +112,9 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
 
 
 class PoseStock:
-    """Pose messages to be filled anew: to make one takes ten times as long as to fill it.
+    """Pose messages that are reused: filling one takes a tenth of the time of making one.
 
-    So a message with poses of a stock must be sent before the next one is made from it.
+    A message with poses of a stock must be sent before the next one is made from the stock.
     """
 
     def __init__(self) -> None:
@@ -126,7 +126,7 @@ class PoseStock:
     def fill(
         self, positions: Sequence[Sequence[float]], rotations: Sequence[Sequence[float]]
     ) -> list[PoseStamped]:
-        """Return poses at positions x, y, z [m], turned by quaternions x, y, z, w."""
+        """Return poses with positions x, y, z [m] and orientations x, y, z, w (quaternions)."""
         for _ in range(len(positions) - len(self._poses)):
             self._poses.append(PoseStamped(header=self.header))
             pose = self._poses[-1].pose
@@ -144,14 +144,14 @@ def settled_path(
     stamp,
     stock: PoseStock | None = None,
 ) -> Path:
-    """Write settled waypoints of a prediction as a path with the body's full orientation.
+    """Convert settled waypoints of a prediction into a path with the body's full orientation.
 
     Args:
-        prediction: PathPrediction of n waypoints.
-        rows: Waypoints to write, in order; all must have settled.
+        prediction: Prediction of n waypoints.
+        rows: Indices of the waypoints to write, in order; all must have settled.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time of the path and of every pose.
-        stock: Where to take the poses from; without it they are new.
+        stock: Poses to reuse; None makes new ones.
     """
     stock = stock or PoseStock()
     stock.header.frame_id, stock.header.stamp = frame_id, stamp
@@ -164,7 +164,7 @@ def settled_path(
 
 
 def empty_path(frame_id: str, stamp=None) -> Path:
-    """Write a path without poses, the answer where there is no way."""
+    """Return a path without poses, the answer if no path is traversable."""
     path = Path()
     path.header.frame_id = frame_id
     if stamp is not None:
@@ -173,7 +173,7 @@ def empty_path(frame_id: str, stamp=None) -> Path:
 
 
 def stamped_pose(pose: ArrayLike, frame_id: str, stamp=None) -> PoseStamped:
-    """Write a level pose (3,) x, y [m], yaw [rad], such as the goal of a request."""
+    """Convert a pose (3,) x, y [m], yaw [rad] into a level one, such as the goal of a request."""
     x, y, yaw = (float(value) for value in np.asarray(pose, dtype=np.float64))
     stamped = PoseStamped()
     stamped.header.frame_id = frame_id
@@ -186,7 +186,7 @@ def stamped_pose(pose: ArrayLike, frame_id: str, stamp=None) -> PoseStamped:
 
 
 def poses_path(poses: ArrayLike, frame_id: str, stamp=None) -> Path:
-    """Write level poses (n, 3) x, y [m], yaw [rad] as a path to be checked."""
+    """Convert poses (n, 3) x, y [m], yaw [rad] into a path of level poses to be checked."""
     path = empty_path(frame_id, stamp)
     path.poses = [stamped_pose(pose, frame_id, stamp) for pose in np.asarray(poses)]
     return path

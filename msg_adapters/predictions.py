@@ -1,4 +1,4 @@
-"""Predicted quantities as messages: flat arrays per waypoint, and a joint trajectory."""
+"""Converts predictions into messages: arrays per waypoint and a joint trajectory."""
 
 import array
 
@@ -12,16 +12,17 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.path_prediction import PathPrediction
 
 MEASURES = ("tip_over_ratio", "tip_over_force_angle")
-"""Columns of the tip-over margin: the paper's ratio, and the force-angle measure over flat."""
+"""Columns of the tip-over margin: the paper's ratio, and the force-angle measure over its
+value on flat ground."""
 
 JOINTS = SUSPENSION_JOINTS + WHEEL_JOINTS
 """Joints of the predicted trajectory, in order."""
 
 
 def waypoint_array(values: ArrayLike, column_label: str = "wheel") -> Float64MultiArray:
-    """Write (n, k) values, one row per waypoint, as an array with labelled dimensions.
+    """Convert values (n, k), one row per waypoint, into an array with labelled dimensions.
 
-    The columns are wheels in wheel order, or the MEASURES. NaN where a pose did not settle.
+    The columns are wheels in wheel order, or the MEASURES. Poses that did not settle have NaN.
     """
     values = np.ascontiguousarray(values, dtype=np.float64)
     rows, columns = values.shape
@@ -35,10 +36,10 @@ def waypoint_array(values: ArrayLike, column_label: str = "wheel") -> Float64Mul
 
 
 def array_values(message: Float64MultiArray) -> NDArray[np.float64]:
-    """Read the (n, k) values of a two-dimensional array; a view of the message's data.
+    """Return the values (n, k) of a two-dimensional array as a view of the message's data.
 
     Raises:
-        MessageError: other than two dimensions, padding, or a length that disagrees.
+        MessageError: Not two dimensions, padding, or a length that disagrees.
     """
     sizes = [dim.size for dim in message.layout.dim]
     values = np.frombuffer(message.data, np.float64)[message.layout.data_offset :]
@@ -51,7 +52,7 @@ def array_values(message: Float64MultiArray) -> NDArray[np.float64]:
 
 
 def tip_over_array(prediction: PathPrediction) -> Float64MultiArray:
-    """Write the tip-over margins of a PathPrediction (n waypoints) as (n, 2), see MEASURES."""
+    """Convert the tip-over margins of n waypoints into an array (n, 2), see MEASURES."""
     margins = [getattr(prediction, measure) for measure in MEASURES]
     return waypoint_array(np.column_stack(margins), "measure")
 
@@ -63,19 +64,19 @@ def joint_trajectory(
     stamp,
     stock: list[JointTrajectoryPoint] | None = None,
 ) -> JointTrajectory:
-    """Write the joints along a path, up to the first waypoint that did not settle.
+    """Return the joints along a path, up to the first waypoint that did not settle.
 
-    Positions are the suspension angles and the angles the wheels have rolled without slip [rad];
-    efforts are zero for the passive suspension and the drive torques for the wheels [N m]. The
-    points are the waypoints, in order, at their predicted time from start.
+    Positions are the suspension angles and the wheels' rolling angles without slip [rad]. Efforts
+    [N m] are zero for the passive suspension and the drive torques for the wheels. The points are
+    the waypoints in order, at their predicted time from start.
 
     Args:
-        prediction: PathPrediction of n waypoints.
-        wheel_radius: Of the rover [m].
+        prediction: Prediction of n waypoints.
+        wheel_radius: Radius of the rover's wheels [m].
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
-        stock: Points to fill anew instead of making them, which takes most of the time; it grows
-            as needed. So one message must be sent before the next is made from it.
+        stock: Points to reuse, because making them takes most of the time. The list grows as
+            needed. One message must be sent before the next one is made from it.
     """
     count = len(prediction.settled)
     if not prediction.settled.all():
@@ -97,7 +98,7 @@ def joint_trajectory(
 
 
 def empty_trajectory(frame_id: str, stamp) -> JointTrajectory:
-    """Write a trajectory that names the JOINTS and has no points."""
+    """Return a trajectory of the JOINTS without points."""
     trajectory = JointTrajectory(joint_names=list(JOINTS))
     trajectory.header.frame_id = frame_id
     trajectory.header.stamp = stamp
@@ -105,7 +106,7 @@ def empty_trajectory(frame_id: str, stamp) -> JointTrajectory:
 
 
 def suspension_angles(prediction: PathPrediction) -> NDArray[np.float64]:
-    """Return (n, 4) angles [rad] of SUSPENSION_JOINTS at each waypoint of a PathPrediction."""
+    """Return angles (n, 4) [rad] of SUSPENSION_JOINTS at each of n waypoints."""
     return np.hstack([prediction.rocker_angle, prediction.bogie_angle])
 
 
@@ -114,7 +115,7 @@ def _rolled_angles(
     wheel_radius: float,
     count: int,
 ) -> NDArray[np.float64]:
-    """Return (count, 6) angles [rad] that the wheels have rolled, negative backwards."""
+    """Return rolling angles (count, 6) [rad] of the wheels, negative backwards."""
     steps = np.diff(prediction.wheel_centres[:count], axis=0)
     yaw = prediction.poses[1:count, 2]
     forward = steps[:, :, 0] * np.cos(yaw)[:, None] + steps[:, :, 1] * np.sin(yaw)[:, None]
@@ -132,6 +133,6 @@ def _doubles(values: NDArray[np.float64]) -> array.array:
 
 
 def _rows(values: NDArray[np.float64]) -> list[array.array]:
-    """Copy the rows of (n, k) values into such arrays."""
+    """Copy the rows of values (n, k) into arrays as `_doubles` does."""
     flat, width = _doubles(values), values.shape[1]
     return [flat[k : k + width] for k in range(0, len(flat), width)]

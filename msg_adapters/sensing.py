@@ -1,4 +1,4 @@
-"""What a rover's sensors publish: joint states, odometry and inertial measurements."""
+"""Writes the messages of a rover's sensors: joint states, odometry and IMU."""
 
 import array
 from collections.abc import Mapping
@@ -19,9 +19,9 @@ def joint_state(
     efforts: Mapping[str, float],
     stamp,
 ) -> JointState:
-    """Write angles [rad], rates [rad/s] and torques [N m] by joint name.
+    """Convert angles [rad], rates [rad/s] and torques [N m] by joint name into a message.
 
-    A joint without rate or torque gets zero.
+    A joint without a rate or torque gets zero.
     """
     message = JointState(name=list(positions))
     message.header.stamp = stamp
@@ -40,14 +40,14 @@ def odometry_message(
     frame_id: str,
     stamp,
 ) -> Odometry:
-    """Write where the rover is and how it moves.
+    """Return the odometry of a rover.
 
     Args:
         position: (3,) body origin [m], map frame.
         orientation: (4,) quaternion x, y, z, w.
         velocity: (3,) [m/s], body frame.
         body_rates: (3,) angular velocity [rad/s], body frame.
-        deviations: Standard deviations of places [m] and angles [rad].
+        deviations: Standard deviations of positions [m] and angles [rad].
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
     """
@@ -68,12 +68,12 @@ def odometry_message(
 def imu_message(
     orientation: Floats, body_rates: Floats, gravity: float, deviation: float, stamp
 ) -> Imu:
-    """Write what an inertial unit at the body origin of a slow rover measures.
+    """Return what an IMU at the body origin measures; accelerations of the rover are neglected.
 
     Args:
         orientation: (4,) quaternion x, y, z, w, body to map.
         body_rates: (3,) angular velocity [rad/s], body frame.
-        gravity: [m/s^2]; at rest the unit measures that much upwards.
+        gravity: Gravity [m/s^2]; the IMU measures this acceleration upwards.
         deviation: Standard deviation of angles [rad].
         stamp: builtin_interfaces/Time.
     """

@@ -1,4 +1,4 @@
-"""Messages about the tool of the arm: where its tip is to go, and what acts on it there."""
+"""Reads messages about the arm's tool: the target of its tip, and the wrench on it."""
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3, WrenchStamped
@@ -9,10 +9,10 @@ from msg_adapters.frames import check_frame
 
 
 def target_to_point(target: PoseStamped, map_frame: str) -> NDArray[np.float64]:
-    """Return (3,) the place [m] of a pose in the map frame; its orientation is not used.
+    """Return the position (3,) [m] of a pose in the map frame; the orientation is ignored.
 
     Raises:
-        MessageError: another frame, or a place that is not finite.
+        MessageError: Another frame, or a position that is not finite.
     """
     check_frame(target.header.frame_id, map_frame, "tool target")
     return _finite(target.pose.position, "tool target", "a place in metres")
@@ -24,7 +24,7 @@ def wrench_to_force_and_moment(
     """Return force (3,) [N] and moment (3,) [N m] of a wrench, axes of the map frame.
 
     Raises:
-        MessageError: another frame, or components that are not finite.
+        MessageError: Another frame, or components that are not finite.
     """
     check_frame(wrench.header.frame_id, map_frame, "tool wrench")
     force = _finite(wrench.wrench.force, "tool wrench force", "a force in N")

@@ -1,4 +1,4 @@
-"""The state of a traction controller as a diagnostic status."""
+"""Writes the state of a traction controller as a diagnostic status."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,18 +11,18 @@ STATUS_NAME = "traction_controller: wheel torques"
 def traction_diagnostics(
     values: Mapping[str, Any], fault: str, hardware_id: str, stamp
 ) -> DiagnosticArray:
-    """Write the state of a traction controller as one status.
+    """Return the state of a traction controller as one status.
 
     Args:
-        values: What becomes keys and values of the status; `warning`, `fallback` and
-            `contact_source` decide its level too.
-        fault: Why there is no torque, empty where there is torque.
+        values: Keys and values of the status; `warning`, `fallback` and `contact_source` also
+            set its level.
+        fault: Reason for zero torques, empty if there is no fault.
         hardware_id: Name of the rover.
         stamp: builtin_interfaces/Time.
 
     Returns:
-        An array with one status: ERROR where a fault sets the torques to zero, WARN where the
-        rover drives with equal torques or without an input that it should have, else OK.
+        An array with one status: ERROR if a fault sets the torques to zero, WARN if the rover
+        drives with equal torques or lacks an input, else OK.
     """
     status = DiagnosticStatus(name=STATUS_NAME, hardware_id=hardware_id)
     if fault:

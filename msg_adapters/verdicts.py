@@ -1,4 +1,4 @@
-"""Verdicts as messages: a diagnostic status for the operator, JSON text for programs."""
+"""Writes verdicts as messages: a diagnostic status for operators, JSON text for programs."""
 
 import json
 from collections.abc import Mapping
@@ -10,14 +10,14 @@ STATUS_NAME = "traverse_server: can the rover traverse"
 
 
 class Report(Protocol):
-    """What a report must have to be written as JSON."""
+    """A report that can be written as JSON."""
 
     def to_dict(self) -> Mapping[str, Any]:
-        """Return all entries as JSON can hold them: no NaN, no infinity."""
+        """Return all entries in JSON types, without NaN or infinity."""
 
 
 class PathVerdict(Protocol):
-    """What a verdict on a path must have to be written as a diagnostic status."""
+    """A verdict on a path that can be written as a diagnostic status."""
 
     @property
     def traversable(self) -> bool:
@@ -25,14 +25,14 @@ class PathVerdict(Protocol):
 
     @property
     def reason(self) -> str:
-        """Why not; empty if traversable."""
+        """Reason why the path is not traversable; empty if it is."""
 
     @property
     def has_warning(self) -> bool:
-        """Whether the operator is to look at something though the path is traversable."""
+        """Whether there is a warning for the operator, even if the path is traversable."""
 
     def summary(self) -> Mapping[str, Any]:
-        """Return the entries to show as JSON can hold them, none of them long."""
+        """Return the short entries in JSON types."""
 
 
 def report_to_json(report: Report) -> str:
@@ -50,15 +50,15 @@ def verdict_to_diagnostics(
     """Write a verdict as one diagnostic status.
 
     Args:
-        verdict: Every entry of its summary becomes a key and a value: a text as it is, any other
-            value as JSON.
+        verdict: Each entry of its summary becomes a key and a value. Texts are copied, other
+            values are written as JSON.
         hardware_id: Name of the rover.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
 
     Returns:
-        An array with one status: OK where traversable, WARN where traversable with a warning,
-        else ERROR with the reason as its message.
+        An array with one status: OK if traversable, WARN if traversable with a warning, else
+        ERROR with the reason as its message.
     """
     level = DiagnosticStatus.WARN if verdict.has_warning else DiagnosticStatus.OK
     status = DiagnosticStatus(

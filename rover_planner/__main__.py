@@ -1,4 +1,4 @@
-"""Runs the command `rover_planner` as `python -m rover_planner`."""
+"""Runs the command line of `rover_planner` by `python -m rover_planner`."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The command `rover_planner`: its app, and the exit code of what it ran."""
+"""The command `rover_planner`: its subcommands and its exit code."""
 
 import sys
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 NEGATIVE_ARGUMENTS = {"ignore_unknown_options": True}
-"""Takes -1.5 as a number where it stands for an argument; options take it anyway."""
+"""Makes typer accept negative numbers as arguments; options accept them anyway."""
 
 app.command()(predict)
 app.command(context_settings=NEGATIVE_ARGUMENTS)(reach)
@@ -35,7 +35,7 @@ app.command()(figure4)
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code; bad input is one line on stderr."""
+    """Run the command and return its exit code; print one line on stderr for bad input."""
     try:
         code = run_app(app, "rover_planner", words)
     except (RoverError, PlanningError) as error:
@@ -50,5 +50,5 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _print_refusal(text: str) -> None:
-    """Print on one line why it did not run."""
+    """Print in one line why the command did not run."""
     print("rover_planner:", " ".join(text.split()), file=sys.stderr)

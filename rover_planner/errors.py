@@ -1,9 +1,9 @@
-"""The root of the errors that planning raises."""
+"""The errors that this package raises."""
 
 
 class PlanningError(Exception):
-    """A request that has no meaning; the text names the argument and what would be right."""
+    """An invalid request; the text names the argument and the allowed values."""
 
 
 class DemoError(Exception):
-    """The demo could not be carried out; the text says which part failed and how."""
+    """A failure of the demo; the text names the part that failed and the reason."""

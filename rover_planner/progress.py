@@ -1,4 +1,4 @@
-"""What the terminal shows while a command works."""
+"""Progress on the terminal while a command runs: spinner, bar and steps."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -18,10 +18,10 @@ from rich.progress import (
 
 @contextmanager
 def show_progress() -> Iterator[Callable[[str], None]]:
-    """Show a spinner with the step being worked on; nothing where stderr is not a terminal.
+    """Show a spinner with the current step; show nothing if stderr is not a terminal.
 
     Yields:
-        A function that is told the next step.
+        A function to call with the text of the next step.
     """
     console = Console(stderr=True)
     if not console.is_terminal:  # even a disabled bar of rich 13.7 prints an empty line
@@ -35,10 +35,10 @@ def show_progress() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def show_bar(name: str, total: int) -> Iterator[Callable[[], None]]:
-    """Show a bar with the work that is done and left; nothing where stderr is not a terminal.
+    """Show a progress bar; show nothing if stderr is not a terminal.
 
     Yields:
-        A function to call once for each piece of work that is done.
+        A function to call after each of the `total` pieces of work.
     """
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -51,7 +51,7 @@ def show_bar(name: str, total: int) -> Iterator[Callable[[], None]]:
 
 
 class Steps:
-    """Says on the terminal what is being done and how long it took."""
+    """Prints the steps of a command and their durations on the terminal."""
 
     def __init__(self) -> None:
         self.console = Console(highlight=False)
@@ -60,7 +60,10 @@ class Steps:
 
     @contextmanager
     def step(self, text: str) -> Iterator[Any]:
-        """Show a spinner while the block runs, then a line; the block may change the text."""
+        """Show a spinner while the block runs, then a line with its duration [s].
+
+        The block may change the text of the status that it gets.
+        """
         began = time.monotonic()
         with self.console.status(text) as status:
             yield status

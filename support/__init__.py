@@ -1,1 +1,1 @@
-"""What tests and benchmarks share: grounds, reference cases, ROS for tests, a browser."""
+"""Helpers of tests and benchmarks: grounds, reference cases, ROS contexts, a browser."""

@@ -1,4 +1,4 @@
-"""The least friction that any torques need, by linear programs of the tests' own."""
+"""The smallest friction utilisation of any torques, by independent linear programs."""
 
 import numpy as np
 from scipy.optimize import linprog
@@ -6,13 +6,14 @@ from scipy.optimize import linprog
 from support.rover_geometry import balance_matrix
 
 SIDES_OF_THE_CONE = 64
+"""Sides of the pyramid that replaces a friction cone."""
 
 
 def can_stand(rover, prediction, i, utilisation, max_torque) -> bool:
-    """Tell whether any forces within a cone around that of `utilisation` balance waypoint i.
+    """Return whether forces within the friction cones of `utilisation` balance waypoint i.
 
-    The unknowns are N (6), T (6), s0, s1. The cone is replaced by a pyramid around it, so that
-    what is impossible here is impossible.
+    The unknowns are N (6), T (6), s0, s1. Each cone is replaced by a circumscribed pyramid, so
+    that an infeasible program proves that the cones are infeasible too.
     """
     A, b, along = balance_matrix(rover, prediction, i)
     turns = 2.0 * np.pi * np.arange(SIDES_OF_THE_CONE) / SIDES_OF_THE_CONE

@@ -1,4 +1,4 @@
-"""A real browser for tests: how it is found and started, and a visitor who uses the page."""
+"""A real browser for tests: finds and starts it, and operates the page as a user does."""
 
 import re
 import shutil
@@ -14,6 +14,7 @@ sync_api = pytest.importorskip(
 )
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
+"""Programs that are tried, in this order."""
 PROGRAM = next(filter(None, map(shutil.which, NAMES)), None)
 ARGUMENTS = [
     "--use-gl=angle",
@@ -24,10 +25,11 @@ ARGUMENTS = [
     "--disable-component-update",
     "--disable-sync",
 ]
-"""For WebGL without a graphics card, and no requests to the network."""
+"""Options of the browser: WebGL without a graphics card, and no network requests."""
 LAPTOP = {"width": 1280, "height": 720}
+"""Size of a laptop's window [px]."""
 WAIT = 120.0
-"""Longest wait for anything on the page [s]; a busy machine takes seconds for a picture."""
+"""Longest wait for the page [s]; rendering takes seconds on a busy machine."""
 
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
@@ -46,10 +48,10 @@ def wait_until(condition: Callable[[], Any], what: str) -> Any:
 
 
 class Visitor:
-    """A person who uses the page: reads texts, sees pixels, presses, drags and clicks."""
+    """A simulated user of the page: reads texts and pixels, presses, drags and clicks."""
 
     def __init__(self, browser: Any, url: str):
-        # Few pixels: without a graphics card each one takes time.
+        # A small window, because rendering without a graphics card is slow.
         self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=0.4)
         self.page_errors: list[str] = []
         self.tab.on("pageerror", lambda error: self.page_errors.append(str(error)))
@@ -74,8 +76,7 @@ class Visitor:
     def set_slider(self, label: str, value: str) -> None:
         """Type a value into the box beside a slider, key by key.
 
-        `fill` sets a text without keys. The box then takes it for a change at the cursor of the
-        last key, and may discard it.
+        Playwright's `fill` sets the text without key events. The box may then discard the text.
         """
         box = self._row(label).locator("input").last
         box.click()

@@ -1,4 +1,4 @@
-"""Command lines for tests: files to run `rover_planner` on, and what a refusal looks like."""
+"""Command-line helpers for tests: input files of `rover_planner`, and a check of refusals."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ from rover_physics.terrain.grid import Terrain, save_terrain
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 N = 30
-"""Poses of the path in `write_ground_and_path`."""
+"""Number of poses of the path in `write_ground_and_path`."""
 
 
 def write_ground_and_path(folder: Path) -> Path:
@@ -27,12 +27,12 @@ def write_ground_and_path(folder: Path) -> Path:
 def predict_words(
     folder: Path, rover="lsr1", terrain="terrain.npz", poses="poses.npz", out="out.npz"
 ) -> list[str]:
-    """Return the words of `rover_planner predict` on files of a folder."""
+    """Return the arguments of `rover_planner predict` for files of a folder."""
     return ["predict", str(rover), *(str(folder / name) for name in (terrain, poses, out))]
 
 
 def run_program(*words: str) -> subprocess.CompletedProcess:
-    """Run `rover_planner` in a process of its own."""
+    """Run `rover_planner` in a separate process."""
     return subprocess.run(
         [sys.executable, "-m", "rover_planner", *words],
         cwd=REPOSITORY,
@@ -44,7 +44,7 @@ def run_program(*words: str) -> subprocess.CompletedProcess:
 
 
 def assert_refused(capfd, code: int, word: str) -> None:
-    """Hold that the command ended with code 2 and one line on stderr that has a word in it."""
+    """Assert that the exit code is 2 and that stderr has one line, which contains `word`."""
     err = capfd.readouterr().err
     assert code == 2
     assert err.count("\n") == 1

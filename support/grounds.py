@@ -19,7 +19,7 @@ def waves(x, y):
 
 
 def rocky(x, y):
-    """Return waves with a low rock to the left of the straight way from -x to +x."""
+    """Return waves with a low rock to the left of the straight path from -x to +x."""
     return waves(x, y) + 0.08 * np.exp(-((x - 0.2) ** 2 + (y - 0.35) ** 2) / 0.05)
 
 

@@ -1,4 +1,4 @@
-"""A client of the traverse server as tests need it: sends, asks, and keeps what it hears."""
+"""A client of the traverse server for tests: publishes, calls, and keeps the results."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ from support.ros_fixtures import RosRun, call, wait_until
 
 SERVER = "/traverse_server"
 START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)
-"""Poses to ask for a plan between, x, y [m] and yaw [rad]."""
+"""Default poses of a query: x, y [m] and yaw [rad]."""
 
 RESULTS = {
     "plan": Path,
@@ -39,7 +39,7 @@ RESULTS = {
 
 
 class PlannerClient(Node):
-    """Everything on the other side of the traverse server's contract."""
+    """A node with the counterparts of all topics and services of the traverse server."""
 
     def __init__(self, ros: RosRun):
         super().__init__("test_planner", context=ros.context)
@@ -60,7 +60,7 @@ class PlannerClient(Node):
         self._joints = self.create_publisher(JointState, "joint_states", topic_qos())
 
     def send_cloud(self, cloud: PointCloud2) -> None:
-        """Publish a cloud as it is."""
+        """Publish a cloud unchanged."""
         self._send(self._cloud, cloud)
 
     def send_terrain(self, terrain) -> None:
@@ -92,14 +92,14 @@ class PlannerClient(Node):
         return plan
 
     def check_path(self) -> Trigger.Response:
-        """Ask about the last path."""
+        """Call ~/check_path for the last path."""
         markers = self.heard["markers"]
         before = len(markers)
         self._heard_last = lambda: len(markers) > before
         return call(self._check, Trigger.Request())
 
     def check_poses(self, server, poses) -> Trigger.Response:
-        """Publish a path of poses (n, 3), wait until the server has it, ask about it."""
+        """Publish a path of poses (n, 3), wait until the server has it, and check it."""
         self.send_path(poses_path(poses, "map"))
         wait_until(
             lambda: (
@@ -111,7 +111,7 @@ class PlannerClient(Node):
         return self.check_path()
 
     def load_map(self, url: str) -> LoadMap.Response:
-        """Ask to load a terrain file."""
+        """Call ~/load_map with the URL of a terrain file."""
         return call(self._map, LoadMap.Request(map_url=str(url)))
 
     def set_parameter(self, name: str, value) -> tuple[bool, str]:
@@ -127,8 +127,8 @@ class PlannerClient(Node):
     def next_results(self, ask) -> tuple:
         """Call `ask` and return its answer with the results published for it.
 
-        Results follow an answer, so those of the question before are awaited first; the markers
-        are the last of them.
+        Results are published after an answer. This method therefore first waits for the results
+        of the previous query, of which the markers are the last.
         """
         wait_until(self._heard_last, "the results of the question before")
         for messages in self.heard.values():

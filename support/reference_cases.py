@@ -1,4 +1,4 @@
-"""The settled cases of test/data, made with MuJoCo: see test/data/README.md."""
+"""The settled cases of test/data, computed with MuJoCo: see test/data/README.md."""
 
 import json
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class ReferenceGround:
     attitude: np.ndarray
     """(n, 2) roll and pitch [rad]."""
     joints: np.ndarray
-    """(n, 4) rocker right and left, bogie right and left [rad]."""
+    """(n, 4) angles of rocker right and left, bogie right and left [rad]."""
 
 
 @lru_cache(maxsize=1)
@@ -68,7 +68,7 @@ def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGrou
 
 @lru_cache(maxsize=1)
 def reference_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
-    """Return what the model says at each reference case under equal torques."""
+    """Return the model's predictions for all reference cases under equal torques."""
     rover = load_rover("lsr1")
     grounds = reference_grounds()
     return tuple((case, sweep_path(rover, case.terrain, case.poses)) for case in grounds)

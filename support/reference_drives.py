@@ -1,4 +1,4 @@
-"""The drives of test/data, made with MuJoCo, and what the model says of them."""
+"""The drives of test/data, computed with MuJoCo, and the model's verdicts on them."""
 
 import json
 from collections.abc import Iterator
@@ -17,6 +17,7 @@ from rover_physics.traversability.verdict import Verdict, judge
 
 DRIVES = Path(__file__).resolve().parents[1] / "test" / "data" / "drives.json"
 RESOLUTION = 0.02
+"""Cell size of the grounds [m]."""
 PASSED = "passed"
 
 
@@ -33,13 +34,13 @@ class Drive:
     max_torque: float
     """Torque limit of the speed servos [N m]."""
     outcome: str
-    """passed, stuck or tipped, which includes sliding off."""
+    """passed, stuck or tipped; tipped includes sliding off."""
     end: float
-    """x where the drive ended [m]."""
+    """x at the end of the drive [m]."""
 
     @property
     def label(self) -> str:
-        """Kind and size, as in step 0.163."""
+        """Kind and size, such as step 0.163."""
         return (
             f"{self.kind} {self.size:.3f}" if self.size < 1.0 else f"{self.kind} {self.size:.1f}"
         )
@@ -83,7 +84,7 @@ def drive_path(spacing: float = 0.01) -> np.ndarray:
 
 
 def unlimited(rover: Rover) -> Rover:
-    """Return `rover` without the limits that MuJoCo does not know: tilt, margins, belly, drops."""
+    """Return `rover` without limits that MuJoCo lacks: tilt, margins, clearance, drops."""
     limits = replace(
         rover.limits, tilt=1.55, tip_over_ratio=0.0, belly_clearance=-10.0, wheel_drop=10.0
     )

@@ -1,4 +1,4 @@
-"""ROS for tests: a context and a domain of their own, executors that spin in the background."""
+"""ROS for tests: separate contexts and domains, executors that spin in the background."""
 
 import contextlib
 import os
@@ -13,18 +13,18 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 TIMEOUT = 20.0
-"""Longest wait for anything [s]; only a broken system takes that long."""
+"""Default limit of waits [s]; only a broken system takes that long."""
 
 
 def domain_id() -> int:
-    """Return a domain (1 to 100) of this test process, so that runs side by side do not meet."""
+    """Return the domain (1 to 100) of this test process, so that parallel runs are separate."""
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
     run = os.getppid() if "PYTEST_XDIST_WORKER" in os.environ else os.getpid()
     return 1 + (run * 7 + int(worker)) % 100
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
-    """Return the condition's first true value; fail with what was waited for."""
+    """Return the condition's first true value; fail with `what` after a timeout [s]."""
     end = time.monotonic() + timeout
     while time.monotonic() < end:
         value = condition()
@@ -35,7 +35,7 @@ def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT
 
 
 class RosRun:
-    """A context with nodes, each spun by an executor in a thread of its own."""
+    """A context with nodes; each node has its own executor and thread."""
 
     def __init__(self) -> None:
         self.context = Context()
@@ -53,7 +53,7 @@ class RosRun:
         return node
 
     def is_alive(self, node: Node) -> bool:
-        """Tell whether a node is still being spun; an exception in a callback ends that."""
+        """Return whether a node is still being spun; an exception in a callback ends spinning."""
         return any(thread.is_alive() for other, _, thread in self._spinning if other is node)
 
     def close(self) -> None:
@@ -67,7 +67,7 @@ class RosRun:
         rclpy.shutdown(context=self.context)
 
     def _spin(self, executor: SingleThreadedExecutor) -> None:
-        # Not executor.spin(): now and then that sleeps through executor.shutdown().
+        # executor.spin() is not used: it sometimes misses executor.shutdown().
         with contextlib.suppress(ExternalShutdownException):
             while not self._ending.is_set():
                 executor.spin_once(timeout_sec=0.2)
@@ -76,8 +76,8 @@ class RosRun:
 def call(client, request, timeout: float = TIMEOUT):
     """Call a service and return its response."""
     assert client.wait_for_service(timeout), f"no service {client.srv_name}"
-    # A service is found before it has found who asks; on a busy machine its first answer may then
-    # be lost (it waits a tenth of a second only), so a question is asked twice before giving up.
+    # A client may discover a service before the service discovers the client. The service waits
+    # for only 0.1 s then, and its first response may be lost, so a request is sent twice.
     for _ in range(2):
         done = threading.Event()
         future = client.call_async(request)

@@ -1,4 +1,4 @@
-"""Rough grounds from a seed, planes, and the symmetries that move a ground with its poses."""
+"""Grounds for tests: rough grounds from a seed, planes, and rotated or mirrored grounds."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ import numpy as np
 from rover_physics.terrain.grid import Terrain
 
 RESOLUTION = 0.04
+"""Cell size of the grounds [m]."""
 
 
 def plane(slope_x: float, slope_y: float, height: float = 0.0, half: float = 1.2) -> Terrain:
@@ -38,7 +39,7 @@ def fractal(seed: int, half: float = 3.0, roughness: float = 0.06) -> Terrain:
 
 
 def rocky(seed: int, half: float = 3.0, count: int = 120) -> Terrain:
-    """Return gentle relief strewn with spherical caps of 5 to 20 cm radius."""
+    """Return gentle relief with spherical caps of 5 to 20 cm radius."""
     rng = np.random.default_rng(seed)
     x, y = _grid(half)
     z = fractal(seed + 1000, half, 0.03).elevation.copy()
@@ -50,9 +51,9 @@ def rocky(seed: int, half: float = 3.0, count: int = 120) -> Terrain:
 
 
 def bouldered(seed: int, half: float = 3.0, count: int = 150, highest: float = 0.1) -> Terrain:
-    """Return gentle relief strewn with half-ellipsoids from 2 cm to `highest` [m] high.
+    """Return gentle relief with half-ellipsoids, 2 cm to `highest` [m] high.
 
-    They are at most twice as wide, from middle to rim, as high: their rims stand upright.
+    Their radius is at most twice their height, and their rims are vertical.
     """
     rng = np.random.default_rng(seed)
     x, y = _grid(half)
@@ -67,14 +68,14 @@ def bouldered(seed: int, half: float = 3.0, count: int = 150, highest: float = 0
 
 
 def random_poses(seed: int, count: int, half: float) -> np.ndarray:
-    """Return poses (count, 3) within `half` [m] of the origin, all headings."""
+    """Return random poses (count, 3) within `half` [m] of the origin, with random headings."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-half, half, (count, 2))
     return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
 
 
 def quarter_turn(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
-    """Return ground and poses turned together by 90 degrees about the map's z: x -> y, y -> -x."""
+    """Return ground and poses, both rotated by 90 degrees about the map's z: x -> y, y -> -x."""
     xmin, xmax, ymin, ymax = terrain.bounds
     turned = replace(
         terrain,

@@ -1,7 +1,7 @@
-"""An independent rover for the tests: where its parts are and what balances it, in plain numpy.
+"""An independent model of the rover for tests: geometry and balance of forces in plain numpy.
 
-Nothing here is shared with the kernels; it is written from the conventions
-(docs/conventions.md) and the equations of the paper.
+It shares no code with the kernels. It follows the conventions (docs/conventions.md) and the
+equations of the paper.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ class Placed:
     origin: np.ndarray
     """(3,) body origin [m]."""
     wheels: np.ndarray
-    """(6, 3) wheel centres from the suspension angles [m]."""
+    """(6, 3) wheel centres, computed from the suspension angles [m]."""
     rocker_pivots: np.ndarray
     """(2, 3) [m]."""
     bogie_pivots: np.ndarray
@@ -43,7 +43,7 @@ def attitude_of(prediction: PathPrediction, i: int) -> np.ndarray:
 
 
 def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
-    """Return where the parts of waypoint i are, from pose and suspension angles alone."""
+    """Return the positions of the parts at waypoint i, from pose and suspension angles only."""
     R, origin = attitude_of(prediction, i), prediction.position[i]
     suspension, masses = rover.suspension, rover.masses
     wheels, on_bogie, rocker_pivots, bogie_pivots = [], [], [], []
@@ -82,7 +82,10 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
 
 
 def contact_frames(prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return n, t, a of each wheel (6, 3, 3) from attitude and contact angle: t = a x n."""
+    """Return the unit vectors n, t, a of each wheel (6, 3, 3) from attitude and contact angle.
+
+    n is the contact normal, a the wheel axis, t = a x n.
+    """
     a = attitude_of(prediction, i)[:, 1]
     ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP))
     upward = np.cross(ahead, a)
@@ -92,7 +95,7 @@ def contact_frames(prediction: PathPrediction, i: int) -> np.ndarray:
 
 
 def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
-    """Return the nine sums that balance sets to zero, in units of the weight.
+    """Return the nine sums that are zero in equilibrium, in units of the weight.
 
     Three forces and three moments about the body origin of the whole rover, the moment about each
     bogie pivot (eq 15), and the difference of the moments about the rocker pivots (eq 14 for both
@@ -100,8 +103,8 @@ def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
 
     Args:
         rover: The rover.
-        placed: Where its parts are.
-        acting: (force [N], place [m], side, whether on the bogie) of all that acts.
+        placed: Positions of its parts.
+        acting: All forces: (force [N], position [m], side, whether on the bogie).
     """
     axis = placed.attitude[:, 1]
 
@@ -136,7 +139,7 @@ def _weights(rover: Rover, placed: Placed) -> list:
 
 
 def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return what is left of the nine balance equations of waypoint i; see `balance_sums`."""
+    """Return the residuals of the nine balance equations of waypoint i; see `balance_sums`."""
     placed = place_rover(rover, prediction, i)
     shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
     forces = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(prediction, i))
@@ -147,9 +150,10 @@ def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.nd
 def balance_matrix(
     rover: Rover, prediction: PathPrediction, i: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return A (9, 14), b (9,) and the wheels' places along the body (6,) [m] of waypoint i.
+    """Return A (9, 14), b (9,) and the wheels' positions along the body (6,) [m] of waypoint i.
 
-    A @ (N, T, s0, s1) = b is its balance, all forces in units of the weight, S = s0 + s1 along.
+    A @ (N, T, s0, s1) = b is its balance, with forces in units of the weight and lateral forces
+    S = s0 + s1 * position.
     """
     A, b = free_balance_matrix(rover, prediction, i)
     placed = place_rover(rover, prediction, i)
@@ -163,7 +167,7 @@ def free_balance_matrix(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return A (9, 18) and b (9,) of waypoint i: A @ (N, T, S) = b is its balance.
 
-    All forces are in units of the weight; each wheel has a lateral force S of its own.
+    All forces are in units of the weight; each wheel has an independent lateral force S.
     """
     placed, frames = place_rover(rover, prediction, i), contact_frames(prediction, i)
     columns = []
@@ -192,11 +196,11 @@ def wheel_gaps(
     Args:
         rover: The rover.
         terrain: The ground.
-        prediction: What the model says.
-        i: The waypoint.
-        laterals: Where across the wheel to look, from its middle plane [m].
-        angles: How many points to look at along each half circle, twice: the second time between
-            the neighbours of the nearest.
+        prediction: The model's prediction.
+        i: Index of the waypoint.
+        laterals: Lateral positions of the sampled circles, from the wheel's middle plane [m].
+        angles: Points along each half circle. The same number is used again for a refinement
+            between the neighbours of the nearest point.
     """
     coarse = np.linspace(-0.5 * np.pi, 0.5 * np.pi, angles)
     shape = (6, len(laterals), angles)
@@ -222,7 +226,7 @@ def _gaps_at(rover, terrain, prediction, i, laterals, angle) -> np.ndarray:
 
 
 def turned_round(rover: Rover) -> Rover:
-    """Return the same machine with front and rear exchanged: what was ahead is behind."""
+    """Return the same rover with front and rear exchanged."""
 
     def flip(point):
         return (-point[0], point[1], point[2])

@@ -1,4 +1,4 @@
-"""Measured states of settled rovers, and the motion between them, made from predictions."""
+"""Measured states of settled rovers and motions between them, computed from predictions."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from support.rover_geometry import attitude_of
 
 
 def state_of(prediction: PathPrediction, i: int) -> MeasuredState:
-    """Return what would be measured at waypoint i."""
+    """Return the measured state at waypoint i."""
     arms = prediction.contact_points[i] - prediction.wheel_centres[i]
     return MeasuredState(
         prediction.roll[i],
@@ -39,7 +39,7 @@ def rough_states(rover: Rover, count: int):
 
 
 def drive_states(rover: Rover, ground: Terrain, speed: float = 0.03, start: float = -1.2):
-    """Return prediction, motions and duration of a step [s] of a slow drive along +x."""
+    """Return prediction, motions and time step [s] of a slow drive along +x."""
     x = np.linspace(start, -start, 1201)
     prediction = sweep_path(rover, ground, np.column_stack([x, 0.0 * x, 0.0 * x]))
     duration = (x[1] - x[0]) / speed

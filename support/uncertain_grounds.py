@@ -1,4 +1,4 @@
-"""Maps with errors drawn at random, and how often a sweep over them leaves its bounds."""
+"""Maps with random errors, and how often predictions on them leave their bounds."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from rover_physics.terrain.grid import Terrain
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
 
 ROUNDING = 1e-6
-"""Amount by which a value may be outside of its bounds, in its own unit."""
+"""Tolerance of the bounds for rounding errors, in the unit of each value."""
 
 
 def step(height: float) -> Terrain:
@@ -25,7 +25,7 @@ def step(height: float) -> Terrain:
 
 
 def uncertain_grounds(rover: Rover) -> dict[str, Terrain]:
-    """Return grounds to be perturbed, by name."""
+    """Return the grounds without errors, by name."""
     return {
         "level": plane(0.0, 0.0, half=3.0),
         "slope": plane(0.25, 0.1, half=3.0),
@@ -41,7 +41,7 @@ def with_std(terrain: Terrain, std: float) -> Terrain:
 
 
 def path_across(seed: int, count: int = 24) -> np.ndarray:
-    """Return a straight path (count, 3) of 2 m through the middle of a ground."""
+    """Return a straight path (count, 3), 2 m long, through the middle of a ground."""
     rng = np.random.default_rng(seed)
     heading, aside = rng.uniform(-0.5, 0.5), rng.uniform(-0.6, 0.6)
     along = np.linspace(-1.0, 1.0, count)
@@ -50,14 +50,13 @@ def path_across(seed: int, count: int = 24) -> np.ndarray:
 
 
 def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterator[Terrain]:
-    """Yield maps whose heights err by their standard deviations.
+    """Yield maps with random height errors of the given standard deviations.
 
     Args:
         terrain: The map, with a layer `elevation_std`.
-        length: Distance [m] at which the errors' correlation has fallen to 1/e; 0: each cell
-            errs on its own.
+        length: Correlation length [m], at which the correlation is 1/e; 0: independent errors.
         count: Number of maps.
-        seed: Of the generator.
+        seed: Seed of the random numbers.
     """
     rng = np.random.default_rng(seed)
     shape, width = terrain.elevation.shape, length / terrain.resolution / 2.0
@@ -75,17 +74,17 @@ def _smooth(values: np.ndarray, width: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a path fared on maps drawn at random."""
+    """Result of a path on random maps."""
 
     waypoints: int
     """Number of waypoints with bounds, counted for each map."""
     outside: dict[str, int]
-    """How many of these had a value outside of its bounds, by value; "any" for any value or no
-    pose at all, "no pose" for the latter."""
+    """Number of these with a value outside its bounds, by value; "no pose" counts waypoints that
+    did not settle, "any" counts waypoints with any of these."""
     unbounded: int
-    """Number of waypoints of the path that settle but have no bounds."""
+    """Number of waypoints that settle but have no bounds."""
     widths: dict[str, float]
-    """Median width of the bounds over the range of the values that were drawn, by value."""
+    """Median ratio of the width of the bounds to the range of the random values, by value."""
 
 
 def draw_path(
@@ -98,7 +97,7 @@ def draw_path(
     policy: str = "equal",
     sigmas: float = 3.0,
 ) -> Outcome:
-    """Sweep a path over maps drawn at random and hold it against its bounds."""
+    """Predict a path on random maps and compare the values with their bounds."""
     prediction = sweep_path(rover, terrain, poses, SweepOptions(policy=policy))
     bounds = bound_path(rover, terrain, prediction, SweepOptions(policy=policy), sigmas=sigmas)
     rows = bounds.bounded
@@ -126,7 +125,7 @@ def draw_path(
 
 
 def _relative_width(limits: np.ndarray, drawn: list[np.ndarray]) -> float:
-    """Return the median of width over range where both are finite and something varies."""
+    """Return the median of width over range, where both are finite and the range is not zero."""
     values = np.array(drawn)
     with np.errstate(invalid="ignore"):
         spread = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)

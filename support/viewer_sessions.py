@@ -1,4 +1,4 @@
-"""Paths, grounds and sessions that tests of the page share."""
+"""Paths, grounds and sessions for tests of the viewer."""
 
 import numpy as np
 
@@ -10,13 +10,13 @@ LSR1 = load_rover("lsr1")
 
 
 def straight(length: float = 2.0, spacing: float = 0.02) -> np.ndarray:
-    """Return poses (n, 3) along x from x = -1 m, over a length and with a spacing [m]."""
+    """Return poses (n, 3) along x from x = -1 m, with a length and a spacing [m]."""
     x = np.arange(-1.0, length - 1.0 + 1e-9, spacing)
     return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
 
 
 def ramp(x, y):
-    """Return waves that rise by 1 in 4 along x: passable with friction 0.8, half-way with 0.4."""
+    """Return waves with a slope of 1 in 4 along x: passable with mu 0.8, only partly with 0.4."""
     return waves(x, y) + 0.25 * x
 
 

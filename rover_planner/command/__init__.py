@@ -1,1 +1,1 @@
-"""The command line: one file a subcommand, and the options they share."""
+"""The subcommands of the command line, one file each, and their shared options."""

@@ -1,4 +1,4 @@
-"""The options of the command line that are about the manipulator, from text to checked values."""
+"""Reads the command-line options of the manipulator and checks their values."""
 
 import math
 from collections.abc import Sequence
@@ -8,15 +8,15 @@ from rover_planner.errors import PlanningError
 
 
 def read_arm_angles(rover: Rover, words: Sequence[str]) -> dict[str, float] | None:
-    """Return the angles [rad] of all joints of the arm by name, None (stowed) without words.
+    """Return the angles [rad] of all arm joints by name; None (stowed) if `words` is empty.
 
     Args:
         rover: The rover.
-        words: Each as NAME=RAD; all joints of the arm, once, in any order.
+        words: NAME=RAD for each joint of the arm, each joint once, in any order.
 
     Raises:
-        PlanningError: A rover without an arm, words of another form, an angle that is not
-            finite, or joints unknown, named twice or missing.
+        PlanningError: The rover has no arm, a word has another form, an angle is not finite, or
+            a joint is unknown, named twice or missing.
     """
     if not words:
         return None

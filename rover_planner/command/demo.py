@@ -1,4 +1,4 @@
-"""The command `rover_planner demo`: a server, a planner that asks it, a table and a picture."""
+"""The command `rover_planner demo`: queries a running server, shows a table and a picture."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ def demo(
         typer.Option(
             "--map",
             metavar="TERRAIN",
-            help="Preset name (spirit) or elevation map, .npz; by default one is made.",
+            help="Preset name (spirit) or elevation map, .npz; default: a generated one.",
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Picture to write, .png.")] = Path(
@@ -24,9 +24,9 @@ def demo(
     seed: Annotated[int, typer.Option(help="Seed of the terrain and the goals.")] = 1,
     max_gap: MaxGap = 0.2,
 ) -> None:
-    """Ask a running traverse_server over ROS 2 for several goals, and picture its answers.
+    """Query a traverse_server over ROS 2 for several goals and draw its answers.
 
-    Exit code 0 when it ran, whatever the answers; 1 if a part of it failed; 2 for bad input.
+    Exit code 0: it ran, with any answers. 1: a part of it failed. 2: bad input.
     """
     from rover_planner.demo.demo import run_demo
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several subcommands share."""
 
 from typing import Annotated
 

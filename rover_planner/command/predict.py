@@ -1,4 +1,4 @@
-"""The command `rover_planner predict`: loads, slip and margins along a path, into a file."""
+"""The command `rover_planner predict`: writes loads, slip and margins along a path to a file."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -60,12 +60,12 @@ def predict(
     ] = False,
     torque_ranges: Annotated[
         bool,
-        typer.Option("--torque-ranges", help="Add the torques with which each wheel can do."),
+        typer.Option("--torque-ranges", help="Add the range of feasible torques of each wheel."),
     ] = False,
 ) -> None:
     """Predict loads, slip and margins along a path of poses and write them to a file.
 
-    Exit code 0 when it ran, whatever the verdict; 2 for bad input.
+    Exit code 0: it ran, with any verdict. 2: bad input.
     """
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover

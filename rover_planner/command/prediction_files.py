@@ -1,4 +1,4 @@
-"""The files of the `predict` command: poses in, the model's predictions out, and back again."""
+"""Reads and writes the files of the `predict` command: poses and predictions."""
 
 import io
 import zipfile
@@ -37,7 +37,7 @@ ARRAYS = (
     "energy",
     "time",
 )
-"""The arrays of a prediction that the output file holds, under the same names."""
+"""Arrays of a prediction in the output file, under the same names."""
 REPLAY_ARRAYS = (
     "poses",
     "status",
@@ -52,16 +52,16 @@ REPLAY_ARRAYS = (
     "wheel_drop",
     "falling",
 )
-"""What it holds besides, so that `rover_planner view` can replay it."""
+"""Further arrays in the file that `rover_planner view` needs to replay it."""
 SOIL_ARRAYS = ("sinkage", "motion_resistance")
-"""Those that it holds besides where soil was asked for, or the terrain names soils."""
+"""Further arrays in the file if a soil was given or the terrain has soils."""
 
 
 def read_poses(path: Path) -> NDArray[np.float64]:
     """Read `poses` (n, 3), x, y [m] and yaw [rad] of the body origin, from an .npz file.
 
     Raises:
-        PlanningError: No such file, no .npz file, no such array, or not numbers of that shape.
+        PlanningError: The file is missing or not an .npz file, or has no such array of numbers.
     """
     poses = _read_arrays(path, ("poses",), "poses")["poses"]
     if poses.dtype.kind not in "fiu":
@@ -74,7 +74,7 @@ def read_poses(path: Path) -> NDArray[np.float64]:
 
 
 def _read_arrays(path: Path, names: Sequence[str], what: str) -> dict[str, Any]:
-    """Read arrays by name from an .npz file of `what`."""
+    """Read arrays by name from an .npz file; errors name its kind, `what`."""
     try:
         archive = np.load(path, allow_pickle=False)
         if not isinstance(archive, np.lib.npyio.NpzFile):
@@ -92,13 +92,14 @@ def _read_arrays(path: Path, names: Sequence[str], what: str) -> dict[str, Any]:
 
 
 def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
-    """Read what `write_prediction` wrote, without what lies between waypoints and bounds.
+    """Read a file of `write_prediction`, without crossings between waypoints and bounds.
 
     Returns:
-        The prediction of n waypoints, and for each the reason why it is not passable, or "".
+        The prediction of n waypoints, and for each the reason why it is not passable, "" if it
+        is passable.
 
     Raises:
-        PlanningError: No such file, or not one of predictions.
+        PlanningError: The file is missing or is not a file of predictions.
     """
     arrays = _read_arrays(path, (*ARRAYS, *REPLAY_ARRAYS, "reason"), "predictions")
     reasons = tuple(arrays.pop("reason").tolist())
@@ -118,20 +119,20 @@ def write_prediction(
     classes: Sequence[ClassifiedWaypoint] | None = None,
     ranges: TorqueRanges | None = None,
 ) -> None:
-    """Write a prediction and its verdict to an .npz file of exactly that name.
+    """Write a prediction and its verdict to an .npz file; the file name is not extended.
 
-    Beside the ARRAYS it holds `reason` (n,) text, empty where passable, `traversable` () bool and
-    `first_failure` () int, -1 if there is none; on an uncertain map `map_sigmas` () and for each
-    of BOUNDED_VALUES its `..._bounds`, smallest and largest in the last axis.
+    The file has the ARRAYS, `reason` (n,) text, empty if passable, `traversable` () bool, and
+    `first_failure` () int, -1 if there is none. On an uncertain map it also has `map_sigmas` ()
+    and for each of BOUNDED_VALUES its `..._bounds`, with minimum and maximum in the last axis.
 
     Args:
-        path: The file; it is overwritten.
-        prediction: The path of n waypoints.
-        verdict: What the limits say to it.
+        path: The file; an existing one is overwritten.
+        prediction: Prediction of n waypoints.
+        verdict: Verdict on them.
         on_soil: Whether to write SOIL_ARRAYS (n, 6), in m and N.
-        classes: Of each waypoint, written as `traversability_class`, `class_constraint` and
+        classes: Class of each waypoint, written as `traversability_class`, `class_constraint` and
             `class_wheel` (n,) text and `class_margin` (n,).
-        ranges: Written as `torque_range` (n, 6, 2), lowest and highest torque [N m].
+        ranges: Torque ranges, written as `torque_range` (n, 6, 2), minimum and maximum [N m].
 
     Raises:
         PlanningError: The file cannot be written.

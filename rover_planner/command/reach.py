@@ -20,10 +20,10 @@ from rover_planner.command.options import (
 def reach(
     rover: RoverName,
     terrain: TerrainName,
-    x: Annotated[float, typer.Argument(metavar="X", help="Place of the body in m, map frame.")],
+    x: Annotated[float, typer.Argument(metavar="X", help="Position of the body in m, map frame.")],
     y: Annotated[float, typer.Argument(metavar="Y")],
     yaw: Annotated[float, typer.Argument(metavar="YAW", help="Heading of the body in rad.")],
-    tx: Annotated[float, typer.Argument(metavar="TX", help="Place for the tip in m, map frame.")],
+    tx: Annotated[float, typer.Argument(metavar="TX", help="Target for the tip in m, map frame.")],
     ty: Annotated[float, typer.Argument(metavar="TY")],
     tz: Annotated[float, typer.Argument(metavar="TZ")],
     force: Annotated[
@@ -40,9 +40,9 @@ def reach(
     policy: Policy = "equal",
     soil: SoilName = None,
 ) -> None:
-    """Tell as JSON whether the rover at rest can reach a point with its arm, and push there.
+    """Print as JSON whether the rover at rest can reach a point with its arm and push there.
 
-    Exit code 0 when it ran, whatever the answer; 2 for bad input.
+    Exit code 0: it ran, with any answer. 2: bad input.
     """
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover

@@ -1,4 +1,4 @@
-"""The command `rover_planner study`: which numbers of a rover are best for what it drives over."""
+"""The command `rover_planner study`: sweeps or optimises numbers of a rover."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,7 +19,7 @@ def study(
 ) -> None:
     """Sweep or optimise numbers of a rover; write a CSV and a picture.
 
-    Exit code 0 when it ran; 2 for bad input.
+    Exit code 0: it ran. 2: bad input.
     """
     need("matplotlib", "the picture of a study")
     from rover_planner.progress import show_bar

@@ -10,7 +10,7 @@ def terrain(
     out: Annotated[
         Path, typer.Argument(metavar="OUT", help="Elevation map to write, .npz; is overwritten.")
     ],
-    seed: Annotated[int, typer.Option(help="Seed of all that is random.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     size: Annotated[float, typer.Option(help="Width and height in m.")] = 24.0,
     resolution: Annotated[float, typer.Option(help="Cell size in m.")] = 0.05,
     roughness: Annotated[

@@ -1,1 +1,1 @@
-"""The demo: a server, a planner that asks it, a table and a picture."""
+"""The demo: a server, a mission planner that queries it, a table and a picture."""

@@ -1,7 +1,7 @@
-"""Child processes that never outlive their parent: a process group each, ended to the last member.
+"""Child processes that end with their parent; each has its own process group.
 
-As a program, `python -m rover_planner.demo.child_process PARENT MODULE ...` runs a module that the
-kernel (Linux) terminates when its parent has died, so that even a killed parent leaves nothing.
+The program `python -m rover_planner.demo.child_process PARENT MODULE ...` runs a module that the
+Linux kernel terminates when the process PARENT dies, even if that process was killed.
 """
 
 import ctypes
@@ -18,19 +18,19 @@ from pathlib import Path
 from types import FrameType
 
 GRACE = 4.0
-"""How long a process may take to end by itself after SIGTERM [s]."""
+"""Time that a process has to end after SIGTERM before it is killed [s]."""
 
 _PR_SET_PDEATHSIG = 1
 _POLL = 0.05
 
 
 class ChildProcess:
-    """A Python module running in a process group of its own."""
+    """A Python module that runs in its own process group."""
 
     def __init__(
         self, module: str, arguments: Sequence[str], environment: Mapping[str, str], log: Path
     ):
-        """Start the module; what it says on stderr goes to the log file, stdout can be read."""
+        """Start the module; stderr is written to the file `log`, stdout is read by `lines`."""
         self.name = module.rpartition(".")[2]
         self.log = log
         with open(log, "wb") as log_file:
@@ -45,23 +45,23 @@ class ChildProcess:
 
     @property
     def pid(self) -> int:
-        """Number of the process."""
+        """Process id."""
         return self._process.pid
 
     @property
     def running(self) -> bool:
-        """Whether the process has not ended yet."""
+        """Whether the process is still running."""
         return self._process.returncode is None and self._exit_status() is None
 
     @property
     def exit_code(self) -> int | None:
-        """Exit code, negative for a signal; None while it is running."""
+        """Exit code, negative for a signal; None while the process is running."""
         if self._process.returncode is not None:
             return self._process.returncode
         return self._exit_status()
 
     def lines(self, watch: Callable[[], None]) -> Iterator[str]:
-        """Yield the lines of its standard output until it closes; `watch` is called in between."""
+        """Yield the lines of standard output until it closes; call `watch` regularly meanwhile."""
         assert self._process.stdout is not None
         descriptor = self._process.stdout.fileno()
         pending = b""
@@ -76,19 +76,19 @@ class ChildProcess:
             yield from (line.decode(errors="replace") for line in whole)
 
     def last_words(self) -> str:
-        """Return the last line of its log that says something."""
+        """Return the last non-empty line of the log."""
         lines = self.log.read_text(errors="replace").splitlines()
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
 
     def stop(self) -> None:
-        """End the whole group: ask, wait for GRACE, then kill."""
+        """End the whole process group: send SIGTERM, wait for GRACE, then kill."""
         if self._process.returncode is not None:
             return
         self._signal(signal.SIGTERM)
         deadline = time.monotonic() + GRACE
         while self.running and time.monotonic() < deadline:
             time.sleep(_POLL)
-        # the leader is not waited for yet, so its number still names the group and nothing else
+        # the leader has not been reaped yet, so its id still belongs to this group
         self._signal(signal.SIGKILL)
         self._process.wait()
         if self._process.stdout is not None:
@@ -101,7 +101,7 @@ class ChildProcess:
             return
 
     def _exit_status(self) -> int | None:
-        """Look whether the leader has ended, without reaping it."""
+        """Return the leader's exit status without reaping it, None while it is running."""
         flags = os.WEXITED | os.WNOHANG | os.WNOWAIT
         result = os.waitid(os.P_PID, self._process.pid, flags)
         if result is None:
@@ -111,10 +111,10 @@ class ChildProcess:
 
 @contextmanager
 def stopping_children() -> Iterator[list[ChildProcess]]:
-    """Yield a list for child processes, all of which are stopped at the end, whatever happens.
+    """Yield a list for child processes; all of them are stopped when the block ends.
 
-    SIGTERM and SIGHUP end the block like Ctrl-C does, with the exit code that shells expect; while
-    the children are being stopped further signals wait.
+    SIGTERM and SIGHUP end the block as Ctrl-C does, with the exit code that shells expect. Further
+    signals are blocked while the children are being stopped.
     """
     children: list[ChildProcess] = []
     numbers = (signal.SIGTERM, signal.SIGHUP)
@@ -132,12 +132,12 @@ def stopping_children() -> Iterator[list[ChildProcess]]:
 
 
 def _exit_by_signal(number: int, frame: FrameType | None) -> None:
-    """Leave by way of all the finally blocks."""
+    """Raise SystemExit, so that all finally blocks run."""
     raise SystemExit(128 + number)
 
 
 def _run_module() -> None:
-    """Run the module named on the command line, bound to the life of the parent."""
+    """Run the module named on the command line; it ends when the parent ends."""
     parent, module = int(sys.argv[1]), sys.argv[2]
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

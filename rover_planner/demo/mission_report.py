@@ -11,10 +11,10 @@ from rover_planner.planning.goals import Mission
 
 
 def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) -> Table:
-    """Make a table of the verdicts of a traverse_server, one row a goal.
+    """Return a table of the verdicts of a traverse_server, one row per goal.
 
     Args:
-        rover: The rover that was asked about.
+        rover: The rover.
         mission: The goals.
         answers: The verdict on each goal, as `MissionPlanner.ask` returns it.
     """
@@ -56,5 +56,5 @@ def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) 
 
 
 def _number(value: float | None, digits: int) -> str:
-    """Write a number, or a dash where there is none."""
+    """Format a number; None becomes a dash."""
     return "-" if value is None else f"{value:.{digits}f}"

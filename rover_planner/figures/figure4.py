@@ -1,12 +1,12 @@
 """Figure 4 of the paper: how the torque of one wheel changes the loads of all three of a side.
 
-The rover stands on level ground and the same torque acts on one wheel of both sides. Something
-has to hold the thrust of that wheel, and the loads depend on what. Two cases are drawn:
+The rover stands on level ground and the same torque acts on one wheel of both sides. The loads
+depend on the force that balances the thrust of that wheel. Two cases are drawn:
 
-- alone: the other motors give nothing, as in the paper's model; the thrust is held where body and
-  rockers meet, as by the inertia of the body of a rover that starts to move;
-- held by all wheels: each wheel takes a third of the thrust back, so that the rover stays. This is
-  the common pull of the product's own balance.
+- alone: the other motors give no torque, as in the paper's model. The thrust is balanced at the
+  rocker pivots, like the inertial force of the body of a rover that starts to move.
+- held by all wheels: each wheel balances a third of the thrust, so that the rover stays at rest.
+  This corresponds to the common traction in the balance of `rover_physics`.
 """
 
 from pathlib import Path
@@ -25,13 +25,13 @@ from rover_planner.figures.pictures import STYLE, save_figure
 
 AXLES = ("rear", "middle", "front")
 MAX_TORQUE = 0.2
-"""Torques are varied between plus and minus this [N m], as in the paper."""
+"""Torques vary between minus and plus MAX_TORQUE [N m], as in the paper."""
 ALONE, HELD = "other motors off, thrust held at the body", "thrust held by all wheels alike"
 
 _COLOURS = {ALONE: "#0072B2", HELD: "#D55E00"}
 _DASHES = {ALONE: "-", HELD: (0, (4, 2))}
 _HEADROOM = 1.55
-"""Room above the lines, in units of the room below, for what is written there."""
+"""Height of the load axis above its centre over that below: leaves room for labels."""
 
 
 def loads_at_rest(rover: Rover) -> np.ndarray:
@@ -45,14 +45,15 @@ def loads_at_rest(rover: Rover) -> np.ndarray:
 
 
 def load_changes(rover: Rover, tractions: np.ndarray) -> np.ndarray:
-    """Return how the loads (3,) [N] of a side on level ground change with tractions on both sides.
+    """Return the change of the loads (3,) [N] of a side on level ground due to tractions.
 
-    Eqs (13) to (15) of the paper with what the body passes on unchanged; what is left of (12), the
-    net thrust, is held at the rocker pivots. Order: rear, middle, front.
+    The same tractions act on both sides. Source: eqs (13) to (15) of the paper with constant
+    forces of the body; the net thrust, which remains in (12), acts at the rocker pivots. Order:
+    rear, middle, front.
 
     Args:
         rover: The rover.
-        tractions: (3,) tractions of the wheels of a side, positive forward [N].
+        tractions: (3,) tractions of the wheels of one side, positive forward [N].
     """
     suspension = rover.suspension
     wheels = np.array([suspension.wheels[name] for name in AXLES])
@@ -87,7 +88,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
     """Write Figure 4 of the paper for `rover` as a picture of nine panels.
 
     Args:
-        path: Picture to write; its suffix says of which kind, such as .png.
+        path: Picture to write; its suffix sets the format, such as .png.
         rover: The rover.
 
     Raises:
@@ -127,7 +128,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
 
 
 def _draw_line(axes: Axes, torques: np.ndarray, loads: np.ndarray, case: str) -> None:
-    """Draw one line, and say how far it rises per 100 mN m."""
+    """Draw one line and label it with its slope per 100 mN m."""
     axes.plot(
         1e3 * torques, loads, color=_COLOURS[case], linestyle=_DASHES[case], linewidth=1.8,
         label=case,

@@ -1,4 +1,4 @@
-"""What all pictures share: their style, and how they are written to a file."""
+"""The common style of all pictures, and writing a picture to a file."""
 
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,11 @@ STYLE: dict[str, Any] = {
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.6,
 }
-"""Settings of matplotlib."""
+"""Settings of matplotlib (rcParams)."""
 
 
 def save_figure(path: Path, figure: Figure) -> None:
-    """Write a picture to a file of the kind that its name says.
+    """Write a picture to a file; the suffix sets the format.
 
     Raises:
         PlanningError: The file cannot be written.

@@ -1,4 +1,4 @@
-"""Pictures of answers: candidate paths on the hill-shaded terrain, and the wheels along them."""
+"""Draws answers: candidate paths on the hill-shaded terrain, and wheel values along them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from rover_planner.errors import PlanningError
 from rover_planner.figures.pictures import STYLE, save_figure
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
-# The palette of Okabe and Ito, which readers with colour-blindness can tell apart.
+# The palette of Okabe and Ito, which is safe for colour-blind readers.
 PASSABLE = "#0072B2"
 REFUSED = "#D55E00"
 CHOSEN = "#F0E442"
 WHEEL_COLOURS = {"front": "#0072B2", "middle": "#E69F00", "rear": "#CC79A7"}
 SIDE_STYLES = {"right": "-", "left": (0, (3, 1.5))}
 
-# Ground is drawn in warm greys, which leave the colours to the paths.
+# Ground is drawn in warm greys, so that the coloured paths stand out.
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#6E6259", "#B5A99C", "#F1EAE0"])
 _COLUMNS = 3
 _UNKNOWN = (0.80, 0.84, 0.90)
@@ -40,24 +40,24 @@ class LabelledAnswer:
     """An answer with the name of its goal."""
 
     name: str
-    """A short name, written at the goal."""
+    """Short name, drawn at the goal."""
     intent: str
-    """What kind of goal it is, for titles."""
+    """Kind of goal, for titles."""
     answer: PathAnswer
-    """The candidates, the best of them and the verdicts."""
+    """The candidates with their verdicts."""
 
 
 def draw_answers(
     path: Path, rover: Rover, terrain: Terrain, answers: Sequence[LabelledAnswer], title: str = ""
 ) -> None:
-    """Write a picture of answers to queries on one terrain.
+    """Draw the answers to queries on one terrain.
 
-    Above, the terrain, the candidate paths coloured by verdict and the chosen ones; below, wheel
-    loads, friction utilisation, torque saturation and tip-over margin against distance, for up to
-    three chosen paths, or for the refused ones if there is no other.
+    The upper part shows the terrain with the candidate paths, coloured by verdict. The lower part
+    shows wheel loads, friction utilisation, torque saturation and tip-over margin over distance,
+    for up to three chosen paths, or for refused paths if none was chosen.
 
     Args:
-        path: Picture to write; its suffix says of which kind, such as .png.
+        path: Picture to write; its suffix sets the format, such as .png.
         rover: The rover, for its limits.
         terrain: The ground.
         answers: The answers, one or more.
@@ -83,14 +83,17 @@ def draw_answers(
 
 
 def hill_shade(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
-    """Return how bright each cell (ny, nx) is, 0 to 1, the sun in the north-west; NaN stays."""
+    """Return the brightness (ny, nx) of the cells, 0 to 1, with light from the north-west.
+
+    Cells with unknown height stay NaN.
+    """
     dy, dx = np.gradient(elevation, resolution)
     azimuth, altitude = np.deg2rad(135.0), np.deg2rad(40.0)
     sun = np.array(
         [np.cos(altitude) * np.cos(azimuth), np.cos(altitude) * np.sin(azimuth), np.sin(altitude)]
     )
     cosine = (-dx * sun[0] - dy * sun[1] + sun[2]) / np.sqrt(1 + dx**2 + dy**2)
-    # level ground comes out at two thirds, so that both sides of a rock show
+    # level ground has a brightness of two thirds, so that both sides of a rock are visible
     return np.clip(2 / 3 + 0.9 * (cosine - sun[2]), 0.0, 1.0)
 
 
@@ -140,7 +143,7 @@ def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[LabelledAnswer]) -
 
 
 def _arrow(yaw: float) -> list[tuple[float, float]]:
-    """Return the outline of an arrow head that points along a heading [rad], for a marker."""
+    """Return the vertices of a marker: an arrow head along a heading [rad]."""
     outline = np.array([[1.0, 0.0], [-0.75, 0.6], [-0.4, 0.0], [-0.75, -0.6], [1.0, 0.0]])
     turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
     return [(float(x), float(y)) for x, y in outline @ turn]
@@ -188,7 +191,10 @@ def _map_legend(terrain: Terrain) -> list[Line2D]:
 
 
 def _shade_layer(terrain: Terrain) -> NDArray[np.float64]:
-    """Return the hill shade as black and white with opacity (ny, nx, 4), unknown cells opaque."""
+    """Return the hill shade as RGBA (ny, nx, 4): black or white with opacity.
+
+    Unknown cells are opaque.
+    """
     shade = hill_shade(terrain.elevation, terrain.resolution)
     shade = np.where(np.isfinite(shade), shade, 2 / 3)
     light = np.where(shade > 2 / 3, 1.0, 0.0)
@@ -255,12 +261,12 @@ def _draw_goal(axes: Axes, labelled: LabelledAnswer) -> None:
 
 
 def _view(terrain: Terrain, answers: Sequence[LabelledAnswer]) -> tuple[float, ...]:
-    """Return xmin, xmax, ymin, ymax [m] of what to show: all paths, with a margin."""
+    """Return xmin, xmax, ymin, ymax [m] of the visible area: all paths and a margin."""
     places = np.concatenate([c.poses[:, :2] for a in answers for c in a.answer.candidates])
     lower, upper = places.min(axis=0), places.max(axis=0)
     margin = 0.08 * float(max(upper - lower)) + 0.5
     lower, upper = lower - margin, upper + margin
-    # a wide view fills the page; the terrain's own edges are shown where paths leave it
+    # a wide view fills the page; the view includes the terrain's edges if paths leave it
     wanted = 1.55 * (upper[1] - lower[1])
     lack = max(0.0, wanted - (upper[0] - lower[0]))
     xmin, xmax, _, _ = terrain.bounds
@@ -274,7 +280,7 @@ def _view(terrain: Terrain, answers: Sequence[LabelledAnswer]) -> tuple[float, .
 def _elevation_range(
     terrain: Terrain, view: tuple[float, ...]
 ) -> tuple[float | None, float | None]:
-    """Return the range of elevations in view, for the colours."""
+    """Return minimum and maximum elevation [m] in view, for the colours."""
     ny, nx = terrain.elevation.shape
     x = terrain.origin[0] + terrain.resolution * np.arange(nx)
     y = terrain.origin[1] + terrain.resolution * np.arange(ny)
@@ -318,7 +324,7 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
 
 
 def _highest(candidate: Candidate, name: str) -> float:
-    """Return the largest finite value of a predicted quantity, 0 where there is none."""
+    """Return the largest finite value of a predicted quantity, 0 if there is none."""
     values = np.asarray(getattr(candidate.prediction, name))
     return float(np.max(values, where=np.isfinite(values), initial=0.0))
 
@@ -352,7 +358,7 @@ def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
 
 
 def _wheel_legend() -> list[Line2D]:
-    """Return the handles that say which line is which wheel."""
+    """Return the legend handles of the wheels."""
     handles = [
         Line2D(
             [],

@@ -1,4 +1,4 @@
-"""What the words of the program mission_planner mean; needs no ROS."""
+"""The command-line options of the program mission_planner; needs no ROS."""
 
 import math
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ class Pose(NamedTuple):
 
 @dataclass(frozen=True)
 class MissionOptions:
-    """What a mission planner is to do."""
+    """The options of a mission planner."""
 
     start: Pose
     """Where the rover stands."""
     goals: tuple[Pose, ...]
-    """Where it is asked to go, one question each."""
+    """Its goals; the server is queried once for each."""
     map_name: str | None
     """Preset or file of the map to publish first; None publishes none."""
     drive: bool
@@ -33,13 +33,13 @@ class MissionOptions:
     map_frame: str
     """Frame of map and poses."""
     timeout: float
-    """Longest wait for an answer [s]."""
+    """Longest wait for each answer [s]."""
     json: bool
     """Whether to print JSON."""
 
 
 def read_pose(text: str) -> Pose:
-    """Read X,Y,YAW.
+    """Read a pose from the text X,Y,YAW, in m and rad.
 
     Raises:
         typer.BadParameter: Not three finite numbers.
@@ -62,9 +62,7 @@ def read_mission(
     ],
     goal: Annotated[
         list[Pose],
-        typer.Option(
-            parser=read_pose, metavar="X,Y,YAW", help="Where it is to go; may be given repeatedly."
-        ),
+        typer.Option(parser=read_pose, metavar="X,Y,YAW", help="Goal; may be given repeatedly."),
     ],
     map_name: Annotated[
         str | None,
@@ -86,5 +84,5 @@ def read_mission(
         bool, typer.Option("--json", help="Print a JSON object a line; goals count from 1.")
     ] = False,
 ) -> MissionOptions:
-    """Return what the words of the program mean."""
+    """Return the options given on the command line."""
     return MissionOptions(start, tuple(goal), map_name, drive, map_frame, timeout, as_json)

@@ -1,9 +1,9 @@
-"""The node /mission_planner: asks a traverse_server over ROS 2 for one goal after another.
+"""The node /mission_planner: queries a traverse_server over ROS 2 for a list of goals.
 
     mission_planner [--map TERRAIN] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--drive] [--json]
 
-It is what an operator's planner would do, small enough to copy from: publish a map, call
-`~/can_traverse`, and read the verdict, wheel loads and slip that the server publishes with it.
+It is a short example of a planner client: it publishes a map, calls `~/can_traverse`, and reads
+the verdict, wheel loads and slip ratios that the server publishes with its answer.
 """
 
 import json
@@ -42,21 +42,21 @@ from rover_planner.shell.exit_codes import (
 
 NODE_NAME = "mission_planner"
 SERVER = "/traverse_server"
-"""Name of the server's node; remap its services and topics for another."""
+"""Name of the server's node; remap services and topics to use another one."""
 
 
 class NoAnswerError(Exception):
-    """The server did not answer in time; the text says what was waited for."""
+    """The server did not answer in time; the text names the missing answer."""
 
 
 class DriveFailedError(Exception):
-    """The rover did not get there; the text says what was waited for."""
+    """The rover did not reach the end of its path; the text names the reason."""
 
 
 class MissionPlanner(Node):
-    """Asks the server, and collects what it publishes about each answer.
+    """Queries the server and collects the results that it publishes with each answer.
 
-    Its callbacks run in an executor's thread; the methods below are for another one and block.
+    Callbacks run in an executor's thread. Call the blocking methods below from another thread.
     """
 
     def __init__(self, map_frame: str = "map", timeout: float = 60.0, **node_arguments: Any):
@@ -82,10 +82,10 @@ class MissionPlanner(Node):
             )
 
     def wait_for_server(self) -> None:
-        """Wait until the server serves and is heard.
+        """Wait until the server's service and its verdict topic are connected.
 
         Raises:
-            NoAnswerError: It is not there in time.
+            NoAnswerError: The server is not available in time.
         """
         verdicts = f"{SERVER}/verdict"
         self._wait(
@@ -94,25 +94,25 @@ class MissionPlanner(Node):
         )
 
     def publish_map(self, terrain: Terrain) -> None:
-        """Publish a terrain for the server and for whoever comes later.
+        """Publish a terrain for the server and for later subscribers.
 
         Raises:
-            NoAnswerError: Nobody subscribes to the map in time.
+            NoAnswerError: No node subscribes to the map in time.
         """
         self._wait(lambda: self._map_publisher.get_subscription_count() > 0, "a map subscriber")
         stamp = self.get_clock().now().to_msg()
         self._map_publisher.publish(terrain_to_point_cloud(terrain, self._frame, stamp))
 
     def ask(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
-        """Ask whether the rover can get from start to goal.
+        """Ask the server whether the rover can drive from start to goal.
 
         Args:
             start: x, y [m] and yaw [rad] in the map frame.
-            goal: The same.
+            goal: x, y [m] and yaw [rad] in the map frame.
 
         Returns:
-            The server's verdict, with `plan` [[x, y, z], ...] [m], and `max_wheel_load` [N] and
-            `max_slip_ratio` of the path that was judged, None where there is none.
+            The server's verdict by key, plus `plan` [[x, y, z], ...] [m], `max_wheel_load` [N]
+            and `max_slip_ratio` of the judged path, None if no path was judged.
 
         Raises:
             NoAnswerError: The server does not answer in time.
@@ -120,7 +120,7 @@ class MissionPlanner(Node):
         deadline = time.monotonic() + self._timeout
         while True:
             answer = self._ask_once(start, goal)
-            # the map is on its way, by another road than the question
+            # the map may arrive later than the query, because it is sent on a topic
             if answer.get("code") != "no_map" or time.monotonic() > deadline:
                 return answer
             time.sleep(0.2)
@@ -145,15 +145,15 @@ class MissionPlanner(Node):
         return answer
 
     def drive(self, within: float = 0.2, timeout: float = 3600.0) -> None:
-        """Send the last plan to the rover, on the topic `path`, and wait until it is there.
+        """Publish the last plan on the topic `path` and wait until the rover reaches its end.
 
         Args:
-            within: Distance from the end that counts as there [m].
+            within: Distance from the end that counts as reached [m].
             timeout: Longest wait [s].
 
         Raises:
-            DriveFailedError: There is no plan, nobody follows it, or the rover is not there in
-                time.
+            DriveFailedError: There is no plan, no node follows it, or the rover does not reach
+                its end in time.
         """
         if not self._plan.poses:
             raise DriveFailedError("there is no plan to drive")
@@ -182,7 +182,7 @@ class MissionPlanner(Node):
             self._changed.notify_all()
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
-        """Return the largest value of an array that the server publishes with its verdict."""
+        """Return the largest value of an array published with the verdict, None if it is empty."""
         rows = answer.get("waypoints")
         if not rows:
             return None
@@ -215,7 +215,7 @@ class MissionPlanner(Node):
         """Wait until a condition holds.
 
         Raises:
-            NoAnswerError: It does not in time.
+            NoAnswerError: It does not hold in time.
             ExternalShutdownException: ROS is shut down meanwhile.
         """
         longest = timeout or self._timeout
@@ -259,13 +259,13 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _end_with(code: int, error: Exception) -> int:
-    """Print on one line why the node ends, and return its exit code."""
+    """Print in one line why the node ends, and return the exit code."""
     print(f"{NODE_NAME}:", " ".join(str(error).split()), file=sys.stderr)
     return code
 
 
 def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOptions) -> int:
-    """Publish the map and ask for each goal; return the exit code."""
+    """Publish the map and query each goal; return the exit code."""
     report = _print_json if options.json else _print_text
     report({"event": "waiting for the server"})
     node.wait_for_server()
@@ -288,7 +288,7 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
 
 
 def _was_judged(answer: dict[str, Any]) -> bool:
-    """Tell whether the answer is about a path, not a refusal of the question."""
+    """Return whether a path was judged; otherwise the query was refused."""
     return "waypoints" in answer
 
 
@@ -321,7 +321,7 @@ def _print_text(event: dict[str, Any]) -> None:
 
 
 def _value(text: str) -> Any:
-    """Read a value of a diagnostic status: JSON, or else a plain text."""
+    """Parse a value of a diagnostic status as JSON; other texts are returned as they are."""
     try:
         return json.loads(text)
     except ValueError:

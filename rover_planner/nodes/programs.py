@@ -1,4 +1,4 @@
-"""The node programs: what each is for its help, and how its words are read; needs no ROS."""
+"""The node programs: their help texts and command-line arguments; needs no ROS."""
 
 import itertools
 import sys
@@ -26,19 +26,19 @@ class Program:
     """One of the node programs."""
 
     what: str
-    """What it does, in a sentence."""
+    """Its purpose, in one sentence."""
     topics: str
-    """What it hears, serves and publishes, in a line."""
+    """Its subscriptions, services and publishers, in one sentence."""
     read: Callable[..., Any]
-    """Its options, as typer takes them; returns what they mean."""
+    """Function whose arguments are the options, as typer expects; returns the options' values."""
     parameters: tuple[ParameterSpec, ...] = ()
     """Its table of parameters."""
     exit_codes: str = _EXIT_CODES
-    """Which exit code means what."""
+    """Meaning of its exit codes."""
 
 
 def read_nothing() -> dict[str, Any]:
-    """Return the parameters that the words of a program without options set: none."""
+    """Return the parameters set by a program without options: none."""
     return {}
 
 
@@ -46,11 +46,11 @@ def read_engine(
     engine: Annotated[
         str,
         typer.Option(
-            metavar="quasi_static|mujoco", help="What moves it; sets the parameter engine."
+            metavar="quasi_static|mujoco", help="Physics engine; sets the parameter engine."
         ),
     ] = "",
 ) -> dict[str, Any]:
-    """Return the parameters that the words of rover_simulator set."""
+    """Return the parameters that the options of rover_simulator set."""
     return {"engine": engine} if engine else {}
 
 
@@ -79,7 +79,7 @@ PROGRAMS = {
         specs_of(RoverSimulatorParameters),
     ),
     "mission_planner": Program(
-        "Ask a traverse_server over ROS 2 for one goal after another.",
+        "Query a traverse_server over ROS 2 for a list of goals.",
         "calls /traverse_server/can_traverse; subscribes /traverse_server/verdict, "
         "/traverse_server/wheel_loads, /traverse_server/slip_ratios, odometry; publishes "
         "elevation_cloud, path",
@@ -94,7 +94,7 @@ PROGRAMS = {
 
 
 def read_words(name: str, words: Sequence[str] | None) -> Any:
-    """Return what the words of a node program mean, ROS's own put aside.
+    """Return the values of a node program's options; ROS arguments are checked and removed.
 
     Args:
         name: One of PROGRAMS.
@@ -104,7 +104,7 @@ def read_words(name: str, words: Sequence[str] | None) -> Any:
         What the program's `read` returns; 0, an exit code, after help was printed.
 
     Raises:
-        PlanningError: The words have no meaning, ROS's own included.
+        PlanningError: An argument is invalid; ROS arguments included.
     """
     from rclpy.utilities import remove_ros_args
 
@@ -112,13 +112,13 @@ def read_words(name: str, words: Sequence[str] | None) -> Any:
     _refuse_old_remappings(given)
     try:
         own = remove_ros_args([name, *given])[1:]
-    except RuntimeError as error:  # of several classes that rclpy does not export
+    except RuntimeError as error:  # rclpy raises several classes that it does not export
         raise PlanningError(str(error)) from error
     return run_app(make_app(name), name, own)
 
 
 def _refuse_old_remappings(words: Sequence[str]) -> None:
-    """Refuse NAME:=VALUE without --ros-args: ROS takes it as a remapping, not as a parameter."""
+    """Refuse NAME:=VALUE without --ros-args, which ROS reads as a remapping, not a parameter."""
     for word in itertools.takewhile(lambda word: word != "--ros-args", words):
         if ":=" in word:
             raise PlanningError(
@@ -133,7 +133,7 @@ def print_help(name: str) -> None:
 
 
 def make_app(name: str) -> typer.Typer:
-    """Return the app that reads the words of a program and has its help."""
+    """Return the typer app that reads a program's arguments and prints its help."""
     program = PROGRAMS[name]
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     app.command(
@@ -151,7 +151,7 @@ def _epilog(program: Program) -> list[str]:
     topics = f"Topics and services: {program.topics}."
     if not program.parameters:
         return [topics]
-    as_they_are = "\b"  # click keeps the lines of such a paragraph
+    as_they_are = "\b"  # click keeps the line breaks of a paragraph that starts with it
     lines = [as_they_are, "Parameters, each set by --ros-args -p NAME:=VALUE:"]
     for spec in program.parameters:
         lines += _indent(f"{spec.name}: {_describe(spec)}", 2, 10)
@@ -160,7 +160,7 @@ def _epilog(program: Program) -> list[str]:
 
 
 def _indent(text: str, first: int, others: int) -> list[str]:
-    """Return the lines of a text, indented by a number of blanks."""
+    """Wrap a text; indent the first line and the other lines by numbers of blanks."""
     return textwrap.wrap(
         text,
         88,
@@ -171,7 +171,7 @@ def _indent(text: str, first: int, others: int) -> list[str]:
 
 
 def _describe(spec: ParameterSpec) -> str:
-    """Return type, default and unit of a parameter, and what it may be."""
+    """Return type, default, unit and allowed values of a parameter."""
     default = "empty" if spec.default == "" else str(spec.ros_default)
     words = [spec.type_name, f"default {default} {spec.unit}".rstrip()]
     if spec.bounds is not None:

@@ -1,4 +1,4 @@
-"""The arm's part of the traverse server: tool target and wrench in, `~/check_reach` out."""
+"""Topics and service of the arm in the traverse server: tool target, wrench, `~/check_reach`."""
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
@@ -14,7 +14,7 @@ from rover_planner.ros.refusals import answer_or_refuse
 
 
 class ReachTopics:
-    """Wires a ReachQuery to the topics and the service of a node."""
+    """Connects a ReachQuery to the topics and the service of a node."""
 
     def __init__(self, node: Node, service: TraverseService, map_frame: str):
         self._node, self._service, self._map_frame = node, service, map_frame
@@ -25,7 +25,7 @@ class ReachTopics:
 
     @property
     def query(self) -> ReachQuery:
-        """The last target and wrench."""
+        """The query, with the last target and wrench."""
         return self._query
 
     def _take_target(self, message: PoseStamped) -> None:

@@ -1,4 +1,4 @@
-"""The results of a traverse server on their topics: one judged path, one stamp for all of it."""
+"""Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,9 +37,9 @@ WHEEL_TOPICS = {
     "friction_utilisation": "friction_utilisation",
     "torque_saturation": "torque_saturation",
 }
-"""Topics of one value per waypoint and wheel, and the field of the prediction each carries."""
+"""Topics with one value per waypoint and wheel, and the field of the prediction on each."""
 LOOK_OUT = 0.2
-"""Time between two looks for listeners that have come [s]."""
+"""Period of the check for new subscribers [s]."""
 
 _KINDS = {
     "plan": Path,
@@ -48,11 +48,11 @@ _KINDS = {
     "verdict": DiagnosticArray,
     "markers": MarkerArray,
 }
-"""Topics in the order of publication, and the message each carries."""
+"""Topics in the order of publication, and their message types."""
 
 
 class ResultTopics:
-    """Makes the plan of a judgement at once, and publishes the rest when the answer is sent."""
+    """Makes the plan of a judgement at once and publishes all results after the answer is sent."""
 
     def __init__(self, node: Node, deferred_work: DeferredWork, map_frame: str):
         self._node, self._deferred_work, self._frame = node, deferred_work, map_frame
@@ -71,16 +71,16 @@ class ResultTopics:
         plan_spacing: float,
         log: Callable[[], None],
     ) -> Path:
-        """Return the plan of a judgement, and publish all results once the answer is sent.
+        """Return the plan of a judgement; publish all results after the answer is sent.
 
         Args:
             judgement: The answer.
-            rover: The rover that was asked about.
+            rover: The rover of the query.
             plan_spacing: Distance between poses of the plan [m]; 0 keeps all waypoints.
-            log: What else to do once the answer is sent, before the results.
+            log: Called after the answer is sent, before the results are published.
 
         Returns:
-            The plan; its poses are good until the next plan is made.
+            The plan; its poses are valid until the next plan is made.
         """
         stamp = self._node.get_clock().now().to_msg()
         results = _Results(
@@ -101,7 +101,7 @@ class ResultTopics:
 
 @dataclass(frozen=True)
 class _Results:
-    """The messages of one judgement, each made when it is asked for."""
+    """The messages of one judgement; each is made on demand."""
 
     judgement: Judgement
     rover: Rover
@@ -122,7 +122,7 @@ class _Results:
         return self._prediction(topic)
 
     def plan(self) -> Path:
-        """Return the path to drive, without poses where there is none."""
+        """Return the path to drive, without poses if none is traversable."""
         candidate = self.judgement.candidate
         if candidate is None or not self.judgement.traversable:
             return empty_path(self.frame, self.stamp)
@@ -135,7 +135,7 @@ class _Results:
         return verdict_to_diagnostics(report, self.rover.name, self.frame, self.stamp)
 
     def _nothing(self, topic: str) -> object:
-        """Return the empty message for where no path was judged."""
+        """Return the empty message that is published if no path was judged."""
         if topic == "predicted_joints":
             return empty_trajectory(self.frame, self.stamp)
         if topic == "markers":
@@ -145,7 +145,7 @@ class _Results:
         return waypoint_array(np.empty((0, len(WHEELS))))
 
     def _prediction(self, topic: str) -> object:
-        """Return what is predicted along a judged path."""
+        """Return the predicted values along a judged path."""
         candidate = self.judgement.candidate
         assert candidate is not None
         prediction = candidate.prediction
@@ -161,7 +161,7 @@ class _Results:
         return waypoint_array(getattr(prediction, WHEEL_TOPICS[topic]))
 
     def _rows_to_show(self) -> NDArray[np.intp]:
-        """Return waypoints about `plan_spacing` apart, and those where the class changes."""
+        """Return indices of waypoints about `plan_spacing` apart and where the class changes."""
         candidate = self.judgement.candidate
         assert candidate is not None
         return decimate(candidate.poses, self.plan_spacing, self.judgement.changes())

@@ -1,4 +1,4 @@
-"""The node /rover_simulator: a rover on a terrain, with the topics of a real one."""
+"""The node /rover_simulator: simulates a rover on a terrain with the topics of a real rover."""
 
 import contextlib
 import json
@@ -39,14 +39,15 @@ from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "rover_simulator"
 COMMANDS = "/traction_controller/commands"
-"""Where torques come from; remap it for another controller."""
+"""Topic of the torque commands; remap it for another controller."""
 DEVIATIONS = (0.01, 0.005)
-"""Of odometry: places [m] and angles [rad]."""
+"""Standard deviations in odometry: positions [m] and angles [rad]."""
 DIAGNOSTICS_PERIOD = 1.0
+"""Time between two diagnostic messages [s]."""
 
 
 class RoverSimulator(Node):
-    """Wires a Simulation to ROS."""
+    """Connects a Simulation to ROS topics."""
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
@@ -151,7 +152,7 @@ class RoverSimulator(Node):
         return {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
 
     def _tell(self, state: PlantState) -> None:
-        """Say once why the rover stops, and when it goes on."""
+        """Log once when the rover stops, with the reason, and once when it moves on."""
         if state.stopped == self._told:
             return
         self._told = state.stopped
@@ -206,7 +207,7 @@ def _transform(state: PlantState, frame_id: str, stamp: Any) -> TransformStamped
 
 
 def _make_broadcaster(node: Node) -> Any:
-    """Return what publishes transforms where tf2 is installed, which PyPI does not have."""
+    """Return a transform broadcaster, None without tf2, which PyPI does not offer."""
     with contextlib.suppress(ImportError):
         from tf2_ros import TransformBroadcaster
 
@@ -215,7 +216,7 @@ def _make_broadcaster(node: Node) -> Any:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the node until it is told to stop; return 2 if a word or parameter is wrong, else 0."""
+    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
     node = None
     try:
         options = read_words(NODE_NAME, words)

@@ -1,4 +1,4 @@
-"""Starts the node programs: help and missing libraries are told before ROS is imported."""
+"""Starts the node programs; reports help and missing libraries before ROS is imported."""
 
 import importlib
 import sys

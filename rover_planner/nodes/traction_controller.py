@@ -1,4 +1,4 @@
-"""The node /traction_controller: wheel torques shared by a quadratic program at its rate."""
+"""The node /traction_controller: commands wheel torques by a QP at a fixed rate."""
 
 import gc
 import signal
@@ -58,14 +58,16 @@ from rover_planner.traction.traction_service import (
 NODE_NAME = "traction_controller"
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 DIAGNOSTICS_PERIOD = 1.0
+"""Time between two diagnostic messages [s]."""
 SWITCH_INTERVAL = 2e-4
-"""How long the thread that makes maps ready may keep the interpreter from an update [s]."""
+"""Longest time for which the thread that prepares maps may delay an update [s]; Python's
+thread switch interval."""
 ARRIVAL_TIME = Duration(seconds=0.2)
-"""Longest wait for the zeros of a node that ends to arrive."""
+"""Longest wait for the final zero torques to reach their subscribers."""
 
 
 class TractionController(Node):
-    """Wires a TractionService to ROS: whatever is wrong, the wheels get zero torque in time."""
+    """Connects a TractionService to ROS; any fault sets the wheel torques to zero in time."""
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
@@ -86,35 +88,35 @@ class TractionController(Node):
 
     @property
     def service(self) -> TractionService:
-        """What takes measurements."""
+        """The service that takes measurements and returns torques."""
         return self._service
 
     @property
     def statistics(self) -> TractionStatistics:
-        """Times, counts and what came last."""
+        """Update times, counts and the last update."""
         return self._statistics
 
     def take_priority(self) -> None:
-        """Let this process run before others, if a parameter asks for it; say so if it can't."""
+        """Set the real-time priority of the parameter; log a warning if it is not granted."""
         refusal = take_priority(self._values.realtime_priority)
         if refusal:
             self.get_logger().warning(refusal)
 
     def stop(self) -> None:
-        """Send zero torques, wait until they have arrived, and update no more."""
+        """Send zero torques, wait until they have arrived, and stop updating."""
         self._timer.cancel()
         self._send(self._commands, self._efforts, np.zeros(len(WHEEL_JOINTS)))
         self._commands.wait_for_all_acked(ARRIVAL_TIME)
 
     def destroy_node(self) -> None:
-        """Send zero torques and end."""
+        """Send zero torques and destroy the node."""
         if self.context.ok():
             self.stop()
         self._maps.close()
         super().destroy_node()
 
     def _warm_up(self) -> None:
-        """Compile and run everything once, so that the first update is no slower than others."""
+        """Compile and run everything once, so that the first update is as fast as others."""
         service = TractionService(load_traction_settings(self._values))
         joints = dict.fromkeys(JOINTS, 0.0)
         service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
@@ -132,7 +134,7 @@ class TractionController(Node):
         self._used = self.create_publisher(Float64MultiArray, "~/friction_utilisation", qos)
         self._angles = self.create_publisher(Float64MultiArray, "~/contact_angles", qos)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos)
-        # Messages are filled anew, not made anew: publishing copies them.
+        # Messages are reused, which is safe because publishing copies them.
         zeros = np.zeros(len(WHEEL_JOINTS))
         self._contacts = np.zeros((2, len(WHEEL_JOINTS)))
         self._efforts, self._of_wheels = effort_commands(zeros, self._order), wheel_values(zeros)
@@ -185,7 +187,7 @@ class TractionController(Node):
             self.get_logger().warning(f"odometry not used: {error}", throttle_duration_sec=5.0)
 
     def _prepare_map(self, cloud: PointCloud2) -> PreparedMap:
-        """Make a map of a cloud, in the thread of the intake."""
+        """Prepare a map from a cloud; called in the intake's thread."""
         check_frame(cloud.header.frame_id, self._values.map_frame, "elevation_cloud")
         terrain = terrain_from_point_cloud(
             cloud, self._values.map_resolution, self._values.cell_height
@@ -196,7 +198,7 @@ class TractionController(Node):
         self.get_logger().error(f"elevation_cloud refused, the last map stays: {error}")
 
     def update(self) -> None:
-        """Estimate, build, solve and publish; the timer asks for it."""
+        """Estimate, build, solve and publish; called by the timer."""
         start = time.perf_counter()
         try:
             prepared = self._maps.take()
@@ -204,7 +206,7 @@ class TractionController(Node):
                 self._service.take_map(prepared)
             update = self._service.update(_now())
         except Exception as error:
-            # A fault of this program must not leave the wheels with their last torque.
+            # After an internal error the wheels must not keep their last torque.
             update = self._service.rest(f"internal error: {type(error).__name__}: {error}")
         self._send(self._commands, self._efforts, update.torques[self._order])
         if update.answer is not None and update.estimate is not None:
@@ -222,7 +224,7 @@ class TractionController(Node):
         publisher.publish(message)
 
     def _tell(self, update: TractionUpdate) -> None:
-        """Say once what changed."""
+        """Log changes of fault and warning, once each."""
         if update.fault != self._fault:
             if update.fault and not self._fault:
                 self.get_logger().warning(f"zero torque: {update.fault}")
@@ -242,12 +244,15 @@ class TractionController(Node):
 
 
 def _now() -> float:
-    """Return the time by which ages are told [s]; it never jumps."""
+    """Return the monotonic time that ages are measured with [s]."""
     return time.monotonic()
 
 
 class _Stop:
-    """Turns signals into a request: ROS's own handlers end the context before zeros are sent."""
+    """Turns signals into a stop request; ROS's own handlers would end the context too early.
+
+    The context must exist until the zero torques are sent.
+    """
 
     def __init__(self) -> None:
         self.wanted = False
@@ -259,7 +264,7 @@ class _Stop:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the node until it is told to stop; return 2 if a word or parameter is wrong, else 0."""
+    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
     stop = _Stop()
     node = None
     try:

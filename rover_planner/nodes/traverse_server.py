@@ -1,4 +1,4 @@
-"""The node /traverse_server: asks and answers over ROS 2 whether the rover can traverse."""
+"""The node /traverse_server: answers over ROS 2 whether the rover can traverse a path."""
 
 import gc
 import sys
@@ -49,7 +49,7 @@ NODE_NAME = "traverse_server"
 
 
 class TraverseServer(Node):
-    """Wires a TraverseService to ROS: what arrives is understood or refused, never fatal."""
+    """Connects a TraverseService to ROS; invalid messages are refused and never end the node."""
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
@@ -73,18 +73,18 @@ class TraverseServer(Node):
 
     @property
     def service(self) -> TraverseService:
-        """What the node knows."""
+        """The service with the last map, path and joint angles."""
         return self._service
 
     @property
     def reach(self) -> ReachTopics:
-        """What the node knows of the arm's tool."""
+        """The topics and the service of the arm."""
         return self._reach
 
     def _create_subscriptions(self) -> None:
         profiles = map_subscriptions_qos(self._values.map_durability)
         for qos in profiles:
-            # With several profiles a mismatch of one is no news.
+            # With several profiles a mismatch of one of them is expected.
             events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
             self.create_subscription(
                 PointCloud2, "elevation_cloud", self._take_cloud, qos, event_callbacks=events
@@ -93,7 +93,7 @@ class TraverseServer(Node):
         self.create_subscription(Path, "~/path", self._take_path, topic_qos())
 
     def _load_first_map(self) -> str:
-        """Load the map that a parameter names, if it can be loaded, and return its name."""
+        """Load the map of the parameter terrain_file, if it is set; return the file name."""
         file = self._values.terrain_file
         if file:
             try:
@@ -121,7 +121,7 @@ class TraverseServer(Node):
             self.get_logger().error(f"elevation_cloud refused, {kept}: {error}")
 
     def _is_second_copy(self, info) -> bool:
-        """Tell whether the map came through the other subscription already."""
+        """Return whether the same map has already arrived through the other subscription."""
         stamp = info["source_timestamp"]
         if not stamp:
             return False
@@ -161,7 +161,7 @@ class TraverseServer(Node):
             goal = stamped_pose_to_array(request.goal, self._map_frame, "goal")
             judgement = self._service.answer(start, goal, request.tolerance)
             if judgement.traversable:
-                judgement.changes()  # computed here, where a fault makes a refusal
+                judgement.changes()  # computed here, so that an error becomes a refusal
             return judgement
 
         _, response.plan = self._judge("can_traverse", answer)
@@ -174,7 +174,7 @@ class TraverseServer(Node):
     ) -> Trigger.Response:
         def answer() -> Judgement:
             judgement = self._service.check_last_path()
-            _ = judgement.report  # computed here, where a fault makes a refusal
+            _ = judgement.report  # computed here, so that an error becomes a refusal
             return judgement
 
         judgement, _ = self._judge("check_path", answer)
@@ -205,9 +205,9 @@ class TraverseServer(Node):
         return response
 
     def _judge(self, request: str, judge: Callable[[], Judgement]) -> tuple[Judgement, Path]:
-        """Answer a request; whatever is wrong with it makes a refusal. Return the plan too.
+        """Return the judgement of a request and its plan; any error becomes a refusal.
 
-        Results and a line in the log follow when the answer has been sent.
+        Results are published and logged after the answer has been sent.
         """
         judgement = answer_or_refuse(self.get_logger(), request, judge, refusal)
         rover, spacing = self._service.settings.rover, self._values.plan_spacing
@@ -223,7 +223,7 @@ class TraverseServer(Node):
 
 
 def _file_of_url(url: str) -> FilePath | None:
-    """Return the file that a path or a file:// URL names, None for a URL of another kind."""
+    """Return the file of a path or a file:// URL, None for other URLs."""
     parts = urlparse(url)
     if parts.scheme == "file":
         return FilePath(unquote(parts.path)) if parts.netloc in ("", "localhost") else None
@@ -231,7 +231,7 @@ def _file_of_url(url: str) -> FilePath | None:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the node until it is told to stop; return 2 if a word or parameter is wrong, else 0."""
+    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
     logger = rclpy.logging.get_logger(NODE_NAME)
     try:
         if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
@@ -258,10 +258,10 @@ def _run(make_node: Callable[[], Node]) -> None:
         node = make_node()
         executor.add_node(node)
         gc.collect()
-        gc.freeze()  # what lives as long as the node need not be looked through again and again
+        gc.freeze()  # objects that live as long as the node are excluded from garbage collection
         executor.spin()
     except Exception as error:
-        # Whoever is told to stop half-way through the start fails on a context that has ended.
+        # A signal during the start ends the context, and the rest of the start then fails.
         if rclpy.ok():
             raise
         raise ExternalShutdownException from error

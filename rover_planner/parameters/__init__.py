@@ -1,1 +1,1 @@
-"""Parameters of the nodes: a dataclass each, which declaration, checks and docs are made from."""
+"""Node parameters: one dataclass per node, used for declaration, checks and documentation."""

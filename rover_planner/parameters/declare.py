@@ -1,4 +1,4 @@
-"""Declares the table of a node's parameters, checks what others set, and tells the node."""
+"""Declares a node's parameters from their table, checks changes and passes them to the node."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -28,10 +28,10 @@ Table = TypeVar("Table", bound=ParameterTable)
 
 
 def declare_parameters(node: Node, table: type[Table]) -> Table:
-    """Declare the parameters of a table with their descriptors and return their values.
+    """Declare the parameters of a table with their descriptors; return a table of their values.
 
     Raises:
-        ParameterError: An override that the table refuses.
+        ParameterError: An override is not allowed by the table.
     """
     found = []
     for spec in specs_of(table):
@@ -49,14 +49,16 @@ def follow_changes(
     accept: Callable[[Table], object],
     apply: Callable[[Table], None],
 ) -> None:
-    """Refuse bad changes of a node's parameters with the reason; apply the others.
+    """Check changes of a node's parameters: refuse bad ones with a reason, apply the others.
 
     Args:
         node: A node that has declared the table.
-        current: Returns the values in force.
-        accept: Called with all values as they would be; raises where they do not go together.
-        apply: Called with all values after a change. Parameters that are not in the table, such
-            as use_sim_time, pass unchecked and call neither.
+        current: Returns the current values.
+        accept: Called with all values before a change; raises if the combination is invalid.
+        apply: Called with all values after a change.
+
+    Parameters that are not in the table, such as use_sim_time, are accepted without a check and
+    call neither function.
     """
 
     def check(parameters: list[Parameter]) -> SetParametersResult:
@@ -82,7 +84,7 @@ def follow_changes(
 
 
 def _changes(table: type[ParameterTable], parameters: Iterable[Parameter]) -> dict[str, Any]:
-    """Return the values of those parameters that are in a table by name, lists as tuples."""
+    """Return the values of the parameters in a table by name; lists become tuples."""
     names = {spec.name for spec in specs_of(table)}
     return {
         parameter.name: (
@@ -94,7 +96,7 @@ def _changes(table: type[ParameterTable], parameters: Iterable[Parameter]) -> di
 
 
 def _descriptor(spec: ParameterSpec) -> ParameterDescriptor:
-    """Return the descriptor that tools show."""
+    """Return the descriptor that ROS tools show."""
     unit = f" [{spec.unit}]" if spec.unit else ""
     descriptor = ParameterDescriptor(
         name=spec.name, description=spec.meaning + unit, read_only=spec.read_only

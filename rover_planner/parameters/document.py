@@ -1,4 +1,4 @@
-"""Makes docs/parameters.md from the tables."""
+"""Generates docs/parameters.md from the tables."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ TABLES: dict[str, type[ParameterTable]] = {
     "/traction_controller": TractionControllerParameters,
     "/rover_simulator": RoverSimulatorParameters,
 }
-"""Nodes in the order of the document, and the parameters of each."""
+"""Tables of the nodes, by name and in the order of the document."""
 
 
 def parameters_document() -> str:
@@ -51,7 +51,7 @@ def _row(spec: ParameterSpec) -> str:
 
 
 def _allowed(spec: ParameterSpec) -> str:
-    """Return the bounds with their unit, or the choices."""
+    """Return the bounds with their unit, or the choices, as text."""
     if spec.bounds is not None:
         return f"{spec.bounds[0]:g} to {spec.bounds[1]:g} {spec.unit}".rstrip()
     return ", ".join(f"`{choice}`" for choice in spec.choices) or "any"

@@ -12,14 +12,14 @@ ENGINES = (QUASI_STATIC, MUJOCO)
 
 @dataclass(frozen=True)
 class RoverSimulatorParameters(ParameterTable):
-    """Parameters of `/rover_simulator`; each field says what it means."""
+    """Parameters of `/rover_simulator`; the fields document themselves."""
 
     rover: str = parameter(
         "lsr1", "Rover that is simulated: a preset's name or a rover file.", read_only=True
     )
     terrain_file: str = parameter(
         "",
-        "Terrain to drive on: a preset's name or a terrain file; empty makes a Mars-like one.",
+        "Terrain to drive on: a preset's name or a terrain file; empty generates a Mars-like one.",
         read_only=True,
     )
     start_x: float = parameter(
@@ -33,13 +33,13 @@ class RoverSimulatorParameters(ParameterTable):
     )
     engine: str = parameter(
         QUASI_STATIC,
-        "What moves the rover: the quasi-static model, or MuJoCo (extra bench).",
+        "Physics engine: the quasi-static model, or MuJoCo (extra bench).",
         choices=ENGINES,
         read_only=True,
     )
     friction: float = parameter(
         0.0,
-        "Coulomb friction of the ground; 0 takes the terrain's or the rover file's.",
+        "Coulomb friction of the ground; 0 uses that of the terrain or the rover file.",
         bounds=(0.0, 10.0),
         read_only=True,
     )
@@ -58,7 +58,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     speed: float = parameter(
         0.0,
-        "Speed along a path; 0 takes the rover's nominal speed.",
+        "Speed along a path; 0 uses the rover's nominal speed.",
         unit="m/s",
         bounds=(0.0, 10.0),
         read_only=True,
@@ -66,7 +66,7 @@ class RoverSimulatorParameters(ParameterTable):
     follow_commands: bool = parameter(
         False,
         "Whether torques from /traction_controller/commands drive the rover; the simulator then "
-        "publishes cmd_vel, except while it comes from elsewhere.",
+        "publishes cmd_vel unless another node publishes it.",
         read_only=True,
     )
     joints: tuple[str, ...] = parameter(
@@ -74,7 +74,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     timeout: float = parameter(
         0.5,
-        "Age from which cmd_vel and torques are ignored.",
+        "Age above which cmd_vel and torques are ignored.",
         unit="s",
         bounds=(0.01, 10.0),
         read_only=True,
@@ -103,9 +103,9 @@ class RoverSimulatorParameters(ParameterTable):
         read_only=True,
     )
     sensor_occlusion: bool = parameter(
-        True, "Whether ground hides what is behind it.", read_only=True
+        True, "Whether high ground hides the ground behind it.", read_only=True
     )
     seed: int = parameter(
-        1, "Seed of noise and of a made terrain.", bounds=(0, 2**31 - 1), read_only=True
+        1, "Seed of noise and of a generated terrain.", bounds=(0, 2**31 - 1), read_only=True
     )
     map_frame: str = parameter("map", "Frame of map, path and odometry.", read_only=True)

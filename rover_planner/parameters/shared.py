@@ -1,40 +1,40 @@
-"""Parameters that several nodes have, each written once."""
+"""Parameters that several nodes share."""
 
 from msg_adapters.gridding import CELL_HEIGHTS
 from rover_planner.parameters.table import ParameterError, parameter
 
 OWN_PAYLOAD = -1.0
-"""Value of the parameter payload that takes the payload of the rover file."""
+"""Value of the parameter payload that selects the payload of the rover file [kg]."""
 EITHER, TRANSIENT_LOCAL, VOLATILE = "either", "transient_local", "volatile"
 MAP_DURABILITIES = (EITHER, TRANSIENT_LOCAL, VOLATILE)
-"""Values of the parameter map_durability; `rover_planner.ros.qos` says what they mean."""
+"""Values of the parameter map_durability; `rover_planner.ros.qos` explains them."""
 
 
 def max_torque_parameter() -> float:
-    """Return the field of the largest wheel torque."""
+    """Return the field of the parameter max_torque [N m]."""
     return parameter(
         0.0,
-        "Largest torque of a wheel; 0 takes the rover file's.",
+        "Largest torque of a wheel; 0 uses that of the rover file.",
         unit="N m",
         bounds=(0.0, 1e6),
     )
 
 
 def payload_parameter() -> float:
-    """Return the field of the payload; `payload_or_none` reads its value."""
+    """Return the field of the parameter payload [kg]; `payload_or_none` reads its value."""
     return parameter(
         OWN_PAYLOAD,
-        "Mass at the tip of the manipulator; -1 takes the rover file's.",
+        "Mass at the tip of the manipulator; -1 uses that of the rover file.",
         unit="kg",
         bounds=(OWN_PAYLOAD, 1e6),
     )
 
 
 def payload_or_none(payload: float) -> float | None:
-    """Return a payload [kg], None where it is that of the rover file.
+    """Return the payload [kg], None for that of the rover file.
 
     Raises:
-        ParameterError: A mass below 0.
+        ParameterError: The payload is below 0 and not OWN_PAYLOAD.
     """
     if payload == OWN_PAYLOAD:
         return None
@@ -47,17 +47,17 @@ def payload_or_none(payload: float) -> float | None:
 
 
 def map_resolution_parameter() -> float:
-    """Return the field of the cell size of a map."""
+    """Return the field of the parameter map_resolution [m]."""
     return parameter(
         0.0,
-        "Cell size for clouds; 0 takes their spacing where they are a regular grid.",
+        "Cell size for clouds; 0 uses the spacing of their points, which must be a regular grid.",
         unit="m",
         bounds=(0.0, 10.0),
     )
 
 
 def cell_height_parameter() -> str:
-    """Return the field of how a cell's height is chosen."""
+    """Return the field of the parameter cell_height."""
     return parameter(
         CELL_HEIGHTS[0],
         "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
@@ -66,7 +66,7 @@ def cell_height_parameter() -> str:
 
 
 def map_durability_parameter() -> str:
-    """Return the field of the durability of the map's publishers."""
+    """Return the field of the parameter map_durability."""
     return parameter(
         EITHER,
         "Durability of the map publishers to subscribe to.",

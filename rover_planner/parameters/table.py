@@ -1,4 +1,4 @@
-"""Tables of node parameters: dataclasses whose fields have a meaning, a unit and bounds."""
+"""Base of the tables of node parameters: dataclasses whose fields have meaning, unit, bounds."""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -18,7 +18,7 @@ _ROS_TYPES: dict[Any, str] = {
 
 
 class ParameterError(PlanningError):
-    """A parameter with a value that is not allowed; names it, the value and what is allowed."""
+    """A parameter value that is not allowed; the text says which values are allowed."""
 
 
 def parameter(
@@ -30,7 +30,7 @@ def parameter(
     choices: tuple[str, ...] = (),
     read_only: bool = False,
 ) -> Value:
-    """Make a field of a `ParameterTable`; `ParameterSpec` says what the arguments are."""
+    """Make a field of a `ParameterTable`; `ParameterSpec` explains the arguments."""
     made: Any = field(
         default=default,
         metadata={
@@ -41,40 +41,41 @@ def parameter(
             "read_only": read_only,
         },
     )
-    return made  # a field to the dataclass, the type of its value to a type checker
+    return made  # a dataclass field at run time; type checkers see the type of its value
 
 
 @dataclass(frozen=True)
 class ParameterSpec:
-    """One row of a table: what is allowed for a parameter and what it means."""
+    """One row of a table: meaning, default and allowed values of a parameter."""
 
     name: str
     """Name of the parameter, and of the field."""
     type_name: str
-    """Type as ROS calls it."""
+    """ROS name of the type."""
     default: Any
     """Default value."""
     meaning: str
-    """One sentence for `ros2 param describe` and the docs."""
+    """Meaning, in one sentence, for `ros2 param describe` and the documentation."""
     unit: str
-    """Unit, empty where there is none."""
+    """Unit, empty if there is none."""
     bounds: tuple[float, float] | None
-    """Smallest and largest allowed number; None for any."""
+    """Smallest and largest allowed number, in `unit`; None allows any."""
     choices: tuple[str, ...]
-    """Allowed texts; empty for any."""
+    """Allowed texts; empty allows any."""
     read_only: bool
-    """Whether the value is fixed once the node runs."""
+    """Whether the value is fixed after the start of the node."""
 
     @property
     def ros_default(self) -> Any:
-        """Default value as ROS takes it: a list for a tuple."""
+        """Default value for ROS: a tuple becomes a list."""
         return list(self.default) if isinstance(self.default, tuple) else self.default
 
     def check(self, value: Any) -> None:
-        """Refuse a value of the wrong type, NaN, empty, out of bounds or not among the choices.
+        """Check a value.
 
         Raises:
-            ParameterError: Names the parameter, the value and what is allowed.
+            ParameterError: The value has a wrong type, is NaN, empty, out of bounds or not one
+                of the choices.
         """
         if type(value) is not type(self.default):
             raise ParameterError(
@@ -104,10 +105,10 @@ class ParameterSpec:
 
 @dataclass(frozen=True)
 class ParameterTable:
-    """Base of the parameters of a node: all values of a table are checked when it is made.
+    """Base class of a node's parameters; the constructor checks all values.
 
     Raises:
-        ParameterError: A value that `ParameterSpec.check` refuses.
+        ParameterError: `ParameterSpec.check` refuses a value.
     """
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ from rover_planner.parameters.table import ParameterTable, parameter
 
 @dataclass(frozen=True)
 class TractionControllerParameters(ParameterTable):
-    """Parameters of `/traction_controller`; each field says what it means."""
+    """Parameters of `/traction_controller`; the fields document themselves."""
 
     rover: str = parameter("lsr1", "Rover that is driven: a preset's name or a rover file.")
     joints: tuple[str, ...] = parameter(
@@ -32,15 +32,15 @@ class TractionControllerParameters(ParameterTable):
     )
     timeout: float = parameter(
         0.08,
-        "Age from which joint states, attitude and cmd_vel are stale; torques are then zero.",
+        "Age above which joint states, attitude and cmd_vel are stale; torques are then zero.",
         unit="s",
         bounds=(0.01, 1.0),
     )
     odometry_timeout: float = parameter(
-        0.5, "Age from which odometry is not used.", unit="s", bounds=(0.01, 10.0)
+        0.5, "Age above which odometry is not used.", unit="s", bounds=(0.01, 10.0)
     )
     friction: float = parameter(
-        0.0, "Assumed Coulomb friction; 0 takes the rover file's.", bounds=(0.0, 10.0)
+        0.0, "Assumed Coulomb friction; 0 uses that of the rover file.", bounds=(0.0, 10.0)
     )
     max_torque: float = max_torque_parameter()
     payload: float = payload_parameter()
@@ -63,7 +63,7 @@ class TractionControllerParameters(ParameterTable):
     )
     slip_gain: float = parameter(
         1.0,
-        "Torque against a wheel that leaves its rolling speed, in weights times radius squared.",
+        "Torque per difference of a wheel's rate from rolling, in weights times radius squared.",
         unit="s/m",
         bounds=(0.0, 1e3),
     )

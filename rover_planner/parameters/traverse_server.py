@@ -19,12 +19,12 @@ REFUSE, INTERPOLATE = "refuse", "interpolate"
 
 @dataclass(frozen=True)
 class TraverseServerParameters(ParameterTable):
-    """Parameters of `/traverse_server`; each field says what it means."""
+    """Parameters of `/traverse_server`; the fields document themselves."""
 
-    rover: str = parameter("lsr1", "Rover to ask about: a preset's name or a rover file.")
+    rover: str = parameter("lsr1", "Rover of all queries: a preset's name or a rover file.")
     friction: float = parameter(
         0.0,
-        "Coulomb friction where the map has none; 0 takes the rover file's.",
+        "Coulomb friction where the map has none; 0 uses that of the rover file.",
         bounds=(0.0, 10.0),
     )
     max_torque: float = max_torque_parameter()
@@ -73,8 +73,8 @@ class TraverseServerParameters(ParameterTable):
     )
     map_sigmas: float = parameter(
         SIGMAS,
-        "Standard deviations by which heights may be wrong where the map has elevation_std; "
-        "0 takes them as exact.",
+        "Standard deviations of the heights to allow for if the map has elevation_std; "
+        "0 treats heights as exact.",
         bounds=(0.0, 10.0),
     )
     terrain_file: str = parameter(
@@ -84,7 +84,7 @@ class TraverseServerParameters(ParameterTable):
     )
     suspension_tolerance: float = parameter(
         0.1,
-        "Difference of measured and predicted suspension angles that raises a warning.",
+        "Largest difference of measured and predicted suspension angles without a warning.",
         unit="rad",
         bounds=(0.0, 3.2),
     )

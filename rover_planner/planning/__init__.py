@@ -1,1 +1,1 @@
-"""What a mission planner asks, without ROS: candidate paths, their verdicts, the answer."""
+"""Path planning without ROS: candidate paths, their verdicts, and the answers to queries."""

@@ -1,12 +1,12 @@
-"""Candidate paths in the plane between two poses: a direct connection and a fan beside it.
+"""Generates candidate paths in the plane between two poses: a direct curve and a fan around it.
 
-Every candidate is driven forward, leaves the start along its heading and arrives along the goal's
-heading. The direct connection is a cubic Hermite curve, a straight line where both headings point
-along it. The fan adds a cosine bump across the chord to it, whose slope is zero at both ends, so
-both headings stay exact. Curves tighter than the smallest radius are dropped. Where even the
-direct connection is too tight (headings that oppose each other, a goal behind the rover) the arcs
-and lines of Dubins (1957) take over; they connect any two poses with the smallest radius, so there
-is always a candidate.
+Every candidate is driven forward, leaves the start along the start's heading and arrives along the
+goal's heading. The direct connection is a cubic Hermite curve; it is a straight line if both
+headings point along the chord. The fan adds cosine bumps across the chord. Their slope is zero at
+both ends, so that both headings remain exact. Curves tighter than the smallest radius are dropped.
+If the direct connection is too tight (opposite headings, a goal behind the rover), the arcs and
+lines of Dubins (1957) are used instead. They connect any two poses with the smallest radius, so
+that at least one candidate exists.
 """
 
 import numpy as np
@@ -21,21 +21,24 @@ from rover_planner.planning.curve_kernels import (
 from rover_planner.planning.dubins import dubins_paths
 
 MIN_RADIUS = 0.8
-"""Smallest radius of a candidate [m], unless told: the wheelbase of the LSR-1 preset.
+"""Default smallest radius of a candidate [m]: the wheelbase of the LSR-1 preset.
 
-With the radius equal to the wheelbase and steered end wheels, those on the inside turn by about
-40 degrees.
+If the radius equals the wheelbase, the inner end wheels are steered by about 40 degrees.
 """
 
 MAX_WAYPOINTS = 100_000
-"""Longest path worth sweeping [waypoints]; a longer one is a slip in the units of the request."""
+"""Longest path [waypoints]; a longer one is probably an error in the units of the request."""
 
 _SAME_PLACE = 1e-9
+"""Distance below which start and goal are the same position [m]."""
 _LONG_WAY_ROUND = 1.5
+"""Dubins paths longer than the shortest one by more than this factor are dropped."""
 _FINE_SAMPLES = 501
+"""Samples of a curve from which its waypoints are interpolated."""
 _FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
-"""Parameters of the fine samples, and half-way between them."""
+"""Curve parameters of the fine samples and half-way between them."""
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
+"""Lengths of the end tangents in chords; the first one whose direct curve is drivable is used."""
 
 
 def generate_candidates(
@@ -47,7 +50,7 @@ def generate_candidates(
     waypoint_spacing: float = 0.02,
     min_radius: float = MIN_RADIUS,
 ) -> list[np.ndarray]:
-    """Make candidate paths from start to goal, the direct one first, then outwards to both sides.
+    """Generate candidate paths from start to goal: the direct one first, then outwards.
 
     Args:
         start: x, y [m] and yaw [rad] of the body origin in the map frame.
@@ -59,9 +62,9 @@ def generate_candidates(
 
     Returns:
         One to `count` arrays (n, 3) of x, y [m] and yaw [rad, in -pi to pi], yaw along the
-        tangent. The waypoints of a path are equally far apart along it, at most
-        `waypoint_spacing`; the first is the start and the last the goal. One single pose where
-        start and goal are the same.
+        tangent. The waypoints of a path are equidistant along it, at most `waypoint_spacing`
+        apart; the first is the start and the last the goal. A single pose if start and goal are
+        the same.
 
     Raises:
         PlanningError: An argument is NaN or out of range, or the path has more than MAX_WAYPOINTS.
@@ -88,17 +91,17 @@ def generate_candidates(
 
 
 def lateral_offsets(count: int, spacing: float) -> list[float]:
-    """List the lateral offsets of a fan [m]: 0, then left and right in turn, ever further."""
+    """Return the lateral offsets of a fan [m]: 0, then left and right alternately, outwards."""
     return [spacing * ((k + 1) // 2) * (1 if k % 2 else -1) for k in range(count)]
 
 
 def path_length(poses: np.ndarray) -> float:
-    """Return the length [m] of a path of poses (n, 3), measured along its chords."""
+    """Return the length [m] of a path of poses (n, 3): the sum of its straight segments."""
     return float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
 
 
 def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:
-    """Sample the direct curve and its neighbours; nothing where the direct one is too tight."""
+    """Sample the direct curve and its neighbours; return [] if the direct one is too tight."""
     for scale in _TANGENT_SCALES:
         fan = _Fan(start, goal, scale)
         curves = (_Curve(fan, offset) for offset in lateral_offsets(count, spacing))
@@ -110,7 +113,7 @@ def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> lis
 
 
 def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
-    """Sample the Dubins paths that are no long way round."""
+    """Sample the Dubins paths that are not much longer than the shortest one."""
     words = dubins_paths(start, goal, min_radius, waypoint_spacing)
     paths = [np.column_stack(word) for word in words[:count]]
     longest = _LONG_WAY_ROUND * path_length(paths[0])
@@ -120,15 +123,15 @@ def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.nda
 _FINE_WEIGHTS = np.array(
     [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
 )
-"""What chord, start and end tangent count for in the slope at the fine samples, (3, n)."""
+"""Weights (3, n) of chord, start and end tangent in the derivative at the fine samples."""
 _FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
-"""First derivative there of a bump of one metre."""
+"""First derivative at the fine samples of a bump of one metre."""
 
 
 class _Fan:
-    """Curves of a parameter in 0 to 1: the Hermite cubic, and beside it with bumps of some metres.
+    """Parametric curves over 0 to 1: the Hermite cubic plus bumps of given height.
 
-    `scale` times the chord is the length of the end tangents.
+    The length of the end tangents is `scale` times the chord.
     """
 
     def __init__(self, start: np.ndarray, goal: np.ndarray, scale: float):
@@ -143,7 +146,7 @@ class _Fan:
 
 
 class _Curve:
-    """One curve of a fan, and how fast it is driven at the fine samples and between them."""
+    """One curve of a fan with its derivative at the fine samples and between them."""
 
     def __init__(self, fan: _Fan, offset: float):
         self._fan, self._offset = fan, float(offset)
@@ -151,14 +154,14 @@ class _Curve:
         self._speed = np.hypot(self._slope[0], self._slope[1])
 
     def is_drivable(self, min_radius: float) -> bool:
-        """Tell whether the tightest place of the curve is no tighter than `min_radius` [m]."""
+        """Return whether no radius of the curve is smaller than `min_radius` [m]."""
         ends = self._speed[::2]
         if ends.min() <= 1e-6 * ends.max():
             return False
         return bool(turns_within(self._slope, self._speed, float(min_radius)))
 
     def sample(self, waypoint_spacing: float) -> np.ndarray:
-        """Sample poses (n, 3) equally far apart along the curve."""
+        """Sample equidistant poses (n, 3), at most `waypoint_spacing` [m] apart."""
         ends, middles = self._speed[::2], self._speed[1::2]
         pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
         driven = np.concatenate([[0.0], np.cumsum(pieces)])
@@ -174,14 +177,14 @@ class _Curve:
 
 
 def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Put the exact start and goal at the ends of a path, which are right but for rounding."""
+    """Replace the ends of a path by the exact start and goal, which removes rounding errors."""
     path[0], path[-1] = start, goal
     path[:, 2] = _wrap(path[:, 2])
     return path
 
 
 def _wrap(angle):
-    """Bring an angle [rad] into -pi to pi, leaving those inside as they are."""
+    """Wrap an angle [rad] into -pi to pi; angles inside stay unchanged."""
     inside = np.abs(angle) <= np.pi
     if inside.all():
         return angle

@@ -1,4 +1,4 @@
-"""Loops over the samples of a candidate's curve."""
+"""Compiled loops over the samples of a candidate's curve."""
 
 from typing import NamedTuple
 
@@ -9,10 +9,10 @@ from rover_physics.numerics.kernels import exact_kernel
 
 @exact_kernel
 def interpolate(at, x, y, slopes, values):
-    """Write what the cubic Hermite spline through (x, y) with these slopes is at ascending places.
+    """Evaluate the cubic Hermite spline through (x, y) with given slopes at ascending `at`.
 
-    scipy has it, but to import its interpolation takes a tenth of the time a server needs to
-    start.
+    The result is written into `values`. scipy has this spline, but importing scipy.interpolate
+    takes a tenth of the start time of a server.
     """
     i = 0
     for k in range(at.size):
@@ -26,11 +26,11 @@ def interpolate(at, x, y, slopes, values):
 
 @exact_kernel
 def turns_within(slopes, speeds, min_radius):
-    """Tell whether a curve turns nowhere tighter than `min_radius` [m].
+    """Return whether no radius of a curve is smaller than `min_radius` [m].
 
     Args:
         slopes: (2, 2 n - 1) first derivatives at n samples and half-way between them [m].
-        speeds: (2 n - 1,) their lengths [m].
+        speeds: (2 n - 1,) norms of the derivatives [m].
         min_radius: Smallest radius [m].
     """
     pieces = speeds.size // 2
@@ -44,12 +44,12 @@ def turns_within(slopes, speeds, min_radius):
 
 
 class BumpedCurve(NamedTuple):
-    """The Hermite cubic between two places, and beside it a cosine bump; vectors (2,) in [m]."""
+    """A Hermite cubic between two points plus a cosine bump; vectors (2,) in [m]."""
 
     start: np.ndarray
     """Where it begins."""
     chord: np.ndarray
-    """From there to its end."""
+    """Vector from the start to the end of the curve."""
     m0: np.ndarray
     """Tangent at the start."""
     m1: np.ndarray
@@ -62,7 +62,7 @@ class BumpedCurve(NamedTuple):
 
 @exact_kernel
 def follow_curve(t, curve, poses, slopes):
-    """Write places [m] into poses (n, 3) and first derivatives (2, n) at parameters t (n,)."""
+    """Write positions [m] into poses (n, 3) and first derivatives (2, n) at parameters t (n,)."""
     start, chord, m0, m1 = curve.start, curve.chord, curve.m0, curve.m1
     left, offset = curve.left, curve.offset
     for k in range(t.size):

@@ -8,22 +8,23 @@ Journal of Mathematics 79(3). The six words are solved in the normalised form of
 import numpy as np
 
 _TURN = {"L": 1.0, "S": 0.0, "R": -1.0}
+"""Curvature of each letter of a word, in 1 / radius, positive to the left."""
 
 
 def dubins_paths(
     start: np.ndarray, goal: np.ndarray, radius: float, waypoint_spacing: float
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Connect two poses by every Dubins word that exists, the shortest first.
+    """Return the Dubins paths between two poses, the shortest first.
 
     Args:
-        start: x, y [m] and yaw [rad], (3,).
-        goal: The same.
+        start: (3,) x, y [m] and yaw [rad].
+        goal: (3,) x, y [m] and yaw [rad].
         radius: Radius of the arcs [m].
         waypoint_spacing: Largest distance between waypoints along the path [m].
 
     Returns:
-        One to six paths, each x (n,), y (n,) [m] and yaw (n,) [rad], with waypoints equally far
-        apart.
+        One to six paths, each x (n,), y (n,) [m] and yaw (n,) [rad], with equidistant
+        waypoints.
     """
     dx, dy = (goal[:2] - start[:2]) / radius
     bearing = np.arctan2(dy, dx)
@@ -34,9 +35,9 @@ def dubins_paths(
 
 
 def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, float, float]]]:
-    """Solve the six words for headings a, b to the chord [rad] and its length d [radii].
+    """Solve the six words for headings a, b relative to the chord [rad] and its length d [radii].
 
-    Returns each word that exists with the lengths of its three pieces [radii; rad on arcs].
+    Return each word that exists, with the lengths of its three pieces [radii; rad on arcs].
     """
     sa, ca, sb, cb, cab = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.cos(a - b)
     words = []
@@ -73,7 +74,7 @@ def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, f
 
 
 def _drive(start, word, pieces, radius, waypoint_spacing):
-    """Sample a word from the start: x, y, yaw, equally far apart along it."""
+    """Sample a word from the start; return equidistant x, y, yaw (n,)."""
     ends = np.concatenate([[0.0], np.cumsum(pieces)])
     steps = max(1, int(np.ceil(ends[-1] * radius / waypoint_spacing - 1e-9)))
     driven = np.linspace(0.0, ends[-1], steps + 1)
@@ -87,7 +88,7 @@ def _drive(start, word, pieces, radius, waypoint_spacing):
 
 
 def _advance(x, y, yaw, turn, s):
-    """Move by s [radii] along a unit arc to the left (turn 1), right (-1), or straight (0)."""
+    """Return the pose after s [radii] along a left (turn 1) or right (-1) arc or a line (0)."""
     if turn == 0.0:
         return x + s * np.cos(yaw), y + s * np.sin(yaw), yaw + 0.0 * s
     after = yaw + turn * s
@@ -99,6 +100,6 @@ def _advance(x, y, yaw, turn, s):
 
 
 def _turn(angle: float) -> float:
-    """Bring an angle [rad] into 0 to 2 pi, with one that is a full turn but for rounding at 0."""
+    """Wrap an angle [rad] into 0 to 2 pi; a full turn within rounding errors becomes 0."""
     turned = float(np.mod(angle, 2 * np.pi))
     return 0.0 if 2 * np.pi - turned < 1e-9 else turned

@@ -1,4 +1,4 @@
-"""Where a rover could be asked to go on a map: a start, goals on plain ground, and hard goals."""
+"""Chooses a start and goals on a map for demos: goals on plain ground and difficult goals."""
 
 from dataclasses import dataclass
 
@@ -13,27 +13,32 @@ from rover_planner.errors import PlanningError
 Pose = tuple[float, float, float]
 
 _STARTS = 200
+"""Largest number of places that are tried as a start."""
 _RAYS = 72
+"""Directions in which the clear distance from a start is measured: every 5 degrees."""
 _VIEWS = 721
+"""Directions in which the known ground around the start is measured: every half degree."""
 _HALF_CONE = np.deg2rad(50.0)
+"""Half angle of the cone ahead of the start that holds the goals on plain ground [rad]."""
 _WIDE_CONE = np.deg2rad(75.0)
+"""Half angle of the cone ahead of the start that holds the goal off the map [rad]."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A place to ask for."""
+    """A goal of a mission."""
 
     name: str
-    """A letter for tables and pictures."""
+    """Letter that names it in tables and pictures."""
     intent: str
-    """Why it is asked for: "plain", "rough", "steep", "unknown ground" or "off the map"."""
+    """Kind of goal: "plain", "rough", "steep", "unknown ground" or "off the map"."""
     pose: Pose
     """x, y [m] and yaw [rad] of the body origin, map frame."""
 
 
 @dataclass(frozen=True)
 class Mission:
-    """Where the rover stands and where it is asked to go."""
+    """The start of a rover and its goals."""
 
     start: Pose
     """x, y [m] and yaw [rad] of the body origin, map frame."""
@@ -43,22 +48,22 @@ class Mission:
 
 @dataclass(frozen=True)
 class _Ground:
-    """What the map looks like to a rover: one value per cell, for a rover centred there."""
+    """Properties of a map for a rover: one value per cell, for a rover centred there."""
 
     terrain: Terrain
     slope: NDArray[np.float64]
-    """Mean slope under the rover (ny, nx) [rise over run], NaN where its footprint is unknown."""
+    """Mean slope under the rover (ny, nx) [rise over run]; NaN if the footprint is not known."""
     gentle: NDArray[np.bool_]
-    """Where the footprint (ny, nx) is known and its slope at most half of the tilt limit."""
+    """Mask (ny, nx): the footprint is known and its slope is at most half of the tilt limit."""
     difficulty: NDArray[np.float64]
-    """Slopes and steps (ny, nx) as a share of what the rover is built for, NaN likewise."""
+    """Slopes and steps (ny, nx) relative to the rover's capability; NaN as in `slope`."""
     reach: float
-    """How far a goal may be [m]."""
+    """Largest distance of a goal from the start [m]."""
     near: float
-    """How near a goal may be [m]."""
+    """Smallest distance of a goal from the start [m]."""
 
     def cells(self, x, y) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
-        """Return row and column of points, and which of them are on the map."""
+        """Return row and column of points x, y [m], and a mask of those on the map."""
         ny, nx = self.slope.shape
         column = np.rint((np.asarray(x) - self.terrain.origin[0]) / self.terrain.resolution)
         row = np.rint((np.asarray(y) - self.terrain.origin[1]) / self.terrain.resolution)
@@ -77,21 +82,21 @@ class _Ground:
 
 
 def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: int = 4) -> Mission:
-    """Choose a start and goals from what a map shows; the verdicts are the model's business.
+    """Choose a start and goals by the heights of a map; the model is not used.
 
-    The start is on gentle known ground with much of the same ahead. Goals on the plain can be
-    reached over such ground as the crow flies, rocks aside. Then come the roughest ground with
-    known ground all the way to it, the steepest known ground, unknown ground where the map has
-    any, and a place beyond its edge.
+    The start is on gentle known ground with much gentle ground ahead. Goals on plain ground are
+    reached from it on a straight line over gentle ground, apart from rocks. The other goals are
+    the roughest ground with known ground all the way to it, the steepest known ground, unknown
+    ground if the map has any, and a point beyond the edge of the map.
 
     Args:
         terrain: The map, with or without unknown cells.
-        rover: The rover; its size and wheels decide what is gentle and how far goals are.
+        rover: The rover; its size and wheels define gentle ground and the distance of goals.
         seed: Seed of the choice among equally good places.
-        plain_goals: How many goals to choose on the plain; there are fewer if the map is small.
+        plain_goals: Largest number of goals on plain ground; a small map has fewer.
 
     Raises:
-        PlanningError: Nowhere is all the ground under the rover known.
+        PlanningError: The map has no place where all ground under the rover is known.
     """
     rng = np.random.default_rng(seed)
     ground = _survey(terrain, rover)
@@ -111,7 +116,7 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: i
 
 
 def footprint_radius(rover: Rover) -> float:
-    """Return how far [m] the wheels reach from the body origin, seen from above."""
+    """Return the largest horizontal distance [m] of the wheels from the body origin."""
     wheel = rover.wheel
     return max(
         float(np.hypot(abs(x) + wheel.radius, abs(y) + 0.5 * wheel.width))
@@ -122,7 +127,7 @@ def footprint_radius(rover: Rover) -> float:
 def _survey(terrain: Terrain, rover: Rover) -> _Ground:
     """Measure slopes and steps under a rover centred on each cell."""
     known = np.isfinite(terrain.elevation)
-    # Unknown cells take the nearest known height, so that the rim of a gap is no step.
+    # Unknown cells get the nearest known height, so that the rim of a gap is not a step.
     nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
     z = terrain.elevation[tuple(nearest)]
     side = _odd_cells(2 * footprint_radius(rover), terrain.resolution)
@@ -152,7 +157,7 @@ def _survey(terrain: Terrain, rover: Rover) -> _Ground:
 
 
 def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
-    """Choose the place and heading on gentle ground with the most of it ahead."""
+    """Choose the position and heading on gentle ground with the most gentle ground ahead."""
     rows, columns = np.nonzero(np.isfinite(ground.difficulty))
     share = ground.difficulty[rows, columns]
     gentle = share <= max(0.5, np.quantile(share, 0.1))
@@ -167,7 +172,10 @@ def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
 
 
 def _sight(ground: _Ground, clear: NDArray[np.bool_], x, y, bearings) -> NDArray[np.float64]:
-    """Return how far [m] cells (ny, nx) are clear from places (n,) in directions (m,): (n, m)."""
+    """Return the clear distance (n, m) [m] from points (n,) in directions (m,) [rad].
+
+    `clear` is a mask (ny, nx) of the cells.
+    """
     step = max(2 * ground.terrain.resolution, ground.reach / 60)
     distances = np.arange(0.0, ground.reach, step)
     px = x[:, None, None] + distances * np.cos(bearings)[:, None]
@@ -177,7 +185,7 @@ def _sight(ground: _Ground, clear: NDArray[np.bool_], x, y, bearings) -> NDArray
 
 
 def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
-    """Choose goals in sight of the start, in directions spread over the cone ahead."""
+    """Choose goals in sight of the start, in directions spread over a cone ahead."""
     bearings = start[2] + np.linspace(-_HALF_CONE, _HALF_CONE, 4 * count + 1)
     sight = _sight(ground, ground.gentle, np.array([start[0]]), np.array([start[1]]), bearings)[0]
     goals: list[Pose] = []
@@ -208,7 +216,7 @@ def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
 
 
 def _choose_rough(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the most difficult place to which all ground is known, somewhat rather ahead."""
+    """Choose the most difficult place with known ground all the way, preferably ahead."""
     distance, turn = _polar(ground, start)
     bearings = np.linspace(-np.pi, np.pi, _VIEWS)
     known = np.isfinite(ground.slope)
@@ -219,7 +227,7 @@ def _choose_rough(ground: _Ground, start: Pose) -> Pose | None:
 
 
 def _choose_steep(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the steepest known ground, somewhat rather ahead than behind."""
+    """Choose the steepest known ground, preferably ahead."""
     distance, turn = _polar(ground, start)
     score = ground.slope * (1 - turn / (2 * np.pi))
     score = np.where(distance <= 1.2 * ground.reach, score, -np.inf)
@@ -237,7 +245,7 @@ def _choose_unknown(ground: _Ground, start: Pose) -> Pose | None:
 
 
 def _choose_off_map(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose a place beyond the nearest edge of the map ahead."""
+    """Choose a point beyond the nearest edge of the map ahead."""
     bearings = start[2] + np.linspace(-_WIDE_CONE, _WIDE_CONE, 61)
     xmin, xmax, ymin, ymax = ground.terrain.bounds
     with np.errstate(divide="ignore"):
@@ -252,7 +260,7 @@ def _choose_off_map(ground: _Ground, start: Pose) -> Pose | None:
 
 
 def _choose_cell(ground: _Ground, start: Pose, score: NDArray[np.float64]) -> Pose | None:
-    """Return the cell of the highest score (ny, nx) not too near, None if all are -inf."""
+    """Return the cell with the highest score (ny, nx) beyond `near`, None if all are -inf."""
     distance, _ = _polar(ground, start)
     allowed = np.where(distance >= ground.near, score, -np.inf)
     best = np.unravel_index(np.argmax(allowed), allowed.shape)
@@ -271,19 +279,19 @@ def _polar(ground: _Ground, start: Pose) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def _bearing(ground: _Ground, start: Pose) -> NDArray[np.float64]:
-    """Return the direction [rad] of every cell (ny, nx) as seen from the start."""
+    """Return the direction [rad] of every cell (ny, nx) from the start, map frame."""
     ny, nx = ground.slope.shape
     x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
     return np.arctan2(y - start[1], x - start[0])
 
 
 def _facing(start: Pose, x: float, y: float) -> Pose:
-    """Return a pose at x, y whose heading is one that a gentle curve from the start ends with."""
+    """Return a pose at x, y [m] with the end heading of a gentle curve from the start."""
     bearing = np.arctan2(y - start[1], x - start[0])
     turn = float(np.angle(np.exp(1j * (bearing - start[2]))))
     return (x, y, float(bearing + (0.5 * turn if abs(turn) < _WIDE_CONE else 0.0)))
 
 
 def _odd_cells(width: float, resolution: float) -> int:
-    """Return the odd number of cells nearest above a width [m]."""
+    """Return the smallest odd number of cells that is not narrower than a width [m]."""
     return 2 * int(np.ceil(0.5 * width / resolution)) + 1

@@ -1,4 +1,4 @@
-"""The answer to one request: yes or no at once, its report on demand."""
+"""The answer to one request: the verdict at once, its report on demand."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,40 +20,40 @@ class Judgement:
     """A judged path, or a refusal before any path was judged."""
 
     code: str
-    """Why not, as one of the codes of a verdict; empty if traversable."""
+    """Code of the reason why not, as in a verdict or refusal; empty if traversable."""
     reason: str
-    """Why not, in words; empty if traversable."""
+    """Reason why not, in words; empty if traversable."""
     candidate: Candidate | None = None
-    """The path that was judged; None where the request was refused before."""
+    """The judged path; None if the request was refused before."""
     classify: Callable[[], tuple[ClassifiedWaypoint, ...]] = tuple
     """Classifies the waypoints; may sweep the path once more."""
     suspension: SuspensionReport | None = None
-    """Comparison with the measured suspension, None without measurements."""
+    """Comparison with the measured suspension; None without measurements."""
     search: PathSearch | None = None
-    """The search that found the path, None where the path was given."""
+    """The search that found the path; None if the path was given."""
 
     @property
     def traversable(self) -> bool:
-        """Whether the rover may drive."""
+        """Whether the rover may drive the path."""
         return self.candidate is not None and self.candidate.verdict.traversable
 
     @cached_property
     def classes(self) -> tuple[ClassifiedWaypoint, ...]:
-        """The class of each waypoint; empty where no path was judged. Computed on first use."""
+        """The class of each waypoint; empty if no path was judged. Computed on first use."""
         return self.classify()
 
     @cached_property
     def report(self) -> VerdictReport:
-        """All that is said about the request. Computed on first use, with the classes."""
+        """The full report of the request. Computed on first use, with the classes."""
         if self.candidate is None:
             return VerdictReport(False, self.code, self.reason)
         return report_path(self.candidate, self.classes, self.suspension, self.search)
 
     def changes(self) -> NDArray[np.intp]:
-        """Return the indices of waypoints that have another class than the one before."""
+        """Return the indices (m,) of waypoints whose class differs from that of the one before."""
         candidate = self.candidate
         if candidate is None or (self.traversable and candidate.verdict.policy == EQUAL):
-            return np.empty(0, np.intp)  # all waypoints have the same class: no need to classify
+            return np.empty(0, np.intp)  # all waypoints have the same class
         names = np.array([waypoint.traversability_class for waypoint in self.classes])
         return np.flatnonzero(names[1:] != names[:-1]) + 1
 
@@ -69,5 +69,5 @@ class Judgement:
 
 
 def refusal(code: str, reason: str) -> Judgement:
-    """Refuse a request before any path was judged."""
+    """Return the refusal of a request without a judged path."""
     return Judgement(code, reason)

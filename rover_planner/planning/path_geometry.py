@@ -1,4 +1,4 @@
-"""Geometry around a path: waypoints put between its poses, and rings of goals around its end."""
+"""Geometry of paths: waypoints between given poses, and rings of goals around a goal."""
 
 import math
 from collections.abc import Iterator
@@ -10,18 +10,22 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import MAX_WAYPOINTS
 
 _RING_STEP = 0.1
+"""Largest distance between rings [m], if MAX_RINGS allows it."""
 _MAX_RINGS = 4
+"""Largest number of rings: each goal costs an evaluation."""
 _RING_GOALS = 8
+"""Goals on each ring: every 45 degrees."""
 
 
 def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """Put waypoints between the poses (n, 3) of a path until none are further apart.
+    """Insert waypoints into a path so that neighbours are at most `spacing` apart.
 
-    The given poses stay. Between them x and y run along the straight line and the heading turns
-    evenly the shorter way; the turn on the spot of poses at one place stays one step.
+    The given poses stay. Between them x and y are interpolated linearly and the heading turns
+    uniformly in the shorter direction. A turn on the spot, between poses at the same position,
+    remains a single step.
 
     Args:
-        poses: x, y [m], yaw [rad].
+        poses: (n, 3) x, y [m], yaw [rad].
         spacing: Largest distance between waypoints [m].
 
     Raises:
@@ -48,7 +52,10 @@ def rings_within(
     goal: NDArray[np.float64],
     tolerance: float,
 ) -> Iterator[list[NDArray[np.float64]]]:
-    """Yield rings of goals of increasing distance, on each ring those towards the start first."""
+    """Yield rings of goals (3,) around a goal, from near to far within `tolerance` [m].
+
+    On each ring the goals on the start's side come first.
+    """
     if tolerance <= 0.0:
         return
     rings = min(_MAX_RINGS, max(1, math.ceil(tolerance / _RING_STEP)))
@@ -58,7 +65,7 @@ def rings_within(
         key=lambda turn: -math.cos(turn),
     )
     for ring in range(1, rings + 1):
-        # A hair within the tolerance, so that rounding does not carry a goal out of it.
+        # Slightly less than the tolerance, so that rounding does not exceed it.
         distance = tolerance * ring / rings * (1.0 - 1e-6)
         angles = [towards_start + turn for turn in turns]
         yield [

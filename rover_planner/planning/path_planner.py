@@ -1,4 +1,4 @@
-"""Plans and checks paths of one rover on one map; where a goal cannot be reached, tries others."""
+"""Plans and checks paths of a rover on a map; tries other goals near an unreachable one."""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -26,26 +26,26 @@ _QUERIES_PER_RING = 4
 
 @dataclass(frozen=True, eq=False)
 class PathSearch:
-    """The answer to a query, and the goal that it is for."""
+    """The answer to a query and the goal of its paths."""
 
     answer: PathAnswer
     """The candidate paths to the goal."""
     asked_goal: Pose
-    """The goal that was asked for."""
+    """The requested goal."""
     goal: Pose
-    """The goal of the candidates: the one that was asked for, or another near it."""
+    """The goal of the candidates: the requested one or another one near it."""
     alternatives_tried: int
     """Number of other goals that were tried."""
 
     @property
     def goal_offset(self) -> float:
-        """Distance of the goal from the one that was asked for [m]."""
+        """Distance between `goal` and the requested goal [m]."""
         return float(np.hypot(*(self.goal - self.asked_goal)[:2]))
 
 
 @dataclass(frozen=True, eq=False)
 class PathPlanner:
-    """Finds, checks and classifies paths; all of them for the same rover, map and arm angles."""
+    """Finds, checks and classifies paths for one rover, map and arm configuration."""
 
     rover: Rover
     """The rover."""
@@ -60,16 +60,16 @@ class PathPlanner:
         """Find a path from start to goal, or to a goal near it.
 
         Args:
-            start: Where the path starts.
-            goal: Where it is to end.
-            tolerance: How far from the goal's position the path may end [m] where the goal
-                itself cannot be reached; the heading stays. 0 is exact.
+            start: Start of the path.
+            goal: End of the path.
+            tolerance: Largest distance from the goal's position [m] at which the path may end
+                if the goal cannot be reached; the heading stays. 0 tries the goal only.
 
         Returns:
-            The answer for the goal, or for the first other goal that can be reached.
+            The answer for the goal, or for the first alternative goal that can be reached.
 
         Raises:
-            PlanningError: start, goal or options make no candidate paths.
+            PlanningError: Start, goal or options are invalid.
             RoverError: The model refuses an option or the poses.
         """
         answer, tried = self._query(start, goal), 0
@@ -90,7 +90,7 @@ class PathPlanner:
         return check_path(self.rover, self.terrain, poses, self.options, self.joint_angles)
 
     def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
-        """Return the class of each waypoint of a judged path; may sweep it once more."""
+        """Return the class of each waypoint of a judged path; may evaluate the path once more."""
         return classify_judged(
             self.rover,
             self.terrain,
@@ -106,15 +106,15 @@ class PathPlanner:
         )
 
     def _goals_to_stand_on(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Pose]:
-        """Yield other goals at which the rover can stand, the nearest first, a few of each ring.
+        """Yield alternative goals where the rover can stand, nearest first, a few per ring.
 
-        A ring's goals on the start's side come first: where those cannot be reached, the ones
-        behind them rarely can, and each costs a sweep of all candidates.
+        Goals on the start's side of a ring come first. If these cannot be reached, those behind
+        them rarely can, and each goal costs the evaluation of all candidates.
         """
         for ring in rings_within(start, goal, tolerance):
             standing = (pose for pose in ring if self._can_stand(pose))
             yield from itertools.islice(standing, _QUERIES_PER_RING)
 
     def _can_stand(self, pose: Pose) -> bool:
-        """Tell whether the rover can stand at a pose, without asking how it gets there."""
+        """Return whether the rover can stand at a pose; the way to the pose is not checked."""
         return self.check(pose[None, :]).verdict.traversable

@@ -1,4 +1,4 @@
-"""Candidate paths between two poses: judged, compared by risk and energy, and explained."""
+"""Judges candidate paths between two poses, compares risk and energy, and explains the choice."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.candidates import generate_candidates, path_length
 
 RISK_STEP = 0.05
-"""Risks this close [share of a limit] count as equal, so that energy decides between them."""
+"""Rounding step of risks [share of a limit]: paths of equal rounded risk differ by energy."""
 
 
 @dataclass(frozen=True)
 class PathQueryOptions:
-    """How candidate paths are made and judged."""
+    """Options of the generation and judgement of candidate paths."""
 
     count: int = 9
     """Largest number of candidate paths."""
@@ -41,10 +41,10 @@ class PathQueryOptions:
     payload: float | None = None
     """Mass at the tip of the manipulator [kg]; None: that of the rover file."""
     map_sigmas: float = SIGMAS
-    """Standard deviations of an uncertain map to allow for; 0 takes its heights as exact."""
+    """Standard deviations to allow for on an uncertain map; 0 treats heights as exact."""
 
     def sweep_options(self, joint_angles: Mapping[str, float] | None = None) -> SweepOptions:
-        """Return the options of the model; joint angles [rad] are the arm's, None is stowed."""
+        """Return the options of the model; `joint_angles` [rad] of the arm, None is stowed."""
         return SweepOptions(
             policy=self.policy,
             friction=self.friction,
@@ -64,10 +64,10 @@ class Candidate:
     prediction: PathPrediction
     """The model's outputs at each waypoint."""
     verdict: Verdict
-    """Whether the rover may drive it, and the reason if not."""
+    """Whether the rover may drive the path, and the reason if not."""
     cost: tuple[float, float]
-    """Risk (share of the safety limits that is used, in steps of RISK_STEP) and energy [J];
-    infinite where the path is not traversable."""
+    """Risk (used share of a safety limit, in steps of RISK_STEP) and energy [J]; both infinite
+    if the path is not traversable."""
 
     @property
     def length(self) -> float:
@@ -76,7 +76,7 @@ class Candidate:
 
     @property
     def reach(self) -> float:
-        """Share of the path before the first failure: 0 to 1, and 1 where there is none."""
+        """Share of the path before the first failure, 0 to 1; 1 without a failure."""
         failure = self.verdict.first_failure
         if failure < 0:
             return 1.0
@@ -85,23 +85,23 @@ class Candidate:
 
 @dataclass(frozen=True)
 class PathAnswer:
-    """The answer to a query: all candidates, the chosen one, and the one that explains it."""
+    """The answer to a query: all candidates, the best one, and the one that is explained."""
 
     candidates: tuple[Candidate, ...]
-    """The candidates in the order they were made, the direct connection first."""
+    """The candidates in the order of their generation, the direct connection first."""
     best: int
-    """Index of the traversable candidate of the least cost, -1 if there is none."""
+    """Index of the traversable candidate with the lowest cost, -1 if there is none."""
     nearest: int
-    """Index of the candidate to explain: the best, or the one that gets furthest."""
+    """Index of the explained candidate: the best, or the one that gets furthest."""
 
     @property
     def chosen(self) -> Candidate:
-        """The candidate to explain."""
+        """The explained candidate, of index `nearest`."""
         return self.candidates[self.nearest]
 
     @property
     def number(self) -> int:
-        """Number of the chosen candidate as words and messages count: 1 is the first made."""
+        """Number of the chosen candidate in texts and messages, counted from 1."""
         return self.nearest + 1
 
     @property
@@ -110,7 +110,7 @@ class PathAnswer:
         return self.best >= 0
 
     def explain(self) -> str:
-        """Say in one sentence which path was chosen, or why there is none."""
+        """Return one sentence: which path was chosen, or why none is traversable."""
         chosen = self.chosen
         total = len(self.candidates)
         passable = sum(candidate.verdict.traversable for candidate in self.candidates)
@@ -135,18 +135,18 @@ def answer_path_query(
     options: PathQueryOptions | None = None,
     joint_angles: Mapping[str, float] | None = None,
 ) -> PathAnswer:
-    """Sweep the candidate paths from start to goal and choose the best traversable one.
+    """Evaluate the candidate paths from start to goal and choose the best traversable one.
 
     Args:
         rover: The rover; its wheelbase is the smallest radius of a candidate.
         terrain: The ground, map frame.
-        start: x, y [m] and yaw [rad] of the body origin, map frame.
-        goal: The same.
-        options: How candidates are made and judged.
-        joint_angles: Measured angles [rad] of the manipulator's joints by name.
+        start: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
+        goal: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
+        options: How candidates are generated and judged; None takes the defaults.
+        joint_angles: Angles [rad] of the manipulator's joints by name; None is stowed.
 
     Raises:
-        PlanningError: start, goal or options make no candidate paths.
+        PlanningError: Start, goal or options are invalid.
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
     options = options or PathQueryOptions()
@@ -168,7 +168,7 @@ def check_path(
     options: PathQueryOptions | None = None,
     joint_angles: Mapping[str, float] | None = None,
 ) -> Candidate:
-    """Sweep one given path of poses (n, 3) and judge it; arguments as for answer_path_query.
+    """Evaluate and judge a given path of poses (n, 3); arguments as in `answer_path_query`.
 
     Raises:
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
@@ -192,7 +192,7 @@ def _check_paths(
 
 
 def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
-    """Choose the traversable candidate of the least cost; of equals the one made first."""
+    """Choose the traversable candidate with the lowest cost; of equal ones the first."""
     indices = range(len(candidates))
     passable = [k for k in indices if candidates[k].verdict.traversable]
     if passable:
@@ -210,10 +210,10 @@ def path_cost(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> tup
 
 
 def path_risk(rover: Rover, verdict: Verdict) -> float:
-    """Return how much of a safety limit the path uses up, of the limit it comes closest to.
+    """Return the used share of the tightest safety limit; 1 is at the limit.
 
-    Friction utilisation, torque saturation and tilt count as value over limit; the tip-over ratio
-    and the belly clearance, which must not fall short, as limit over value. 1 is at a limit. On an
+    The share is value over limit for friction utilisation, torque saturation and tilt, which have
+    maxima. It is limit over value for tip-over ratio and belly clearance, which have minima. On an
     uncertain map the values are the bounds.
     """
     limits = rover.limits
@@ -232,9 +232,9 @@ def path_risk(rover: Rover, verdict: Verdict) -> float:
 
 
 def smallest_radius(rover: Rover) -> float:
-    """Return the radius [m] of the tightest curve to plan for: the rover's wheelbase.
+    """Return the smallest radius [m] of planned curves: the rover's wheelbase.
 
-    With the end wheels steered, those on the inside of such a curve turn by about 40 degrees.
+    On such a curve the inner end wheels are steered by about 40 degrees.
     """
     wheels = rover.suspension.wheels
     return float(wheels["front"][0] - wheels["rear"][0])

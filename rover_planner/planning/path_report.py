@@ -22,13 +22,13 @@ def report_path(
     suspension: SuspensionReport | None = None,
     search: PathSearch | None = None,
 ) -> VerdictReport:
-    """Return all that is said about a judged path.
+    """Return the full report of a judged path.
 
     Args:
         candidate: The path.
         classes: The classes of its waypoints, at least one.
-        suspension: The comparison with the measured suspension, None without measurements.
-        search: The search that found the path, None where the path was given.
+        suspension: The comparison with the measured suspension; None without measurements.
+        search: The search that found the path; None if the path was given.
     """
     verdict = candidate.verdict
     return VerdictReport(
@@ -46,7 +46,7 @@ def report_path(
 
 
 def _report_failure(candidate: Candidate) -> FailureReport | None:
-    """Return where a path fails, None if it does not."""
+    """Return the first failure of a path, None if there is none."""
     failure = candidate.verdict.first_failure
     if failure < 0:
         return None
@@ -55,7 +55,7 @@ def _report_failure(candidate: Candidate) -> FailureReport | None:
 
 
 def _report_extremes(candidate: Candidate) -> PathReport:
-    """Return size and extremes of a judged path."""
+    """Return length, time, energy and extremes of a judged path."""
     verdict, prediction = candidate.verdict, candidate.prediction
     return PathReport(
         policy=verdict.policy,
@@ -106,7 +106,7 @@ def _list_waypoints(candidate: Candidate, classes: Sequence[ClassifiedWaypoint])
 
 
 def _report_search(search: PathSearch) -> SearchReport:
-    """Return what was tried to reach a goal."""
+    """Return the report of the search for a path to a goal."""
     candidates = search.answer.candidates
     return SearchReport(
         goal=tuple(search.goal.tolist()),

@@ -1,4 +1,4 @@
-"""The question whether the arm can reach a target and hold a load there, without ROS."""
+"""Queries whether the arm can reach a target and hold a load there, without ROS."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,19 +13,19 @@ from rover_planner.planning.traverse_service import TraverseService
 
 @dataclass(frozen=True, eq=False)
 class ReachJudgement:
-    """The answer of the model, or a refusal before the model was asked."""
+    """The answer of the model, or a refusal before the model was used."""
 
     possible: bool
     """Whether the tip reaches the target and the rover holds still within all its limits."""
     code: str
-    """Why not, as one of the codes of a `ReachAnswer` or of a refusal; empty if possible."""
+    """Code of the reason why not, as in a `ReachAnswer` or a refusal; empty if possible."""
     reason: str
-    """Why not, in words; empty if possible."""
+    """Reason why not, in words; empty if possible."""
     answer: ReachAnswer | None = None
-    """The answer of the model; None where it was not asked."""
+    """The answer of the model; None after a refusal."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the answer as JSON can hold it; what is not known is None or left out."""
+        """Return the answer in JSON types; unknown values are None or left out."""
         if self.answer is not None:
             return self.answer.to_dict()
         return {
@@ -37,7 +37,7 @@ class ReachJudgement:
 
 
 class ReachQuery:
-    """The last target and wrench of the tool, and the question about them."""
+    """Keeps the last target and wrench of the tool and answers queries about them."""
 
     def __init__(self) -> None:
         self._target: NDArray[np.float64] | None = None
@@ -48,20 +48,20 @@ class ReachQuery:
 
     @property
     def target(self) -> NDArray[np.float64] | None:
-        """Point (3,) [m] of the map for the tip, None if there is none or it was refused."""
+        """Target (3,) of the tip [m], map frame; None if there is none or it was refused."""
         return self._target
 
     @property
     def force(self) -> NDArray[np.float64] | None:
-        """Force (3,) [N] on the tip, map frame, None if there is none."""
+        """Force (3,) [N] on the tip, map frame; None if there is none."""
         return self._force
 
     def take_target(self, point: NDArray[np.float64]) -> None:
-        """Keep a point (3,) [m] of the map for the tip of the arm."""
+        """Keep the target (3,) [m] of the arm's tip, map frame."""
         self._target = point
 
     def refuse_target(self, reason: str) -> None:
-        """Forget the target: whoever asks next means the one that could not be understood."""
+        """Discard the target and keep the reason; later queries must not use an outdated one."""
         self._target = None
         self._target_refusal = f"the last target was refused: {reason}"
 
@@ -70,12 +70,12 @@ class ReachQuery:
         self._force, self._moment, self._wrench_refusal = force, moment, ""
 
     def refuse_wrench(self, reason: str) -> None:
-        """Forget the wrench; without one that can be understood nothing is answered."""
+        """Discard the wrench; queries are refused until a valid one arrives."""
         self._force = self._moment = None
         self._wrench_refusal = f"the last wrench was refused: {reason}"
 
     def ask(self, service: TraverseService) -> ReachJudgement:
-        """Judge the rover standing at the last pose of the last path with its tool at the target.
+        """Judge the rover at the last pose of the last path with its tool at the target.
 
         Raises:
             RoverError: The rover has no arm, or the model refuses an option.
@@ -110,5 +110,5 @@ class ReachQuery:
 
 
 def refuse_reach(code: str, reason: str) -> ReachJudgement:
-    """Refuse a question before the model was asked."""
+    """Return the refusal of a query without using the model."""
     return ReachJudgement(False, code, reason)

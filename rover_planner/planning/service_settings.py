@@ -1,4 +1,4 @@
-"""Settings of a traverse server: its parameters with the rover loaded."""
+"""Settings of a traverse server: its parameters and the loaded rover."""
 
 from dataclasses import dataclass
 
@@ -16,19 +16,19 @@ class ServiceSettings:
     """The parameters of a traverse server, loaded and ready to use."""
 
     rover: Rover
-    """The rover that is asked about."""
+    """The rover of all queries."""
     query: PathQueryOptions
-    """How candidates are made and judged."""
+    """How candidates are generated and judged."""
     interpolate: bool
     """Whether small unknown regions of a map are interpolated."""
     max_gap: float
     """Widest unknown region that is interpolated [m]."""
     suspension_tolerance: float
-    """Difference of measured and predicted suspension angles that is still agreement [rad]."""
+    """Largest allowed difference between measured and predicted suspension angles [rad]."""
 
 
 def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettings:
-    """Load the rover that the parameters name, and check what depends on it.
+    """Load the rover named in the parameters, and check soil and payload.
 
     Raises:
         RoverError: The rover cannot be loaded, the soil is not among the presets, or the rover

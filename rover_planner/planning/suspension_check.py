@@ -1,4 +1,4 @@
-"""Compares measured suspension angles with those predicted where a path starts."""
+"""Compares measured suspension angles with those predicted at the start of a path."""
 
 from collections.abc import Mapping
 
@@ -10,15 +10,15 @@ from rover_planner.planning.verdict_report import SuspensionReport
 def compare_suspension(
     prediction: PathPrediction, measured: Mapping[str, float], tolerance: float
 ) -> SuspensionReport | None:
-    """Compare measured with predicted suspension angles.
+    """Compare measured and predicted suspension angles.
 
     Args:
-        prediction: Of the path; the rover is taken to stand at its first waypoint.
-        measured: Joint angles [rad] by name; joints that are none of the suspension are ignored.
-        tolerance: Largest difference that is still agreement [rad].
+        prediction: Prediction of a path; the rover is assumed to be at its first waypoint.
+        measured: Joint angles [rad] by name; joints outside the suspension are ignored.
+        tolerance: Largest difference that counts as agreement [rad].
 
     Returns:
-        The comparison, None where nothing was measured or the first waypoint did not settle.
+        The comparison; None if nothing was measured or the first waypoint did not settle.
     """
     if not (measured and prediction.settled[0]):
         return None

@@ -1,4 +1,4 @@
-"""State and decisions of a traverse server, without ROS: map, path and joints in, answers out."""
+"""The traverse server without ROS: keeps map, path and joint angles, and answers queries."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from rover_planner.planning.suspension_check import compare_suspension
 
 
 class TraverseService:
-    """The last good map, path and joint angles, and the questions about them."""
+    """Keeps the last valid map, path and joint angles, and answers queries about them."""
 
     def __init__(self, settings: ServiceSettings):
         self._settings = settings
@@ -30,12 +30,12 @@ class TraverseService:
         self._path: NDArray[np.float64] | None = None
         self._path_refusal = "no path was received yet; publish one on ~/path"
         self._joints: dict[str, float] = {}
-        # Compiles or loads kernels, so that the first question does not wait for it.
+        # Compiles or loads the kernels, so that the first query is fast.
         generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
     @property
     def settings(self) -> ServiceSettings:
-        """The settings in force."""
+        """The current settings."""
         return self._settings
 
     @settings.setter
@@ -46,12 +46,12 @@ class TraverseService:
 
     @property
     def terrain(self) -> Terrain | None:
-        """The last good map, small gaps filled if the settings say so."""
+        """The last valid map, with small gaps interpolated if so set; None if there is none."""
         return self._terrain
 
     @property
     def path(self) -> NDArray[np.float64] | None:
-        """Poses (n, 3) of the last path, None if there is none or it could not be understood."""
+        """Poses (n, 3) of the last path; None if there is none or it was refused."""
         return self._path
 
     @property
@@ -61,7 +61,7 @@ class TraverseService:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints whose angles matter: the suspension's and the manipulator's."""
+        """Names of the joints whose angles are used: those of suspension and manipulator."""
         return SUSPENSION_JOINTS + self._manipulator_joints()
 
     def take_terrain(self, terrain: Terrain) -> None:
@@ -70,32 +70,32 @@ class TraverseService:
             terrain.fill_gaps(self._settings.max_gap) if self._settings.interpolate else terrain
         )
         self._received = terrain
-        pack_ground(self._terrain)  # now, so that the first question does not wait for it
+        pack_ground(self._terrain)  # now, so that the first query is fast
 
     def take_path(self, poses: NDArray[np.float64]) -> None:
-        """Keep a path of poses (n, 3), x, y [m], yaw [rad], to be checked."""
+        """Keep a path of poses (n, 3), x, y [m], yaw [rad], for `check_last_path`."""
         self._path = poses
 
     def refuse_path(self, reason: str) -> None:
-        """Forget the path: whoever asks next means the one that could not be understood."""
+        """Discard the path and keep the reason; later queries must not use an outdated one."""
         self._path = None
         self._path_refusal = f"the last path was refused: {reason}"
 
     def take_joints(self, positions: Mapping[str, float]) -> None:
-        """Keep measured joint angles [rad] by name; others stay as they were."""
+        """Keep measured joint angles [rad] by name; angles of other joints stay."""
         self._joints.update(positions)
 
     def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> Judgement:
-        """Find a path from start to goal, or say why there is none.
+        """Find a path from start to goal, or the reason why there is none.
 
         Args:
             start: (3,) x, y [m], yaw [rad] of the body origin, map frame.
-            goal: The same.
-            tolerance: How far from the goal's position the rover may end [m], where the goal
-                itself cannot be reached; the heading stays. 0 is exact.
+            goal: (3,) x, y [m], yaw [rad] of the body origin, map frame.
+            tolerance: Largest distance from the goal's position [m] at which the path may end
+                if the goal cannot be reached; the heading stays. 0 tries the goal only.
 
         Raises:
-            PlanningError: The request has no meaning.
+            PlanningError: The request is invalid.
             RoverError: The model refuses the request.
         """
         if not (math.isfinite(tolerance) and tolerance >= 0.0):
@@ -125,13 +125,13 @@ class TraverseService:
         return self._judgement(planner, planner.check(poses))
 
     def refuse_if_missing(self) -> Judgement | None:
-        """Return the refusal of a question about the path where path or map is missing."""
+        """Return a refusal if path or map is missing, else None."""
         if self._path is None:
             return refusal("no_path", self._path_refusal)
         return _refuse_without_map() if self._terrain is None else None
 
     def _planner(self, terrain: Terrain) -> PathPlanner:
-        """Return a planner for a map, the settings in force and the arm as it was measured."""
+        """Return a planner for a map, the current settings and the measured arm angles."""
         return PathPlanner(
             self._settings.rover, terrain, self._settings.query, self._manipulator_angles()
         )
@@ -139,25 +139,25 @@ class TraverseService:
     def _judgement(
         self, planner: PathPlanner, candidate: Candidate, search: PathSearch | None = None
     ) -> Judgement:
-        """Make a judgement of a judged path; its classes are computed when asked for."""
+        """Return the judgement of a judged path; its classes are computed on demand."""
         return Judgement(
             candidate.verdict.code,
             candidate.verdict.reason,
             candidate,
             partial(planner.classify, candidate),
-            compare_suspension(  # with the joints as they are now
+            compare_suspension(  # with the current joint angles
                 candidate.prediction, self._joints, self._settings.suspension_tolerance
             ),
             search,
         )
 
     def _manipulator_joints(self) -> tuple[str, ...]:
-        """Return the names of the manipulator's joints, none where the rover has none."""
+        """Return the names of the manipulator's joints, () if the rover has no manipulator."""
         manipulator = self._settings.rover.manipulator
         return tuple(manipulator.joints) if manipulator is not None else ()
 
     def _manipulator_angles(self) -> dict[str, float] | None:
-        """Return the measured manipulator angles, None (stowed) until all are known."""
+        """Return the measured manipulator angles [rad], None (stowed) until all are known."""
         names = self._manipulator_joints()
         if not names or any(name not in self._joints for name in names):
             return None
@@ -165,7 +165,7 @@ class TraverseService:
 
 
 def _refuse_without_map() -> Judgement:
-    """Refuse a question that came before any map."""
+    """Return the refusal of a query before the first map."""
     return refusal(
         "no_map", "no map was received yet; publish one on elevation_cloud or call ~/load_map"
     )

@@ -1,4 +1,4 @@
-"""All that is said about a request: the verdict and its details, typed, and as flat JSON."""
+"""The report of a request: the verdict and its details as dataclasses and as flat JSON."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -9,17 +9,17 @@ from rover_physics.numerics.plain_values import to_plain
 
 @dataclass(frozen=True)
 class FailureReport:
-    """Where a path fails first."""
+    """The first failure of a path."""
 
     failure_pose: tuple[float, ...]
     """x, y [m] and yaw [rad] of the first waypoint that is not passable, map frame."""
     failure_distance: float
-    """Distance along the path from its start to there [m]."""
+    """Distance along the path from its start to that waypoint [m]."""
 
 
 @dataclass(frozen=True)
 class PathReport:
-    """Size of a judged path, and the extremes predicted on the part of it that settled."""
+    """Length, time and energy of a judged path, and extremes over the waypoints that settled."""
 
     policy: str
     """Torque policy that was assumed."""
@@ -38,9 +38,9 @@ class PathReport:
     max_sinkage: float
     """Largest sinkage of a wheel into soil [m]."""
     map_sigmas: float
-    """Standard deviations of the map that were allowed for; 0 where it has no elevation_std."""
+    """Standard deviations of the map that were allowed for; 0 if it has no elevation_std."""
     tip_over_ratio_bound: float
-    """Smallest possible tip-over ratio within these; NaN where the map is exact."""
+    """Smallest possible tip-over ratio within `map_sigmas`; NaN if the map is exact."""
     friction_utilisation_bound: float
     """Largest possible friction utilisation."""
     torque_saturation_bound: float
@@ -54,9 +54,9 @@ class PathReport:
     length: float
     """Length of the path [m]."""
     time: float
-    """Driving time [s], NaN where the last waypoint did not settle."""
+    """Driving time [s]; NaN if the last waypoint did not settle."""
     energy: float
-    """Energy of the wheel motors [J], NaN where the last waypoint did not settle."""
+    """Energy of the wheel motors [J]; NaN if the last waypoint did not settle."""
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,17 @@ class ClassReport:
     """Traversability class of a path, and the waypoint that decides it."""
 
     traversability_class: str
-    """One of `TRAVERSABILITY_CLASSES`: that of the worst waypoint, whatever `policy` is."""
+    """One of `TRAVERSABILITY_CLASSES`, that of the worst waypoint; does not depend on `policy`."""
     class_waypoint: int
     """Index of the waypoint that decides the class."""
     class_constraint: str
-    """Code of the limit that is broken there, else of the tightest one."""
+    """Code of the limit that is violated there, else of the tightest limit."""
     class_wheel: str
-    """Name of its wheel, empty where it is about no single wheel."""
+    """Name of the wheel; empty if the limit does not concern a single wheel."""
     class_margin: float
-    """Share of that limit that is left, negative where broken; NaN where there is no amount."""
+    """Remaining share of that limit, negative if violated; NaN if the limit has no number."""
     class_reason: str
-    """Why the waypoint is not passable with equal torques, or at all; empty where passable."""
+    """Reason why the waypoint is not passable, or not with equal torques; empty if passable."""
 
 
 @dataclass(frozen=True)
@@ -94,31 +94,31 @@ class SearchReport:
     goal: tuple[float, ...]
     """x, y [m] and yaw [rad] of the goal of the judged path, map frame."""
     goal_offset: float
-    """Distance of that goal from the one asked for [m]."""
+    """Distance between that goal and the requested one [m]."""
     alternative_goals_tried: int
-    """Number of other goals that were tried."""
+    """Number of alternative goals that were tried."""
     candidates: int
     """Number of candidate paths to that goal."""
     traversable_candidates: int
     """Number of them that are traversable."""
     chosen_candidate: int
-    """Number of the judged candidate, from 1: the best, or the one that gets furthest."""
+    """Number of the judged candidate, counted from 1: the best, or the one that gets furthest."""
     explanation: str
-    """One sentence on the choice."""
+    """One sentence that explains the choice."""
 
 
 @dataclass(frozen=True)
 class WaypointLists:
-    """Verdict and class of each waypoint; in the JSON only, as they are long."""
+    """Verdict and class of each waypoint; only in the JSON, because they are long."""
 
     codes: tuple[str, ...]
-    """Code of the limit that is broken, empty where passable under `policy`."""
+    """Code of the violated limit; empty if passable under `policy`."""
     reasons: tuple[str, ...]
-    """The reason in words, empty where passable."""
+    """Reason in words; empty if passable."""
     traversability_classes: tuple[str, ...]
-    """Traversability class."""
+    """Traversability class of each waypoint."""
     class_constraints: tuple[str, ...]
-    """As `class_constraint`."""
+    """Per waypoint, as `ClassReport.class_constraint`."""
     class_wheels: tuple[str, ...]
     """As `class_wheel`."""
     class_margins: tuple[float, ...]
@@ -127,30 +127,30 @@ class WaypointLists:
 
 @dataclass(frozen=True)
 class VerdictReport:
-    """The answer to a request with all its details; a part that does not apply is None.
+    """The answer to a request with all its details; parts that do not apply are None.
 
-    Order and names of the fields, those of the parts included, are order and names of the keys in
-    JSON, where no part has a level of its own.
+    The JSON has one level: the fields of the parts become keys beside those of this class. Names
+    and order of the keys are those of the fields.
     """
 
     traversable: bool
     """Whether the rover may drive the path."""
     code: str
-    """Why not, as one of the codes of a verdict or of a refusal; empty if traversable."""
+    """Code of the reason why not, as in a verdict or refusal; empty if traversable."""
     reason: str
-    """Why not, in words; empty if traversable."""
+    """Reason why not, in words; empty if traversable."""
     first_failure: int = -1
     """Index of the first waypoint that is not passable, -1 if none."""
     failure: FailureReport | None = None
-    """Where the path fails."""
+    """The first failure of the path."""
     path: PathReport | None = None
-    """The judged path; this and all below are None where no path was judged."""
+    """The judged path; this and all fields below are None if no path was judged."""
     classes: ClassReport | None = None
     """Traversability class of the path."""
     suspension: SuspensionReport | None = None
-    """Comparison with the measured suspension, where joints were measured."""
+    """Comparison with the measured suspension; None without measured joints."""
     search: SearchReport | None = None
-    """The search for the path, where one was asked for."""
+    """The search for the path; None if the path was given."""
     waypoint_lists: WaypointLists | None = None
     """Values per waypoint."""
 
@@ -160,16 +160,16 @@ class VerdictReport:
         return self.suspension is not None and not self.suspension.suspension_agrees
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all entries as JSON can hold them: one level, None for NaN and infinity."""
+        """Return all entries in JSON types: one level, None for NaN and infinity."""
         return to_plain(dict(_entries(self)))
 
     def summary(self) -> dict[str, Any]:
-        """Return the entries of `to_dict` but for those with a value per waypoint."""
+        """Return the entries of `to_dict` without those that have a value per waypoint."""
         return replace(self, waypoint_lists=None).to_dict()
 
 
 def _entries(part: Any) -> Iterator[tuple[str, Any]]:
-    """Yield names and values of the fields of a part, those of its own parts in their place."""
+    """Yield names and values of the fields of a part; nested parts are expanded in place."""
     for field in fields(part):
         value = getattr(part, field.name)
         if is_dataclass(value):

@@ -1,1 +1,1 @@
-"""What the nodes share: quality of service, deferred work, refusals, maps."""
+"""ROS parts that the nodes share: quality of service, deferred work, refusals, maps."""

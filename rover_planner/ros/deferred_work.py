@@ -1,4 +1,4 @@
-"""What a node does after it has answered a request, so that nobody waits for it."""
+"""Work that a node does after it has answered a request, so that answers are not delayed."""
 
 import time
 import traceback
@@ -9,25 +9,25 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 QUIET = 0.03
-"""Time without an answer after which the work begins [s]: whoever asked reads the answer first,
-and asks again."""
+"""Time after the last answer before the work begins [s]: a client has time to read the answer
+and to send its next request."""
 SLICE = 0.002
-"""Work that takes longer than this in one go waits for requests before it goes on [s]..."""
+"""Time for which work runs before it pauses for requests [s]."""
 GAP = 0.003
-"""... for so long [s]."""
+"""Length of this pause [s]."""
 MAX_WAITING = 4
-"""Answers whose work may wait for further requests to be answered."""
+"""Largest number of answers whose work may be pending."""
 
 Work = Callable[[], None]
 
 
 class DeferredWork:
-    """Runs work that was put off: answer by answer, piece by piece, and requests go first.
+    """Runs deferred work in order, piece by piece; requests have priority.
 
-    A timer runs the pieces, and every further answer sets it back. So a request that comes
-    meanwhile waits for no more than one SLICE and the piece that exceeds it. Under requests
-    without a pause the work of MAX_WAITING answers waits at most; then that of the oldest is
-    done, all of it, before the next request is looked at. Nothing is left out, nothing overtakes.
+    A timer runs the pieces, and each further answer restarts it. A request therefore waits for at
+    most one SLICE plus the piece that exceeds it. During continuous requests the work of at most
+    MAX_WAITING answers is pending: beyond that, all work of the oldest answer is done before the
+    next request. No work is skipped and the order is kept.
     """
 
     def __init__(self, node: Node):
@@ -38,14 +38,14 @@ class DeferredWork:
         self._too_many = node.create_guard_condition(self._run_oldest)
 
     def do(self, *pieces: Work) -> None:
-        """Put off the work of one answer; where a piece of it fails the log says so."""
+        """Defer the work of one answer; errors of its pieces are logged."""
         self._answers.append(deque(pieces))
         self._wait(QUIET)
         if len(self._answers) > MAX_WAITING:
             self._too_many.trigger()
 
     def _run_some(self) -> None:
-        """Run pieces for about a SLICE."""
+        """Run pieces for about one SLICE."""
         end = time.perf_counter() + SLICE
         while self._answers and time.perf_counter() < end:
             self._run_next()
@@ -59,7 +59,7 @@ class DeferredWork:
         self._timer.reset()
 
     def _run_oldest(self) -> None:
-        """Run what belongs to the oldest answers until no more than MAX_WAITING are left."""
+        """Run the work of the oldest answers until at most MAX_WAITING answers are pending."""
         while len(self._answers) > MAX_WAITING:
             self._run_next()
 
@@ -70,7 +70,7 @@ class DeferredWork:
             if pieces:
                 pieces.popleft()()
         except Exception:
-            # A fault of this program must not leave the rover without a planner.
+            # An internal error must not end the node.
             self._node.get_logger().error(traceback.format_exc())
         if not pieces:
             self._answers.popleft()

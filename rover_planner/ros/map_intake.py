@@ -1,4 +1,4 @@
-"""Maps for a loop that must not wait: taken as bytes, prepared once in a thread of their own."""
+"""Receives maps for a control loop and prepares them in a separate thread."""
 
 import threading
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from rover_planner.traction.prepared_map import PreparedMap
 
 
 class MapIntake:
-    """Takes serialised clouds, prepares a map of the latest one, and returns it when asked."""
+    """Takes serialised clouds, prepares a map of the latest one, and returns it on request."""
 
     def __init__(
         self, prepare: Callable[[PointCloud2], PreparedMap], refuse: Callable[[str], None]
@@ -19,7 +19,7 @@ class MapIntake:
         """Start the thread.
 
         Args:
-            prepare: Makes a map of a cloud, called in the thread; it may raise INPUT_ERRORS.
+            prepare: Makes a map of a cloud; called in the thread; may raise INPUT_ERRORS.
             refuse: Called in the thread with the reason why a cloud cannot be used.
         """
         self._prepare, self._refuse = prepare, refuse
@@ -41,12 +41,12 @@ class MapIntake:
             self._changed.notify()
 
     def take(self) -> PreparedMap | None:
-        """Return a map that was prepared since the last call, if any."""
+        """Return the map that was prepared since the last call, None if there is none."""
         ready, self._ready = self._ready, None
         return ready
 
     def close(self) -> None:
-        """End the thread once it has prepared the map that it is working on."""
+        """End the thread after the map in work is prepared."""
         with self._changed:
             self._ending = True
             self._changed.notify()
@@ -64,5 +64,5 @@ class MapIntake:
             except INPUT_ERRORS as error:
                 self._refuse(str(error))
             except Exception as error:
-                # A fault of this program must not end the thread: the next map may be better.
+                # An internal error must not end the thread: the next map may work.
                 self._refuse(f"internal error: {type(error).__name__}: {error}")

@@ -1,4 +1,4 @@
-"""Quality of service by purpose, so that no node spells out its own."""
+"""Quality-of-service profiles of all topics, by purpose."""
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
@@ -6,14 +6,14 @@ from rover_planner.parameters.shared import EITHER, TRANSIENT_LOCAL, VOLATILE
 
 
 def topic_qos() -> QoSProfile:
-    """Return the profile of ordinary topics: reliable, the last ten."""
+    """Return the profile of ordinary topics: reliable, depth 10."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE
     )
 
 
 def result_qos() -> QoSProfile:
-    """Return the profile of results: as ordinary topics, and kept for whoever comes later."""
+    """Return the profile of results: reliable and transient local, for late subscribers."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=10,
@@ -23,14 +23,14 @@ def result_qos() -> QoSProfile:
 
 
 def sensor_qos() -> QoSProfile:
-    """Return the profile of sensor data: best effort, so that every publisher is heard."""
+    """Return the profile of sensor data: best effort, which matches every publisher."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
     )
 
 
 def map_qos(durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> QoSProfile:
-    """Return the profile of maps: reliable, only the latest."""
+    """Return the profile of maps: reliable, depth 1."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=1,
@@ -40,11 +40,11 @@ def map_qos(durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> 
 
 
 def map_subscriptions_qos(durability: str) -> list[QoSProfile]:
-    """Return the profiles with which to subscribe to a map, one subscription each.
+    """Return the profiles of subscriptions to a map, one per subscription.
 
-    A transient-local subscription gets the map that was published before it came, but does not
-    match a volatile publisher; a volatile one matches both, but waits for the next map. So
-    EITHER takes both, and the subscriber has to pass over the second copy.
+    A transient-local subscription gets a map that was published earlier, but does not match a
+    volatile publisher. A volatile one matches both, but only gets the next map. EITHER needs one
+    subscription of each kind, and the subscriber must ignore the second copy.
 
     Args:
         durability: One of `MAP_DURABILITIES`.

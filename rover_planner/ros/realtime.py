@@ -1,4 +1,4 @@
-"""Precedence of this process over others on the machine, where the system grants it."""
+"""Sets the real-time priority of this process, if the system grants it."""
 
 import os
 from pathlib import Path
@@ -7,13 +7,13 @@ THREADS = Path("/proc/self/task")
 
 
 def take_priority(priority: int) -> str:
-    """Let all threads of this process run before those of ordinary programs (SCHED_FIFO).
+    """Set the real-time priority (SCHED_FIFO) of all threads of this process.
 
     Args:
-        priority: 1 to 99 as in sched(7); 0 leaves everything as it is.
+        priority: 1 to 99 as in sched(7); 0 changes nothing.
 
     Returns:
-        Why it was not granted, empty where it was.
+        The reason why it was not granted, empty if it was granted.
     """
     if priority == 0:
         return ""

@@ -1,4 +1,4 @@
-"""Whatever is wrong with a request makes a refusal with a reason, never the end of the node."""
+"""Turns every error of a request into a refusal with a reason, so that the node continues."""
 
 import traceback
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from rover_physics.errors import RoverError
 from rover_planner.errors import PlanningError
 
 INPUT_ERRORS = (MessageError, PlanningError, RoverError)
-"""Errors that are about what was asked, not about this program."""
+"""Errors of the input; any other error is an internal error."""
 
 Answer = TypeVar("Answer")
 
@@ -17,12 +17,12 @@ Answer = TypeVar("Answer")
 def answer_or_refuse(
     logger, request: str, answer: Callable[[], Answer], refuse: Callable[[str, str], Answer]
 ) -> Answer:
-    """Return the answer to a request, or the refusal of it with code and reason."""
+    """Return `answer()`, or after an error `refuse(code, reason)`; log internal errors."""
     try:
         return answer()
     except INPUT_ERRORS as error:
         return refuse("bad_request", str(error))
     except Exception as error:
-        # A fault of this program must not leave the rover without a planner.
+        # An internal error must not end the node.
         logger.error(f"{request}: {traceback.format_exc()}")
         return refuse("internal_error", f"{type(error).__name__}: {error}")

@@ -1,1 +1,1 @@
-"""What the programs share towards the shell: exit codes, words, missing libraries."""
+"""Parts shared by all programs: exit codes, command-line arguments, missing libraries."""

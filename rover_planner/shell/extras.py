@@ -1,4 +1,4 @@
-"""Libraries that only some commands need, and that a plain installation does not bring."""
+"""Checks for optional libraries, which only some commands need."""
 
 import importlib.util
 
@@ -9,10 +9,10 @@ INSTALL = {
     "matplotlib": "matplotlib: pip install 'rover_planner[plots]'",
     "viser": "viser: pip install 'rover_planner[view]'",
 }
-"""What a module belongs to, and how to get it."""
+"""Name of each optional module's package, and how to install it."""
 
 
 def need(module: str, what: str) -> None:
-    """Raise PlanningError where a module of INSTALL is missing that `what` needs."""
+    """Raise PlanningError if `module`, a key of INSTALL that `what` needs, is missing."""
     if importlib.util.find_spec(module) is None:
         raise PlanningError(f"{what} needs {INSTALL[module]}")

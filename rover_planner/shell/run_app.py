@@ -1,4 +1,4 @@
-"""Runs a typer app so that its caller decides about exit codes and messages."""
+"""Runs a typer app; the caller handles exit codes and error messages."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,7 +9,7 @@ from rover_planner.errors import PlanningError
 
 
 def run_app(app: typer.Typer, name: str, words: Sequence[str] | None) -> Any:
-    """Run an app and return what its command returns, 0 after it has printed its help.
+    """Run an app; return the result of its command, 0 after help was printed.
 
     Args:
         app: The app.
@@ -17,7 +17,7 @@ def run_app(app: typer.Typer, name: str, words: Sequence[str] | None) -> Any:
         words: Its arguments; None takes those of the process.
 
     Raises:
-        PlanningError: The words do not fit the app; says which and why.
+        PlanningError: The arguments are invalid; the text says which and why.
         KeyboardInterrupt: It was interrupted.
     """
     try:
@@ -25,7 +25,7 @@ def run_app(app: typer.Typer, name: str, words: Sequence[str] | None) -> Any:
             args=None if words is None else list(words), prog_name=name, standalone_mode=False
         )
     except Exception as error:
-        # typer has its own copy of click since 0.26, so there is no class of errors to name.
+        # typer vendors click since 0.26, so that no common error class exists.
         if hasattr(error, "format_message"):
             raise PlanningError(error.format_message()) from error
         if type(error).__name__ == "Abort":

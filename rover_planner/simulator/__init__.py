@@ -1,1 +1,1 @@
-"""A rover on a terrain that behaves towards its nodes as a real one does."""
+"""A simulated rover on a terrain with the interfaces of a real rover."""

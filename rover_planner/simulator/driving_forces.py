@@ -1,4 +1,4 @@
-"""What given wheel torques do to a rover on its ground: tractions, loads, and the push left."""
+"""Computes the forces on a rover under given wheel torques: tractions, loads and net push."""
 
 from dataclasses import dataclass
 
@@ -13,45 +13,45 @@ from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.layout import LATERAL_SHARE, LATERAL_SLOPE, LOADS, TRACTIONS
 
 ROUNDS = 6
-"""Rounds in which loads and tractions are found from each other: friction links them."""
+"""Fixed-point iterations of loads and tractions, which depend on each other by friction."""
 MIN_CAPACITY = 1e-9
-"""Smallest friction force that a utilisation is a share of [N]: unloaded wheels have none."""
+"""Lower bound of a wheel's friction force [N]; avoids a division by zero at unloaded wheels."""
 
 
 @dataclass(frozen=True, eq=False)
 class DrivingForces:
-    """The forces of a rover that moves, or stays, under given torques."""
+    """The forces on a rover, moving or at rest, under given torques."""
 
     push: float
-    """Force along body +x beyond what holds the rover where it is [N]."""
+    """Net force along body +x that accelerates the rover [N]."""
     tractions: Floats
-    """(6,) along the ground, forward, within the friction of each wheel [N]."""
+    """(6,) tractions along the ground, positive forward, limited by friction [N]."""
     loads: Floats
-    """(6,) normal forces, none below 0: ground does not pull [N]."""
+    """(6,) normal forces, at least 0 [N]."""
     utilisation: Floats
-    """(6,) share of the friction that is used; 1 where a wheel slides."""
+    """(6,) friction utilisation; 1 for a sliding wheel."""
     sliding: NDArray[np.bool_]
-    """(6,) True where the motor pulls more than friction holds."""
+    """(6,) True if the motor's force exceeds the friction limit."""
 
     def name_sliding(self) -> str:
-        """Return the names of the wheels that slide, with a comma between."""
+        """Return the names of the sliding wheels, separated by commas."""
         return ", ".join(name for name, slides in zip(WHEELS, self.sliding, strict=True) if slides)
 
 
 def find_driving_forces(
     writer: BalanceWriter, radius: float, here: PathPrediction, torques: Floats, direction: float
 ) -> DrivingForces:
-    """Find the forces under given torques, by d'Alembert: the push accelerates the rover's mass.
+    """Compute the forces under given torques; by d'Alembert the push accelerates the rover's mass.
 
     Args:
         writer: Writes the balance of the rover.
         radius: Wheel radius [m].
-        here: One waypoint: where the rover is.
-        torques: (6,) of the motors [N m], positive forward.
-        direction: 1 where the rover moves forward, -1 backward, 0 where it rests.
+        here: Prediction of one waypoint, the rover's pose.
+        torques: (6,) motor torques [N m], positive forward.
+        direction: 1 if the rover moves forward, -1 backward, 0 at rest.
 
     Returns:
-        The forces; no push and the loads of `here` where the balance does not determine them.
+        The forces; zero push and the loads of `here` if the balance has no unique solution.
     """
     friction, loads, lateral = here.friction[0], here.wheel_loads[0], here.lateral[0]
     resistance = np.nan_to_num(here.motion_resistance[0])
@@ -72,14 +72,14 @@ def find_driving_forces(
         loads, lateral = x[LOADS], x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along
     loads = np.maximum(loads, 0.0)
     used = np.hypot(tractions, lateral) / np.maximum(friction * loads, MIN_CAPACITY)
-    if not direction:  # soil gives way only to what is more than its resistance
+    if not direction:  # at rest, a push below the soil's resistance has no effect
         push = float(np.sign(push) * max(abs(push) - resistance.sum(), 0.0))
     utilisation = np.where(sliding, 1.0, np.minimum(used, 1.0))
     return DrivingForces(push, tractions, loads, utilisation, sliding)
 
 
 def _measure_state(here: PathPrediction) -> MeasuredState:
-    """Return what would be measured of the rover at the waypoint, contacts included."""
+    """Return the measured state of a rover at the waypoint, including its contacts."""
     offsets = (here.contact_points[0] - here.wheel_centres[0]) @ _find_wheel_axis(here)
     return MeasuredState(
         float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
@@ -88,6 +88,6 @@ def _measure_state(here: PathPrediction) -> MeasuredState:
 
 
 def _find_wheel_axis(here: PathPrediction) -> Floats:
-    """Return the direction (3,) of the wheel axes, right to left, map frame."""
+    """Return the direction (3,) of the wheel axes from right to left, map frame."""
     right, left = here.wheel_centres[0].reshape(len(SIDES), -1, 3).mean(axis=1)
     return np.asarray((left - right) / np.linalg.norm(left - right))

@@ -1,4 +1,4 @@
-"""A rover in MuJoCo as a plant: rigid bodies with inertia, wheels that slip."""
+"""The plant that simulates a rover in MuJoCo, with inertia and wheel slip."""
 
 import numpy as np
 
@@ -10,11 +10,11 @@ from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.plant import PlantState
 
 MAX_TILT = 1.2
-"""Tilt from which a rover counts as tipped over [rad]."""
+"""Tilt above which a rover counts as tipped over [rad]."""
 
 
 class MujocoPlant:
-    """A `MujocoRover` driven by speeds or by torques; it steers by the speeds of its wheels."""
+    """A `MujocoRover` driven by speeds or torques; it steers by different wheel speeds (skid)."""
 
     def __init__(
         self,
@@ -26,7 +26,7 @@ class MujocoPlant:
         """Drop a rover onto the ground.
 
         Raises:
-            PlanningError: Unknown cells, or a pose beyond the terrain.
+            PlanningError: The terrain has unknown cells, or the pose is outside the terrain.
         """
         self._plant = MujocoRover(rover, terrain, pose, friction)
         self._rover = rover
@@ -41,13 +41,13 @@ class MujocoPlant:
         return self._plant.pose[[0, 1, 3]]
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
-        """Drive at a speed [m/s] and yaw rate [rad/s] for a time [s], by speed servos."""
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with speed servos."""
         rates = (speed + yaw_rate * self._arms) / self._rover.wheel.radius
         self._torques = self._plant.servo(rates, duration)
         self._measure(duration)
 
     def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
-        """Apply torques (6,) [N m] for a time [s]; they steer too, `yaw_rate` is not used."""
+        """Apply torques (6,) [N m] for a duration [s]; they also steer; `yaw_rate` is not used."""
         self._torques = np.asarray(torques, dtype=float)
         self._plant.step(self._torques, duration)
         self._measure(duration)
@@ -59,7 +59,7 @@ class MujocoPlant:
         self._velocity, self._last = R.T @ moved, now
 
     def state(self) -> PlantState:
-        """Return what can be measured now."""
+        """Return the current measurements."""
         plant = self._plant
         return PlantState(
             position=plant.pose[:3],

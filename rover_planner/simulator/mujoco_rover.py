@@ -1,8 +1,8 @@
 """A rover on rigid ground in MuJoCo, moved by wheel torques or by speed servos.
 
-It needs the package mujoco (extra `bench`) and shares nothing with the model of `rover_physics`
-but the rover's numbers: rigid bodies, hinges, a differential that couples the rockers, cylindrical
-wheels on a height field, and dry friction.
+It needs the package mujoco (extra `bench`). It shares only the rover's numbers with the model of
+`rover_physics`. The simulation has rigid bodies, hinges, a differential that couples the rockers,
+cylindrical wheels on a height field, and dry friction.
 """
 
 from dataclasses import dataclass
@@ -23,17 +23,17 @@ TIMESTEP = 0.004
 DROP_HEIGHT = 0.02
 """Height above the ground from which the rover is dropped [m]."""
 SETTLING_TIME = 3.0
-"""Time for which the servos hold the wheels until the rover rests [s]."""
+"""Time for which the servos hold the wheels after the drop, until the rover is at rest [s]."""
 SERVO_SHARE = 0.5
 """Share of a speed error that a servo corrects in one step of the simulation."""
 SERVO_RATE = 5.0
 """Integral gain of a servo over its gain [1/s]."""
 MOTOR_INERTIA = 1.0
-"""Inertia of a geared motor at the wheel, in wheel radii squared times a sixth of the mass."""
+"""Inertia of a geared motor at the wheel, over (wheel radius)^2 times a sixth of the mass."""
 MIN_LOAD = 1e-3
-"""Load from which a wheel counts as on the ground, in weights of the rover."""
+"""Load above which a wheel has ground contact, as a share of the rover's weight."""
 DERATING_SHARE = 0.2
-"""Last share of the largest speed in which the torque of a motor falls to zero."""
+"""Share of the maximum speed, at its upper end, over which the motor torque falls to zero."""
 
 _MODEL = """
 <mujoco model={name}>
@@ -67,14 +67,14 @@ _MODEL = """
 
 @dataclass(frozen=True, eq=False)
 class WheelContacts:
-    """Forces and slip of the wheels at one moment."""
+    """Contact forces and slip of the wheels at one time."""
 
     loads: Floats
     """(6,) sums of normal forces [N]."""
     shears: Floats
-    """(6,) sums of the sizes of the tangential forces [N]."""
+    """(6,) sums of the magnitudes of tangential forces [N]."""
     slip_speeds: Floats
-    """(6,) speeds of the treads over the ground [m/s], weighted by load; zero without contact."""
+    """(6,) slip speeds of the treads [m/s], load-weighted means; zero without contact."""
 
 
 class MujocoRover:
@@ -88,17 +88,17 @@ class MujocoRover:
         friction: float | None = None,
         timestep: float = TIMESTEP,
     ):
-        """Drop a rover onto the ground and wait until it rests.
+        """Drop a rover onto the ground and simulate until it is at rest.
 
         Args:
             rover: The rover.
-            terrain: The ground; all of it known. A friction layer is not used.
+            terrain: The ground without unknown cells. A friction layer is not used.
             pose: x, y [m] and yaw [rad] of the body's origin.
-            friction: Coefficient between wheels and ground instead of the rover's own.
+            friction: Friction coefficient; None takes the rover's.
             timestep: Time step of the simulation [s].
 
         Raises:
-            PlanningError: Unknown cells, or a pose beyond the terrain.
+            PlanningError: The terrain has unknown cells, or the pose is outside the terrain.
         """
         if not np.isfinite(terrain.elevation).all():
             raise PlanningError("terrain has unknown cells; a plant needs all of them known")
@@ -136,7 +136,7 @@ class MujocoRover:
         self._data.time = 0.0
 
     def _height_above_ground(self, x: float, y: float, yaw: float) -> float:
-        """Return the least z of a level rover at which no wheel is in the ground [m]."""
+        """Return the smallest z [m] of a level rover at which no wheel penetrates the ground."""
         radius, width = self.rover.wheel.radius, self.rover.wheel.width
         ahead, across = np.meshgrid(
             np.linspace(-radius, radius, 21), np.linspace(-0.5 * width, 0.5 * width, 9)
@@ -151,13 +151,13 @@ class MujocoRover:
         return float(np.max(highest))
 
     def step(self, torques: Floats, duration: float) -> None:
-        """Apply torques (6,) [N m] in wheel order for a time [s]; the motors limit them."""
+        """Apply torques (6,) [N m] in wheel order for a duration [s]; motor limits apply."""
         for _ in range(max(round(duration / self._model.opt.timestep), 1)):
             self._data.ctrl[:] = self._limit(torques)
             mujoco.mj_step(self._model, self._data)
 
     def _limit(self, torques: Floats) -> Floats:
-        """Return the torques that the motors can give: none beyond their largest speed."""
+        """Limit torques (6,) [N m] to those of the motors, zero above their maximum speed."""
         wheel, rates = self.rover.wheel, self.wheel_rates
         derating = DERATING_SHARE * wheel.max_speed
         share = np.clip((wheel.max_speed - np.abs(rates)) / derating, 0.0, 1.0)
@@ -165,13 +165,13 @@ class MujocoRover:
         return np.clip(torques, -limit, limit)
 
     def servo(self, rates: Floats, duration: float) -> Floats:
-        """Drive the wheels at rates (6,) [rad/s] for a time [s] by speed servos.
+        """Drive the wheels at rates (6,) [rad/s] for a duration [s] with speed servos.
 
-        Each wheel has a PI controller of its own, run at every step of the simulation; its
-        integral does not grow while the torque is limited.
+        Each wheel has a PI controller that runs at every simulation step. Its integral does not
+        grow while the torque is limited (anti-windup).
 
         Returns:
-            Torques (6,) at the end [N m].
+            Torques (6,) of the last step [N m].
         """
         step = self._model.opt.timestep
         gain = SERVO_SHARE * self._inertia / step
@@ -203,7 +203,7 @@ class MujocoRover:
 
     @property
     def _rotation(self) -> Floats:
-        """Rotation matrix (3, 3) of the body, to the map frame."""
+        """Rotation matrix (3, 3), body to map."""
         return matrix_from_xyzw(self.orientation)
 
     @property
@@ -226,7 +226,7 @@ class MujocoRover:
 
     @property
     def joint_velocities(self) -> dict[str, float]:
-        """Rates [rad/s] of the same."""
+        """Rates [rad/s] of suspension and wheels by joint name."""
         values = self._data.qvel[self._velocities].tolist()
         return dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), values, strict=True))
 
@@ -284,7 +284,7 @@ def _write_model(rover: Rover, terrain: Terrain, friction: float, timestep: floa
 
 
 def _thin_out(elevation: Floats) -> Floats:
-    """Leave out rows that the others interpolate: ground that is even along y collides sooner."""
+    """Drop redundant rows of ground that is uniform along y, which speeds up collision checks."""
     for factor in (20, 10, 5, 4, 2):
         if (len(elevation) - 1) % factor:
             continue
@@ -298,7 +298,7 @@ def _thin_out(elevation: Floats) -> Floats:
 
 
 def _write_side(rover: Rover, side: str) -> str:
-    """Return the MJCF text of the rocker of a side with all that hangs on it."""
+    """Return the MJCF text of one side: rocker, bogie and wheels."""
     suspension, mirror = rover.suspension, -1.0 if side == "right" else 1.0
     wheels = {
         name: _write_wheel(rover, f"{name}_{side}", place, mirror)
@@ -306,7 +306,7 @@ def _write_side(rover: Rover, side: str) -> str:
     }
     rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
     hung = "\n".join(wheels[name] for name in suspension.bogie_wheels)
-    # Places are those of flat ground in the body frame, so every body starts at the origin.
+    # Positions are given in the body frame on flat ground, so each MJCF body has no offset.
     return f"""
       <body name="rocker_{side}">
         <joint name="rocker_{side}" type="hinge" axis="0 1 0" pos={_point(rocker, mirror)}
@@ -334,7 +334,7 @@ def _write_wheel(rover: Rover, name: str, place: tuple[float, ...], mirror: floa
 
 
 def _write_inertia(part: Part, mirror: float) -> str:
-    """Return the inertia of a part: that of a ball a tenth of a metre in radius."""
+    """Return the MJCF inertia of a part, taken as a sphere with a radius of 0.1 m."""
     moment = 0.4 * max(part.mass, 1e-3) * 0.1**2
     return (
         f'<inertial pos={_point(part.com, mirror)} mass="{max(part.mass, 1e-3)}" '

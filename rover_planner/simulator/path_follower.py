@@ -1,18 +1,21 @@
-"""Follows a path: the speed and the yaw rate that bring the rover along it (pure pursuit)."""
+"""Path following by pure pursuit: speed and yaw rate that keep the rover on a path."""
 
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 
 ARRIVED = 0.25
-"""Distance from the end, in look-aheads, at which the path is done."""
+"""Distance from the end at which the path counts as finished, in look-ahead distances."""
 
 
 class PathFollower:
-    """Coulter, "Implementation of the pure pursuit path tracking algorithm", 1992."""
+    """Pure pursuit of a path.
+
+    Source: Coulter, "Implementation of the pure pursuit path tracking algorithm", 1992.
+    """
 
     def __init__(self, poses: Floats, look_ahead: float):
-        """Follow poses (n, 3), looking so far [m] ahead along them."""
+        """Follow poses (n, 3) with a look-ahead distance [m] along them."""
         self._places = np.asarray(poses, dtype=float)[:, :2]
         steps = np.hypot(*np.diff(self._places, axis=0).T)
         self._along = np.concatenate([[0.0], np.cumsum(steps)])
@@ -26,11 +29,11 @@ class PathFollower:
 
     @property
     def driven(self) -> float:
-        """How far along the path the rover is [m]."""
+        """Distance driven along the path [m]."""
         return self._done
 
     def has_arrived(self, pose: Floats) -> bool:
-        """Tell whether a pose (3,) is at the end of the path."""
+        """Return whether a pose (3,) is at the end of the path."""
         left = float(np.hypot(*(self._places[-1] - pose[:2])))
         near = left < ARRIVED * self._look_ahead
         return near or self._done >= self.length - 1e-6
@@ -48,14 +51,14 @@ class PathFollower:
         return speed, speed * float(np.clip(curvature, -most, most))
 
     def _project(self, pose: Floats) -> None:
-        """Move on to the nearest place within reach; never back."""
+        """Advance to the point of the path nearest to the pose; never move backwards."""
         ahead = np.linspace(self._done, min(self._done + self._look_ahead, self.length), 40)
         places = np.array([self._at(along) for along in ahead])
         away = np.hypot(*(places - pose[:2]).T)
         self._done = float(ahead[int(np.argmin(away))])
 
     def _at(self, along: float) -> Floats:
-        """Return the place (2,) so far along the path, straight on beyond its end."""
+        """Return the point (2,) at a distance along the path [m], extended straight on."""
         over = max(along - self.length, 0.0)
         x, y = (np.interp(along, self._along, self._places[:, k]) for k in (0, 1))
         if over > 0.0 and len(self._places) > 1:

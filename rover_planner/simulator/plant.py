@@ -1,4 +1,4 @@
-"""What a simulated rover is to the node around it, whichever engine moves it."""
+"""The interface of a simulated rover, common to all physics engines."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,37 +8,37 @@ from rover_physics.numerics.arrays import Floats
 
 @dataclass(frozen=True, eq=False)
 class PlantState:
-    """What can be measured of a rover at one moment."""
+    """Measurements of a rover at one time."""
 
     position: Floats
     """(3,) body origin [m], map frame."""
     orientation: Floats
     """(4,) quaternion x, y, z, w, body to map."""
     velocity: Floats
-    """(3,) of the body origin [m/s], body frame."""
+    """(3,) velocity of the body origin [m/s], body frame."""
     body_rates: Floats
     """(3,) angular velocity [rad/s], body frame."""
     joint_positions: dict[str, float]
     """Angles of suspension and wheels [rad] by joint name."""
     joint_velocities: dict[str, float]
-    """Rates of the same [rad/s]."""
+    """Rates of suspension and wheels [rad/s] by joint name."""
     wheel_torques: Floats
     """(6,) torques of the motors [N m], wheel order."""
     stopped: str
-    """Why the rover does not go on though it should, empty where it does."""
+    """Reason why the rover does not move as commanded; empty if it moves."""
 
 
 class Plant(Protocol):
-    """A rover that is told speeds, or torques, and moves on by a time."""
+    """A simulated rover that is driven by speeds or torques for given durations."""
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
-        """Drive at a speed [m/s] and yaw rate [rad/s] for a time [s], by the wheels' servos."""
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with wheel servos."""
 
     def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
-        """Let torques (6,) [N m] act for a time [s]; `yaw_rate` is what steering asks for."""
+        """Apply torques (6,) [N m] for a duration [s]; `yaw_rate` [rad/s] sets the steering."""
 
     def state(self) -> PlantState:
-        """Return what can be measured now."""
+        """Return the current measurements."""
 
     def pose(self) -> Floats:
         """Return x, y [m] and yaw [rad] (3,) of the body origin."""

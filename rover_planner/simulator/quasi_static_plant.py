@@ -1,9 +1,10 @@
-"""The quasi-static rover as a plant: it moves from one equilibrium to the next.
+"""The plant that simulates a quasi-static rover: it moves from one equilibrium to the next.
 
-Told a speed, it goes there if the model says that it can, and stops where not, with the model's
-reason. Told torques, the balance decides: what the wheels pull beyond what holds the rover on its
-slope moves its mass along, and what a wheel pulls beyond its friction is lost as slip. That speed
-is the only thing that has inertia here. Limits of attitude, suspension, clearance hold for both.
+With a commanded speed, the rover moves if the model allows it; otherwise it stops with the model's
+reason. With commanded torques, the balance of forces decides: the traction beyond the force that
+holds the rover on its slope accelerates its mass, and wheel force beyond friction is lost as slip.
+The forward speed is the only state with inertia. Limits of attitude, suspension and clearance
+apply in both cases.
 """
 
 from dataclasses import fields, replace
@@ -26,17 +27,19 @@ from rover_planner.simulator.driving_forces import DrivingForces, find_driving_f
 from rover_planner.simulator.plant import PlantState
 
 DRAG = 0.5
-"""Share of its speed that a rover without torque loses each second beyond rolling: gears [1/s]."""
+"""Damping of the speed by the gears: deceleration over speed [1/s]."""
 MAX_SLIP = 0.95
+"""Largest slip ratio that is used for wheel rates, which would be infinite at 1."""
 CREEP = 1e-4
-"""Speed below which it does not steer [m/s]."""
+"""Speed below which the rover does not steer [m/s]."""
 MIN_PROGRESS, PATIENCE = 0.02, 2.0
-"""Way [m] that a rover has to make in so much time [s], or it is said to be stuck."""
+"""A rover that moves less than MIN_PROGRESS [m] within PATIENCE [s] counts as stuck."""
 NO_LIMIT = 1e9
+"""Value that disables a limit."""
 
 
 class QuasiStaticPlant:
-    """One rover on one terrain; see the module for what it knows of dynamics."""
+    """One rover on one terrain; the module's docstring describes its dynamics."""
 
     def __init__(
         self,
@@ -47,18 +50,18 @@ class QuasiStaticPlant:
         policy: str = EQUAL,
         soil: str | None = None,
     ):
-        """Put a rover on the ground.
+        """Place a rover on the ground.
 
         Args:
             rover: The rover.
             terrain: The ground.
             pose: x, y [m] and yaw [rad] of the body origin.
-            friction: Coulomb friction instead of the terrain's and the rover's own.
-            policy: How its servos share the traction, one of TORQUE_POLICIES.
+            friction: Coulomb friction; None takes that of the terrain or the rover.
+            policy: How the servos share the traction, one of TORQUE_POLICIES.
             soil: Preset soil where the terrain names none; None: Coulomb friction.
 
         Raises:
-            PlanningError: The rover cannot stand there.
+            PlanningError: The rover cannot stand at the pose.
             SoilError: No soil of that name.
         """
         self._rover, self._terrain = rover, terrain
@@ -85,12 +88,12 @@ class QuasiStaticPlant:
         return self._pose.copy()
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
-        """Drive at a speed [m/s] and yaw rate [rad/s] for a time [s], if the model lets it."""
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], if this is possible."""
         self._torques = self._here.torque[0].copy()
         self._move(speed, yaw_rate, duration)
 
     def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
-        """Let torques (6,) [N m] act for a time [s]; `yaw_rate` is what steering asks for."""
+        """Apply torques (6,) [N m] for a duration [s]; `yaw_rate` [rad/s] sets the steering."""
         wheel, limit = self._rover.wheel, self._rover.wheel.max_torque
         self._torques = np.clip(torques, -limit, limit)
         forces = find_driving_forces(
@@ -100,7 +103,7 @@ class QuasiStaticPlant:
         top = wheel.max_speed * wheel.radius
         speed = float(np.clip(speed, -top, top))
         if self._speed * speed < 0.0:
-            speed = 0.0  # it comes to rest before it rolls the other way
+            speed = 0.0  # the rover stops before it reverses
         turning = yaw_rate if abs(speed) > CREEP else 0.0
         self._move(speed, turning, duration, forces)
         racing = np.sign(torques) * wheel.max_speed
@@ -108,7 +111,7 @@ class QuasiStaticPlant:
         self._watch_stall(forces, duration)
 
     def _watch_stall(self, forces: DrivingForces, duration: float) -> None:
-        """Say why the rover stays where it is though its motors do all they can."""
+        """Set the reason for standing still when wheels slide or motors saturate for PATIENCE."""
         saturated = np.abs(self._torques) >= 0.999 * self._rover.wheel.max_torque
         moved = float(np.hypot(*(self._pose - self._anchor)[:2]))
         if moved > MIN_PROGRESS or not (forces.sliding.any() or saturated.any()):
@@ -125,7 +128,10 @@ class QuasiStaticPlant:
     def _move(
         self, speed: float, yaw_rate: float, duration: float, forces: DrivingForces | None = None
     ) -> None:
-        """Go on if the model lets the rover; `forces` have decided already whether it holds."""
+        """Move if the model allows it.
+
+        With `forces`, which already include friction and torque limits, these are not checked.
+        """
         self._stopped = ""
         middle = self._pose[2] + 0.5 * yaw_rate * duration
         step = speed * duration
@@ -150,14 +156,14 @@ class QuasiStaticPlant:
         self._wheel_rates = turned / duration
 
     def _slip(self, forces: DrivingForces | None) -> Floats:
-        """Return the slip ratios (6,): the model's, or on firm ground those of the forces."""
+        """Return the slip ratios (6,): of the model, or on firm ground of the forces."""
         here = self._here
         if forces is None or np.any(here.motion_resistance[0] > 0.0):
             return here.slip_ratio[0]
         return np.array([coulomb_slip(used) for used in forces.utilisation.tolist()])
 
     def _predict(self, poses: Floats, pulled: bool = False) -> PathPrediction:
-        """Ask the model; about a rover that is pulled, what the best of torques could do."""
+        """Return the model's prediction at poses (n, 3); if `pulled`, with optimal torques."""
         policy = OPTIMAL if pulled else self._policy
         return sweep_path(
             self._rover,
@@ -167,10 +173,10 @@ class QuasiStaticPlant:
         )
 
     def _why_not(self, prediction: PathPrediction, pulled: bool = False) -> str:
-        """Return why the way to the last of some poses is not open, empty where it is.
+        """Return the reason why the last pose cannot be reached; empty if it can.
 
-        Whether wheels hold at a pose is for the forces to say where the rover is pulled. On the
-        way over a face, which has no width here, it is for the best of all torques.
+        If `pulled`, the driving forces decide about grip at a pose. Crossings of steep faces
+        between poses are judged with optimal torques.
         """
         rover, between = self._rover, prediction.between
         at_end = prediction
@@ -184,7 +190,7 @@ class QuasiStaticPlant:
         return reason
 
     def state(self) -> PlantState:
-        """Return what can be measured now."""
+        """Return the current measurements."""
         here, before, duration = self._here, self._before, self._duration
         angles = _suspension(here)
         rates = (angles - _suspension(before)) / duration
@@ -209,7 +215,7 @@ class QuasiStaticPlant:
 
 
 def _last_row(prediction: PathPrediction) -> PathPrediction:
-    """Return the last waypoint of a prediction as a prediction of its own."""
+    """Return a prediction that has only the last waypoint."""
     n = len(prediction.poses)
     rows = {
         field.name: getattr(prediction, field.name)[-1:]
@@ -228,7 +234,7 @@ def _suspension(prediction: PathPrediction) -> Floats:
 def _body_rates(
     roll: float, pitch: float, roll_rate: float, pitch_rate: float, yaw_rate: float
 ) -> Floats:
-    """Return the angular velocity (3,) [rad/s], body frame, from rates of the angles."""
+    """Return the angular velocity (3,) [rad/s], body frame, from Euler angles [rad] and rates."""
     return np.array(
         [
             roll_rate - np.sin(pitch) * yaw_rate,

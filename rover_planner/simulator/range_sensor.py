@@ -1,4 +1,4 @@
-"""What a sensor on the rover's mast sees of the terrain: in range, in its line of sight, noisy."""
+"""A terrain sensor on the rover's mast, with range, occlusion and noise."""
 
 from dataclasses import dataclass
 
@@ -9,28 +9,29 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 
 RAYS = 1440
+"""Directions of the occlusion test: every quarter degree."""
 
 
 @dataclass(frozen=True)
 class RangeSensor:
-    """Where the sensor is and what it can do."""
+    """Position and properties of the sensor."""
 
     reach: float
-    """How far it sees [m]."""
+    """Range [m]."""
     noise: float
     """Standard deviation of heights [m]."""
     height: float
-    """Over the body origin [m]."""
+    """Height of the sensor above the body origin [m]."""
     occlusion: bool
-    """Whether ground hides what is behind it."""
+    """Whether high ground hides the ground behind it."""
 
     def look(self, terrain: Terrain, position: Floats, rng: np.random.Generator) -> Terrain:
-        """Return the part of a terrain around the rover, unknown where it is not seen.
+        """Return the terrain around the rover with noise; cells out of sight are unknown.
 
         Args:
             terrain: The true ground.
             position: (3,) body origin [m].
-            rng: Makes the noise.
+            rng: Random generator of the noise.
         """
         rows, columns = self._window(terrain, position)
         x0 = terrain.origin[0] + terrain.resolution * columns.start
@@ -64,7 +65,7 @@ class RangeSensor:
     def _in_sight(
         self, terrain: Terrain, position: Floats, heights: Floats, away: Floats, bearing: Floats
     ) -> NDArray[np.bool_]:
-        """Tell which cells are no lower than the steepest view before them on their ray."""
+        """Return a mask of the cells that no nearer cell on the same ray hides."""
         eye = position[2] + self.height
         ranges = np.arange(terrain.resolution, self.reach + terrain.resolution, terrain.resolution)
         angles = (np.arange(RAYS) + 0.5) * (2.0 * np.pi / RAYS) - np.pi
@@ -77,6 +78,6 @@ class RangeSensor:
         step = np.clip((away / terrain.resolution).astype(int) - 1, 0, len(ranges) - 1)
         near = away < 1.5 * terrain.resolution
         own = (heights - eye) / np.maximum(away, 1e-9)
-        # A cell is as wide as it is: what hides it by less than its own size does not count.
+        # Occlusion by less than the size of a cell is ignored.
         allowance = 0.5 * terrain.resolution / np.maximum(away, terrain.resolution)
         return np.asarray(near | (own >= before[ray, step] - allowance))

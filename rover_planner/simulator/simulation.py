@@ -1,4 +1,4 @@
-"""What drives the plant: a path, commanded speeds, or torques from elsewhere; no ROS."""
+"""The simulation without ROS: drives a plant along a path, by speeds or by torques."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
-"""Side and cell size of the terrain that is made where none is given [m]."""
+"""Width and cell size of the generated terrain [m], the default terrain."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class SimulationSettings:
     terrain: Terrain
     """The true ground."""
     start: tuple[float, float, float]
-    """x, y [m] and yaw [rad] of the rover at the start."""
+    """x, y [m] and yaw [rad] of the body origin at the start."""
     engine: str
     """One of ENGINES."""
     friction: float | None
-    """Coulomb friction of the ground; None: that of the terrain, or of the rover file."""
+    """Coulomb friction of the ground; None takes that of the terrain or the rover file."""
     soil: str | None
     """Soil where the terrain names none; None: Coulomb friction."""
     policy: str
@@ -42,17 +42,17 @@ class SimulationSettings:
     speed: float
     """Speed along a path [m/s]."""
     follow_commands: bool
-    """Whether torques from elsewhere drive the wheels."""
+    """Whether commanded torques of a controller drive the wheels."""
     timeout: float
-    """Age from which speeds and torques are ignored [s]."""
+    """Age above which commanded speeds and torques are ignored [s]."""
     sensor: RangeSensor
-    """What measures the ground."""
+    """The terrain sensor."""
     seed: int
     """Seed of all noise."""
 
 
 def load_simulation_settings(parameters: RoverSimulatorParameters) -> SimulationSettings:
-    """Load the rover and load or make the terrain that the parameters name.
+    """Load the rover and load or generate the terrain of the parameters.
 
     Raises:
         RoverError: Rover or terrain cannot be loaded.
@@ -87,8 +87,8 @@ def make_plant(settings: SimulationSettings) -> Plant:
     """Make the plant that the settings name.
 
     Raises:
-        PlanningError: MuJoCo is asked for and not installed or told what it has no use for, or
-            the rover cannot start there.
+        PlanningError: MuJoCo is selected but not installed, a setting is not supported by it, or
+            the rover cannot stand at the start.
         SoilError: No soil of that name.
     """
     if settings.engine != MUJOCO:
@@ -113,13 +113,13 @@ def make_plant(settings: SimulationSettings) -> Plant:
 
 
 class Simulation:
-    """One rover, and what it was told last."""
+    """One simulated rover and its last commands."""
 
     def __init__(self, settings: SimulationSettings):
-        """Put the rover at its start.
+        """Place the rover at its start.
 
         Raises:
-            PlanningError: See `make_plant`, as for SoilError.
+            PlanningError, SoilError: As in `make_plant`.
         """
         self.settings = settings
         self.plant = make_plant(settings)
@@ -128,33 +128,33 @@ class Simulation:
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
         self.steering = (0.0, 0.0)
-        """Speed [m/s] and yaw rate [rad/s] that path or command ask for."""
+        """Speed [m/s] and yaw rate [rad/s] set by path or command."""
 
     def take_path(self, poses: Floats) -> None:
-        """Follow poses (n, 3) from now on."""
+        """Follow a path of poses (n, 3), x, y [m], yaw [rad], from now on."""
         wheels = self.settings.rover.suspension.wheels
         self._follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]))
 
     def take_speeds(self, speed: float, yaw_rate: float, now: float) -> None:
-        """Drive at a speed [m/s] and yaw rate [rad/s]; a path is given up for that."""
+        """Drive at a speed [m/s] and yaw rate [rad/s] from time `now` [s]; ends path following."""
         self._follower = None
         self._wanted, self._wanted_at = (speed, yaw_rate), now
 
     def take_torques(self, torques: Floats, now: float) -> None:
-        """Take torques (6,) [N m] in wheel order."""
+        """Take torques (6,) [N m] in wheel order at time `now` [s]."""
         self._torques, self._torques_at = torques, now
 
     def has_speeds(self, now: float) -> bool:
-        """Tell whether commanded speeds are in force: fresh, and no path is followed."""
+        """Return whether commanded speeds apply: they are recent and no path is followed."""
         return self._follower is None and now - self._wanted_at <= self.settings.timeout
 
     @property
     def follows_path(self) -> bool:
-        """Whether there is a path that is not done."""
+        """Whether there is an unfinished path."""
         return self._follower is not None
 
     def advance(self, now: float, duration: float) -> PlantState:
-        """Move on by a time [s] and return what can be measured."""
+        """Advance by a duration [s] from time `now` [s]; return the measurements."""
         self.steering = self._steer(now)
         speed, yaw_rate = self.steering
         if self.settings.follow_commands:
@@ -174,6 +174,6 @@ class Simulation:
         return self._wanted if self.has_speeds(now) else (0.0, 0.0)
 
     def look(self) -> Terrain:
-        """Return what the sensor sees of the ground around the rover."""
+        """Return the sensor's map of the ground around the rover."""
         position = self.plant.state().position
         return self.settings.sensor.look(self.settings.terrain, position, self._rng)

@@ -1,1 +1,1 @@
-"""Studies: which numbers of a rover are best for what it is to drive over."""
+"""Design studies: sweeps and optimisations of a rover's numbers."""

@@ -1,4 +1,4 @@
-"""What a rover is worth: utilisation, margin, energy, the tallest step, even loads."""
+"""Objectives of studies: utilisation, tip-over margin, energy, tallest step, load imbalance."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,24 +18,25 @@ from rover_planner.studies.study_file import Study, StudyDrive
 SPACING = 0.02
 """Distance between waypoints [m]."""
 NO_LIMIT = 1e9
+"""Value that disables a limit."""
 STEP_TOLERANCE = 0.002
-"""To which the height of a step is found [m]."""
+"""Tolerance of the height of the tallest step [m]."""
 SEARCH_STEP = 0.02
-"""Heights of steps that are tried one after another before the last one is bracketed [m]."""
+"""Increment of step heights in the search, before bisection [m]."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """What a rover is worth."""
+    """The value of an objective for a rover."""
 
     value: float
-    """Of the objective; NaN where it cannot be told."""
+    """Value of the objective; NaN if it cannot be computed."""
     note: str = ""
-    """Why it cannot, or what keeps it from being better."""
+    """Reason why it cannot be computed, or what limits the value."""
 
 
 def evaluate(study: Study, rover: Rover) -> Score:
-    """Return the objective of a study for a rover; what makes it impossible is a note.
+    """Return the objective of a study for a rover; if it is impossible, the note has the reason.
 
     Raises:
         RoverError: A terrain cannot be loaded, or the model refuses an argument.
@@ -57,13 +58,13 @@ def evaluate(study: Study, rover: Rover) -> Score:
 
 
 def load_shares(rover: Rover) -> Floats:
-    """Return the shares (6,) of the weight that the wheels carry on level ground, at rest."""
+    """Return the shares (6,) of the weight on the wheels, at rest on level ground."""
     loads = sweep_path(rover, _flat(rover), np.zeros((1, 3))).wheel_loads[0]
     return np.asarray(loads / loads.sum())
 
 
 def _score_drive(study: Study, rover: Rover, k: int) -> Score:
-    """Drive number k; all limits have to hold but the one that the objective is about."""
+    """Return the score of drive k; all limits must hold except that of the objective."""
     drive, where = study.drives[k], f"drive {k + 1}"
     path = drive.length * np.linspace(0.0, 1.0, max(round(drive.length / SPACING), 1) + 1)
     x, y, yaw = drive.start
@@ -83,7 +84,7 @@ def _score_drive(study: Study, rover: Rover, k: int) -> Score:
         return Score(verdict.max_friction_utilisation, where)
     if study.objective == "drive_energy":
         return Score(float(prediction.energy[-1] / prediction.distance[-1]), where)
-    # The verdict's ratio is to the same rover on flat ground, so it does not compare rovers.
+    # The verdict's ratio is relative to the same rover on flat ground; it cannot compare rovers.
     flat_angle = float(pack_model(rover, ground).settings.flat_angle)
     return Score(verdict.min_tip_over_ratio * flat_angle, where)
 
@@ -136,9 +137,9 @@ def step_ground(rover: Rover, height: float) -> Terrain:
 def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = None) -> float:
     """Return the height [m] of the tallest step that the rover climbs straight on.
 
-    Only what the wheels can do counts: friction, torque, contact and suspension; not the safety
-    limits of tilt, margin, clearance and drop. Heights are tried from low to high, for a step may
-    be climbed that is taller than one that is not.
+    Only friction, torque, contact and suspension count, not the safety limits of tilt, tip-over
+    margin, clearance and drop. Heights are tried from low to high, because a rover may climb a
+    step that is higher than one that it cannot climb.
     """
     climbed, height = 0.0, SEARCH_STEP
     while height < 4.0 * rover.wheel.radius and climbs(rover, height, policy, friction):
@@ -154,12 +155,12 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
 
 
 def climbs(rover: Rover, height: float, policy: str, friction: float | None) -> bool:
-    """Tell whether a rover gets up a step of a height [m], belly included."""
+    """Return whether a rover climbs a step of a height [m] without belly contact."""
     return not why_not_climbed(rover, height, policy, friction)
 
 
 def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | None) -> str:
-    """Return why a rover does not get up a step of a height [m], empty where it does."""
+    """Return the reason why a rover does not climb a step of a height [m]; empty if it does."""
     limits = replace(
         rover.limits, tilt=1.5, tip_over_ratio=0.0, belly_clearance=0.0, wheel_drop=100.0
     )

@@ -1,4 +1,4 @@
-"""Numbers of a rover file by dotted names, such as suspension.wheels.front.x."""
+"""Access to numbers of a rover file by dotted names, such as suspension.wheels.front.x."""
 
 import difflib
 from collections.abc import Iterator, Mapping
@@ -11,17 +11,18 @@ from rover_physics.rover.rover_file import rover_from_dict
 from rover_planner.studies.rover_values import rover_to_dict
 
 AXES = ("x", "y", "z")
+"""Names of the three numbers of a point."""
 
 
 def find_key(contents: Mapping[str, Any], name: str) -> tuple[Key, str]:
-    """Return where a number of a rover file is, and its unit.
+    """Return the key and the unit of a number of a rover file.
 
     Args:
         contents: Contents of the rover file.
-        name: Dotted name; the numbers of a point are x, y, z, others count from 0.
+        name: Dotted name; numbers of a point are named x, y, z, other list items from 0.
 
     Raises:
-        RoverFileError: There is no such number; names the nearest.
+        RoverFileError: There is no such number; the text lists the nearest names.
     """
     known = dict(_list_keys(contents))
     if name not in known:
@@ -50,10 +51,10 @@ def _list_keys(contents: Any, name: str = "", key: Key = ()) -> Iterator[tuple[s
 
 
 def vary(rover: Rover, values: Mapping[Key, float]) -> Rover:
-    """Return a rover with other numbers, by their keys.
+    """Return a copy of a rover with changed numbers, by key.
 
     Raises:
-        RoverFileError: No such rover can be; names the key.
+        RoverFileError: The changed rover is invalid; the text names the key.
     """
     data = rover_to_dict(rover)
     for key, value in values.items():

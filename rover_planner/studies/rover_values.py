@@ -1,4 +1,4 @@
-"""The values of a rover that can be changed while it is watched: names, units and ranges."""
+"""Values of a rover that can be changed interactively: labels, units and ranges."""
 
 import dataclasses
 import math
@@ -19,11 +19,11 @@ class RoverValue:
     """One number of a rover file."""
 
     keys: tuple[Key, ...]
-    """Where it is in the file, such as ("wheel", "radius"); several that are always alike."""
+    """Keys in the file, such as ("wheel", "radius"); several if the values are always equal."""
     label: str
-    """What it is called, with its unit."""
+    """Label with unit."""
     low: float
-    """Smallest value offered; the rover file's own checks decide what is possible."""
+    """Smallest value offered; the checks of the rover file may be stricter."""
     high: float
     """Largest value offered."""
     step: float
@@ -48,7 +48,7 @@ def _plain(value: Any) -> Any:
 
 
 def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
-    """List what can be changed of a rover, by the part that it belongs to."""
+    """Return the changeable values of a rover, by part."""
     data = rover_to_dict(rover)
     span = abs(rover.suspension.wheels["front"][0])
     radius = rover.wheel.radius
@@ -102,14 +102,14 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
 def _make_value(
     keys: tuple[Key, ...], label: str, now: float, low: float, high: float
 ) -> RoverValue:
-    """Return a value whose range is some hundred steps of one digit, `now` inside it."""
+    """Return a value whose range contains `now` and has a few hundred one-digit steps."""
     step = 10.0 ** math.floor(math.log10(0.005 * (high - low)))
     low, high = math.floor(low / step + 0.01) * step, math.ceil(high / step - 0.01) * step
     return RoverValue(keys, label, round(min(low, now), 9), round(max(high, now), 9), step)
 
 
 def get_value(data: Mapping[str, Any], key: Key) -> float:
-    """Return a number of the contents of a rover file."""
+    """Return a number from the contents of a rover file, by key."""
     inner: Any = data
     for part in key:
         inner = inner[part]
@@ -117,10 +117,10 @@ def get_value(data: Mapping[str, Any], key: Key) -> float:
 
 
 def with_value(rover: Rover, keys: Sequence[Key], value: float) -> Rover:
-    """Return a rover with one number changed, wherever the keys say that it is.
+    """Return a copy of a rover with the same value at all of the keys.
 
     Raises:
-        RoverFileError: The rover would be impossible; names the key.
+        RoverFileError: The changed rover is invalid; the text names the key.
     """
     data = rover_to_dict(rover)
     for key in keys:
@@ -140,7 +140,7 @@ def read_rover(text: str, source: str) -> Rover:
     """Read a rover from the text of a rover file.
 
     Raises:
-        RoverFileError: The text is no YAML, or the rover is impossible; names the key.
+        RoverFileError: The text is not YAML or the rover is invalid; the error names the key.
     """
     with errors_of(source):
         data = parse_yaml(text)

@@ -18,12 +18,13 @@ from rover_planner.studies.rover_keys import vary
 from rover_planner.studies.study_file import OBJECTIVES, Study
 
 SEED = 1
+"""Seed of the optimisation."""
 ALL_OVER = 0.6
-"""Share of an optimisation's evaluations that looks all over the bounds; the rest looks nearby."""
+"""Share of evaluations in the global phase of an optimisation; the rest is the local phase."""
 NEAR = -0.05
-"""First steps of the search nearby, in widths of the bounds."""
+"""Initial steps of the local phase, in widths of the bounds."""
 IMPOSSIBLE = 1e6
-"""What the optimiser is told of a rover that cannot be judged."""
+"""Cost of a rover that cannot be judged, for the optimiser."""
 
 
 @dataclass(frozen=True)
@@ -31,32 +32,32 @@ class Trial:
     """One rover that was tried."""
 
     values: tuple[float, ...]
-    """Of the parameters, in their order."""
+    """Values of the parameters, in their order."""
     objective: float
-    """What it is worth; NaN where there is no such rover or it cannot be told."""
+    """Value of the objective; NaN if the rover is invalid or cannot be judged."""
     note: str
-    """Why not; or on which drive it is what it is."""
+    """Reason for NaN, or the drive that determines the value."""
     load_shares: tuple[float, ...] = (float("nan"),) * 6
-    """Of the weight on the wheels on level ground, wheel order; NaN where it cannot stand."""
+    """Shares of the weight on level ground, wheel order; NaN if the rover cannot stand."""
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """All that was tried."""
+    """All trials of a study."""
 
     study: Study
     """The study."""
     baseline: Trial
-    """The rover as its file has it."""
+    """The unchanged rover of the file."""
     trials: tuple[Trial, ...]
-    """In the order in which they were tried."""
+    """The trials in order."""
 
     @property
     def best(self) -> Trial:
-        """The trial with the best objective; of equals the middle one.
+        """The trial with the best objective; of equal ones the middle one.
 
         Raises:
-            PlanningError: None could be told.
+            PlanningError: No trial could be judged.
         """
         known = [trial for trial in self.trials if np.isfinite(trial.objective)]
         if not known:
@@ -67,7 +68,7 @@ class StudyResult:
         return sorted(equals, key=lambda trial: trial.values)[len(equals) // 2]
 
     def write_csv(self, path: Path) -> None:
-        """Write a row for each trial."""
+        """Write a CSV file with a row for each trial."""
         _, what, unit = OBJECTIVES[self.study.objective]
         heads = [_head(p.name, p.unit) for p in self.study.parameters]
         heads += [_head(what, unit), *(f"load share {wheel}" for wheel in WHEELS), "note"]
@@ -85,14 +86,14 @@ def _head(name: str, unit: str) -> str:
 
 
 def count_trials(study: Study) -> int:
-    """Return how many rovers a study tries, at most for an optimisation."""
+    """Return the number of trials of a study; for an optimisation the maximum."""
     if study.method == "optimise":
         return study.evaluations
     return int(np.prod([parameter.count for parameter in study.parameters]))
 
 
 def run_study(study: Study, on_trial: Callable[[Trial], None] | None = None) -> StudyResult:
-    """Try the rovers of a study.
+    """Run all trials of a study.
 
     Args:
         study: The study.
@@ -137,13 +138,13 @@ def _combinations(study: Study) -> Iterator[tuple[float, ...]]:
 
 
 class _EnoughError(Exception):
-    """As many rovers were tried as may be."""
+    """The maximum number of trials is reached."""
 
 
 def _optimise(study: Study, attempt: Callable[[tuple[float, ...]], float]) -> None:
-    """Search all over by differential evolution, then near the best by Nelder and Mead.
+    """Optimise globally by differential evolution, then locally by the Nelder-Mead method.
 
-    Neither needs derivatives: objectives have kinks and jumps. Sources: Storn and Price, 1997;
+    Neither needs derivatives, because objectives are not smooth. Sources: Storn and Price, 1997;
     Nelder and Mead, 1965.
     """
     from scipy.optimize import differential_evolution, minimize

@@ -1,4 +1,4 @@
-"""A study: a rover, its numbers that vary, the drives and the objective; and its file."""
+"""Studies and their files: a rover, its varied numbers, the drives and the objective."""
 
 import math
 import os
@@ -34,7 +34,7 @@ OBJECTIVES = {
     "tallest_step": ("largest", "tallest step climbed", "m"),
     "load_imbalance": ("smallest", "largest wheel load over the mean, level ground", ""),
 }
-"""Objectives by name: what is best, what it is, its unit."""
+"""Objectives by name: best value, description, unit."""
 ABOUT_DRIVES = ("worst_utilisation", "tip_over_margin", "drive_energy")
 """Objectives that need drives."""
 
@@ -54,7 +54,7 @@ _NUMBER = Rule("a number in the unit of that number of the rover", holds=math.is
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterEntry:
-    """A number of the rover that varies, as a study file has it."""
+    """A varied number of the rover, as written in a study file."""
 
     name: Text
     """Dotted name, such as suspension.bogie_pivot.z."""
@@ -63,19 +63,19 @@ class ParameterEntry:
     high: Annotated[float, Field(alias="to"), _NUMBER]
     """Largest value."""
     count: Annotated[int, _whole(2, 1000)] = 11
-    """Values of a sweep, the ends included."""
+    """Number of values in a sweep, including both ends."""
     also: Annotated[
         tuple[Text, ...], Rule("a list of one name or more, all different", holds=_are_names)
     ] = ()
-    """Names of further numbers that always have the same value."""
+    """Names of further numbers that get the same value."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyParameter(ParameterEntry):
-    """A number of the rover that varies."""
+    """A varied number of the rover with its keys, unit and current value."""
 
     keys: tuple[Key, ...]
-    """Where it is in the rover file; then where the further numbers are."""
+    """Its key in the rover file, then those of the further numbers."""
     unit: str
     """Its unit."""
     now: float
@@ -97,27 +97,27 @@ class StudyDrive:
         0.0,
         0.0,
     )
-    """x, y [m] and yaw [rad]."""
+    """Start: x, y [m] and yaw [rad]."""
     length: Annotated[float, number("m", above=0.0)] = 2.0
     """[m]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOptions:
-    """The question of a study, and how it is answered."""
+    """The objective of a study and the options of its evaluation."""
 
     objective: Annotated[str, choice(*OBJECTIVES)]
     """One of OBJECTIVES."""
     method: Annotated[str, choice("sweep", "optimise")] = "sweep"
-    """A sweep tries all combinations of the parameters, an optimisation searches."""
+    """A sweep tries all combinations of the parameters; an optimisation searches the best one."""
     policy: Annotated[str, choice("equal", "optimal")] = "equal"
     """How the wheels share the traction."""
     friction: Annotated[float, number("", above=0.0)] | None = None
-    """Instead of the rover's own."""
+    """Coulomb friction; None takes that of the rover."""
     soil: Text | None = None
-    """Preset soil of the ground; None: firm ground."""
+    """Preset soil of the ground; None is firm ground."""
     evaluations: Annotated[int, _whole(3, 100_000)] = 60
-    """Most evaluations of an optimisation."""
+    """Maximum number of evaluations of an optimisation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,15 +125,15 @@ class Study(StudyOptions):
     """One study."""
 
     rover: Rover
-    """The rover whose numbers vary."""
+    """The rover whose numbers are varied."""
     parameters: tuple[StudyParameter, ...]
-    """The numbers that vary."""
+    """The varied numbers."""
     drives: tuple[StudyDrive, ...]
-    """The drives, for objectives that need them."""
+    """The drives; empty if the objective needs none."""
 
     @property
     def wants_largest(self) -> bool:
-        """Whether more of the objective is better."""
+        """Whether larger values of the objective are better."""
         return OBJECTIVES[self.objective][0] == "largest"
 
 
@@ -147,10 +147,10 @@ class _StudyFile(StudyOptions):
 
 
 def load_study(path: Path) -> Study:
-    """Read a study file; docs/studies.md has its keys.
+    """Read a study file; its keys are documented in docs/studies.md.
 
     Raises:
-        RoverFileError: The file cannot be read, or a key is missing, unknown or impossible.
+        RoverFileError: The file cannot be read, or a key is missing, unknown or invalid.
     """
     if not path.is_file():
         raise RoverFileError(f"no study file {path}")
@@ -162,12 +162,12 @@ def study_from_dict(data: object, source: str, folder: Path = Path()) -> Study:
 
     Args:
         data: Nested mapping with the keys of a study file (docs/studies.md).
-        source: Opens every error text.
-        folder: Where rover and terrain files are looked for first.
+        source: Name of the source; each error text starts with it.
+        folder: Folder that is searched first for rover and terrain files.
 
     Raises:
-        RoverFileError: A key is missing, unknown or impossible; names it.
-        SoilError: A soil that is not among the presets.
+        RoverFileError: A key is missing, unknown or invalid; the text names it.
+        SoilError: The soil is not one of the presets.
     """
     with errors_of(source):
         file: _StudyFile = read_as(_StudyFile, data, "a study file")
@@ -182,7 +182,7 @@ def study_from_dict(data: object, source: str, folder: Path = Path()) -> Study:
 
 
 def _check_use(file: _StudyFile) -> None:
-    """Check that drives and soil are there for objectives that use them, and for no others."""
+    """Check that drives are given if needed, and drives and soil only if they are used."""
     if file.soil is not None:
         soil_named(file.soil)
     if file.objective in ABOUT_DRIVES and not file.drives:
@@ -206,7 +206,7 @@ def _check_use(file: _StudyFile) -> None:
 def _find_parameters(
     entries: Sequence[ParameterEntry], rover: Rover
 ) -> tuple[StudyParameter, ...]:
-    """Return the parameters with their places in the rover file; none is varied twice."""
+    """Return the parameters with their keys in the rover file; check that none is varied twice."""
     contents, found, taken = rover_to_dict(rover), [], set[Key]()
     for k, entry in enumerate(entries):
         parameter = _find_parameter(entry, contents, f"parameters[{k}]")
@@ -234,5 +234,5 @@ def _find_file(drive: StudyDrive, folder: Path) -> StudyDrive:
 
 
 def _beside(name: str, folder: Path) -> str:
-    """Return the file of that name in a folder, or the name where there is none."""
+    """Return the path of a file in a folder if it exists, else the name."""
     return str(folder / name) if os.path.isfile(folder / name) else name

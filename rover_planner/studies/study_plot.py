@@ -1,4 +1,4 @@
-"""The picture of a study: its objective over one parameter or two, or trial by trial."""
+"""Draws a study: the objective over one or two parameters, or over the trials."""
 
 from pathlib import Path
 
@@ -13,14 +13,14 @@ from rover_planner.studies.runner import StudyResult
 from rover_planner.studies.study_file import OBJECTIVES
 
 POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
-"""Colours that colour-blind people tell apart (Okabe and Ito); each has a marker of its own."""
+"""Colours that are safe for colour-blind readers (Okabe and Ito); each has its own marker."""
 
 
 def draw_study(result: StudyResult, path: Path) -> None:
     """Draw a study to a PNG file.
 
     Raises:
-        PlanningError: The file cannot be written, or nothing could be judged.
+        PlanningError: The file cannot be written, or no trial could be judged.
     """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.0, 4.0), layout="constrained")

@@ -1,1 +1,1 @@
-"""The traction controller without ROS: measurements in, torques out."""
+"""The traction controller without ROS: computes torques from measurements."""

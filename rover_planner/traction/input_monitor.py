@@ -1,14 +1,14 @@
-"""Monitors inputs: which of them are there, fresh and usable."""
+"""Monitors inputs: whether each is available, recent and valid."""
 
 import math
 from collections.abc import Iterable
 
 NEVER = -math.inf
-"""Time of an input that has not come yet [s]."""
+"""Time of an input that has not arrived yet [s]."""
 
 
 class InputMonitor:
-    """When each input was last good, and what is wrong with those that came bad."""
+    """Keeps the last valid time of each input and the errors of invalid inputs."""
 
     def __init__(self, names: Iterable[str], timeout: float):
         """Monitor inputs by name; one older than `timeout` [s] is stale."""
@@ -18,22 +18,22 @@ class InputMonitor:
         self._errors: dict[str, str] = {}
 
     def take(self, name: str, now: float) -> None:
-        """Note that a good input came at a time [s]."""
+        """Record a valid input at time `now` [s]."""
         self._times[name] = now
         self._errors.pop(name, None)
 
     def refuse(self, name: str, error: str) -> None:
-        """Note that an unusable input came; the input is at fault until a good one comes."""
+        """Record an invalid input; it stays a fault until a valid one arrives."""
         self._errors[name] = error
 
     def is_fresh(self, name: str, now: float) -> bool:
-        """Tell whether an input is there, good and not stale."""
+        """Return whether an input is available, valid and not stale at time `now` [s]."""
         return name not in self._errors and now - self._times.get(name, NEVER) <= self.timeout
 
     def find_fault(self, now: float) -> str:
-        """Return what is wrong with the inputs, empty where nothing is.
+        """Return the fault of the inputs at time `now` [s]; empty if there is none.
 
-        The same fault has the same text: it holds no times.
+        The text of a fault does not change with time.
         """
         missing = [name for name in self._names if name not in self._times | self._errors]
         if missing:

@@ -1,4 +1,4 @@
-"""The loops around the shared torques: speed, heading, wheels that slip, and rate of change."""
+"""Control loops around the torque allocation: speed, heading, slip, stall and torque rate."""
 
 from dataclasses import dataclass
 from statistics import median
@@ -9,17 +9,17 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 
 MAX_RATE_RATIO = 1.3
-"""Largest median rate of the wheels, over the wanted one, that counts as rolling without slip."""
+"""Largest median wheel rate, over the wanted rate, that counts as rolling without slip."""
 MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.2, 2.0
-"""Bounds of the speed of a wheel's centre, over the mean of all."""
+"""Bounds of the speed of a wheel's centre, over the mean of all wheels."""
 STALL_RATIO = 0.3
 """Share of the wanted rate below which the rover counts as stalled."""
 STALL_DELAY = 0.5
-"""Time that a rover is stalled before its servos begin to take over, over TAKEOVER_TIME."""
+"""Delay between stall and takeover by the speed servos, in units of TAKEOVER_TIME."""
 TAKEOVER_TIME = 1.0
-"""Time in which the servos take over then [s]."""
+"""Time in which the share of the speed servos rises from 0 to 1 [s]."""
 RELEASE_TIME = 1.5
-"""Time in which the servos let go of a rover that moves again [s]."""
+"""Time in which their share falls from 1 to 0 when the rover moves again [s]."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,17 @@ class LoopGains:
     speed: float
     """Acceleration per error of speed [1/s]."""
     travel: float
-    """Acceleration per error of distance [1/s^2]."""
+    """Acceleration per error of distance travelled [1/s^2]."""
     heading: float
-    """Angular acceleration per error of yaw rate [1/s]; per error of yaw it is half as much."""
+    """Angular acceleration per error of yaw rate [1/s]; the integral gain is half of it."""
     slip: float
-    """Torque per difference of a wheel's rate from that of rolling [N m s/rad]."""
+    """Torque per difference between wheel rate and rolling rate [N m s/rad]."""
     torque_rate: float
-    """Largest change of a torque [N m/s]."""
+    """Largest rate of change of a torque [N m/s]."""
 
 
 class PIController:
-    """Turns an error of speed into a force or moment: proportional to it and to its integral."""
+    """PI controller of a speed error, with limited output and anti-windup."""
 
     def __init__(self, gain: float, integral_gain: float, limit: float):
         """Start with an integral of zero.
@@ -47,7 +47,7 @@ class PIController:
         Args:
             gain: Output per error.
             integral_gain: Output per integral of the error over time in [s].
-            limit: Largest size of the output, and of its integral part.
+            limit: Largest magnitude of the output, and of its integral part.
         """
         self._gain, self._integral_gain, self._limit = gain, integral_gain, limit
         self._integral = 0.0
@@ -62,7 +62,7 @@ class PIController:
         Args:
             error: Wanted minus measured speed.
             duration: Time since the last call [s].
-            limited: Whether the last output could not be followed; then the integral does not
+            limited: Whether the last output was not fully applied; the integral then does not
                 grow.
         """
         step = self._integral_gain * error * duration
@@ -75,23 +75,23 @@ class PIController:
 
 
 class StallDetector:
-    """Decides how far speed servos take over from a rover that does not move as wanted.
+    """Computes the share of speed servos in the torques of a stalled rover.
 
-    A wheel that is stopped by a face which the contact angles do not show yet looks like one on
-    level ground, and gets as little torque. Speed servos need no contact angles: each pulls until
+    A wheel at a steep face whose contact angle is not estimated yet gets only the small torque of
+    a wheel on level ground. Speed servos need no contact angles: each increases its torque until
     its wheel turns.
     """
 
     def __init__(self) -> None:
-        """Start with a rover that moves."""
+        """Start with a share of 0, as for a rover that moves."""
         self._share = 0.0
 
     def update(self, rate: float, wanted: float, duration: float) -> float:
-        """Return the share of the servos, 0 to 1.
+        """Return the share of the speed servos, 0 to 1.
 
         Args:
-            rate: Median rate of the wheels [rad/s]; wheels that spin raise their mean.
-            wanted: The wanted rate [rad/s].
+            rate: Median wheel rate [rad/s]; spinning wheels would raise a mean.
+            wanted: Wanted wheel rate [rad/s].
             duration: Time since the last call [s].
         """
         stalled = wanted != 0.0 and rate / wanted < STALL_RATIO
@@ -103,13 +103,13 @@ class StallDetector:
 def estimate_rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:
     """Return the rates (6,) at which the wheels would roll without slip.
 
-    They follow the median of the measured ones: two wheels that spin do not change it.
+    They are based on the median of the measured rates, which two spinning wheels do not change.
 
     Args:
-        wheel_rates: (6,) measured [rad/s].
-        ratios: (6,) speeds of the wheels' centres over their mean; a wheel that has to go
-            backward or far ahead is more likely one whose contact angle is wrong.
-        wanted: Wanted mean [rad/s]; rates far beyond it are those of wheels that slip.
+        wheel_rates: (6,) measured rates [rad/s].
+        ratios: (6,) speeds of the wheels' centres over their mean. Ratios outside the bounds
+            probably come from a wrong contact angle and are clipped.
+        wanted: Wanted mean rate [rad/s]; the median is limited to MAX_RATE_RATIO times it.
     """
     ratios = np.minimum(np.maximum(ratios, MIN_SPEED_RATIO), MAX_SPEED_RATIO)
     limit = MAX_RATE_RATIO * abs(wanted)
@@ -119,7 +119,7 @@ def estimate_rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -
 def limit_rate(torques: Floats, last: Floats, max_change: float) -> Floats:
     """Return torques (6,) that differ from the last by at most `max_change` [N m].
 
-    All changes are scaled by the same factor, so that the wheels share them as before.
+    All changes are scaled by the same factor, which keeps their ratios.
     """
     limited = np.empty(len(torques))
     _write_limited(torques, last, max_change, limited)

@@ -1,7 +1,7 @@
-"""A map with everything that the traction controller needs of it, so that an update need not wait.
+"""A map that is prepared for the traction controller, so that updates are not delayed.
 
-Preparing a map takes some milliseconds, longer than an update may. So a thread of its own prepares
-it (`ros/map_intake.py`), and the next update takes it over.
+Preparing a map takes several milliseconds, longer than an update may take. A separate thread does
+it (`ros/map_intake.py`), and the next update takes the result.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from rover_physics.traction.map_contacts import MapContactFinder
 
 @dataclass(frozen=True, eq=False)
 class PreparedMap:
-    """A map, and what finds contact angles on it."""
+    """A map and the finder of contact angles on it."""
 
     rover: Rover
-    """The rover that it was prepared for."""
+    """The rover for which the map was prepared."""
     terrain: Terrain
     """The map."""
     finder: MapContactFinder
@@ -24,5 +24,5 @@ class PreparedMap:
 
 
 def prepare_map(rover: Rover, terrain: Terrain) -> PreparedMap:
-    """Prepare a map for a rover; that takes some milliseconds."""
+    """Prepare a map for a rover; takes several milliseconds."""
     return PreparedMap(rover, terrain, MapContactFinder(rover, terrain))

@@ -8,7 +8,7 @@ import numpy as np
 from rover_planner.traction.traction_service import TractionUpdate
 
 MAX_TIMES = 6000
-"""Number of the last updates whose times are kept."""
+"""Number of updates whose times are kept: one minute at 100 Hz."""
 
 
 class TractionStatistics:
@@ -20,7 +20,7 @@ class TractionStatistics:
         self._last_start: float | None = None
         self._times: deque[float] = deque(maxlen=MAX_TIMES)
         self.missed = 0
-        """Cycles without an update, because one came late."""
+        """Cycles without an update because an update came late."""
         self.fallbacks = 0
         """Updates with equal torques because OSQP failed."""
         self.updates = 0
@@ -30,7 +30,7 @@ class TractionStatistics:
 
     @property
     def times(self) -> np.ndarray:
-        """Durations of the last updates, publishing included [s]."""
+        """Durations of the last updates, including publishing [s]."""
         return np.array(self._times)
 
     def take(self, update: TractionUpdate, start: float, end: float) -> None:
@@ -58,7 +58,7 @@ class TractionStatistics:
 
 
 def _describe_update(update: TractionUpdate) -> dict[str, Any]:
-    """Return what an update came to by name, empty where there is a fault."""
+    """Return the results of an update by name; empty if there is a fault."""
     answer, estimate = update.answer, update.estimate
     if answer is None or estimate is None:
         return {}

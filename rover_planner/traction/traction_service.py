@@ -1,4 +1,4 @@
-"""The traction controller without ROS: it keeps measurements and makes torques of them."""
+"""The traction controller without ROS: keeps measurements and computes wheel torques."""
 
 import time
 from collections.abc import Mapping
@@ -43,15 +43,15 @@ from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 INPUTS = ("joint_states", "imu", "cmd_vel")
 ODOMETRY = "odometry"
 MAX_PUSH = 0.6
-"""Largest push of the speed loop, in weights."""
+"""Largest push of the speed loop, as a share of the rover's weight."""
 HEADING_INTEGRAL_GAIN = 0.5
 """Integral gain of the heading loop over its gain [1/s]."""
 SERVO_STIFFNESS = 6.0
-"""Gain of the servos that take over from a stalled rover, over the gain against slip."""
+"""Gain of the speed servos during a stall, over the slip gain."""
 MAX_STEP = 0.1
-"""Longest time between two updates that loops and filter count [s]."""
+"""Upper bound of the time step of loops and filter [s]."""
 TURN_LEFT = np.repeat([1.0, -1.0], 3)
-"""Sign of each wheel's torque that turns the rover left: the right wheels drive forward."""
+"""Signs (6,) of wheel torques that turn the rover left: the right wheels drive forward."""
 
 
 @dataclass(frozen=True)
@@ -65,37 +65,37 @@ class TractionSettings:
     max_torque: float
     """Largest torque of a wheel [N m]."""
     payload: float | None
-    """Mass at the arm's tip [kg], None for the rover's own."""
+    """Mass at the arm's tip [kg]; None takes that of the rover."""
     policy: str
     """One of TORQUE_POLICIES."""
     timeout: float
-    """Age from which an input is stale [s]."""
+    """Age above which an input is stale [s]."""
     odometry_timeout: float
-    """The same for odometry [s]."""
+    """Age above which odometry is not used [s]."""
     gains: LoopGains
     """Gains of the loops."""
 
 
 @dataclass(frozen=True, eq=False)
 class TractionUpdate:
-    """What came of one update."""
+    """The result of one update."""
 
     torques: Floats
-    """(6,) torques to command, wheel order [N m]; zero where there is a fault."""
+    """(6,) torques to command, wheel order [N m]; zero if there is a fault."""
     fault: str
-    """Why there is no torque, empty where nothing is wrong."""
+    """Reason for zero torques; empty if there is no fault."""
     warning: str
-    """What is wrong though the rover drives, empty where nothing is."""
+    """Problem that does not stop the rover; empty if there is none."""
     answer: TractionAnswer | None
-    """The shared torques, before heading and slip; None where there is a fault."""
+    """The torque allocation, before heading and slip control; None if there is a fault."""
     estimate: ContactEstimate | None
-    """Where the wheels touch; None where there is a fault."""
+    """The contact angles; None if there is a fault."""
     duration: float
-    """How long it took [s]."""
+    """Computation time of the update [s]."""
 
 
 def load_traction_settings(parameters: TractionControllerParameters) -> TractionSettings:
-    """Load the rover that the parameters name, and check what depends on it.
+    """Load the rover named in the parameters, and check the payload.
 
     Raises:
         RoverError: The rover cannot be loaded, or cannot carry the payload.
@@ -145,7 +145,7 @@ class TractionService:
 
     @property
     def settings(self) -> TractionSettings:
-        """The settings in force."""
+        """The current settings."""
         return self._settings
 
     @settings.setter
@@ -165,7 +165,7 @@ class TractionService:
         self._reset()
 
     def _create_loops(self) -> None:
-        """Create the loops of speed and heading with the gains in force."""
+        """Create the loops of speed and heading with the current gains."""
         rover, gains = self._settings.rover, self._settings.gains
         weight = self._writer.weight
         mass, max_push = weight / rover.gravity, MAX_PUSH * weight
@@ -180,7 +180,7 @@ class TractionService:
     def take_joints(
         self, positions: Mapping[str, float], velocities: Mapping[str, float], now: float
     ) -> None:
-        """Take the angles [rad] and rates [rad/s] of joints by name, at a time [s]."""
+        """Take angles [rad] and rates [rad/s] of joints by name, measured at time `now` [s]."""
         missing = [name for name in SUSPENSION_JOINTS if name not in positions]
         missing += [name for name in WHEEL_JOINTS if name not in velocities]
         if missing:
@@ -199,40 +199,40 @@ class TractionService:
         self._monitor.take("joint_states", now)
 
     def take_attitude(self, roll: float, pitch: float, rates: Floats | None, now: float) -> None:
-        """Take roll and pitch [rad] at a time [s].
+        """Take roll and pitch [rad], measured at time `now` [s].
 
-        `rates` is the angular velocity (3,) in the body frame [rad/s], None where not measured.
+        `rates` is the angular velocity (3,) in the body frame [rad/s], None if not measured.
         """
         self._attitude, self._body_rates = (roll, pitch), rates
         self._monitor.take("imu", now)
 
     def take_command(self, speed: float, yaw_rate: float, now: float) -> None:
-        """Take the wanted speed [m/s] and yaw rate [rad/s], at a time [s]."""
+        """Take the wanted speed [m/s] and yaw rate [rad/s], received at time `now` [s]."""
         self._wanted_speed, self._wanted_yaw_rate = speed, yaw_rate
         self._monitor.take("cmd_vel", now)
 
     def take_odometry(self, pose: Floats, deviation: float, now: float) -> None:
-        """Take (4,) x, y, z [m] and yaw [rad] in the map frame, and the deviation of x, y [m]."""
+        """Take x, y, z [m], yaw [rad] (4,), map frame, and the standard deviation of x, y [m]."""
         self._pose, self._deviation = pose, deviation
         self._odometry_monitor.take(ODOMETRY, now)
 
     def take_terrain(self, terrain: Terrain) -> None:
-        """Take a map; it is used while odometry is fresh."""
+        """Take a map; it is used while odometry is recent."""
         self.take_map(prepare_map(self._settings.rover, terrain))
 
     def take_map(self, prepared: PreparedMap) -> None:
-        """Take a prepared map; it is prepared anew if it was for another rover."""
+        """Take a prepared map; prepare it again if it is for another rover."""
         rover = self._settings.rover
         if prepared.rover is not rover:
             prepared = prepare_map(rover, prepared.terrain)
         self._terrain, self._finder = prepared.terrain, prepared.finder
 
     def refuse(self, name: str, error: str) -> None:
-        """Note that an unusable input came, and why it is."""
+        """Record an invalid input and its error."""
         (self._odometry_monitor if name == ODOMETRY else self._monitor).refuse(name, error)
 
     def update(self, now: float) -> TractionUpdate:
-        """Return the torques for a time [s], by the clock of the inputs."""
+        """Return the torques for time `now` [s], on the same clock as the inputs."""
         start = time.perf_counter()
         fault = self._monitor.find_fault(now)
         if fault:
@@ -262,7 +262,7 @@ class TractionService:
         return TractionUpdate(zero, fault, "", None, None, time.perf_counter() - start)
 
     def _reset(self) -> None:
-        """Forget the last answer, and set all integrals to zero."""
+        """Discard the last answer and set all integrals to zero."""
         self._speed.reset()
         self._heading.reset()
         self._stall = StallDetector()
@@ -272,7 +272,7 @@ class TractionService:
         self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
-        """Return the contact angles from the best source, and what is wrong, empty if nothing."""
+        """Return the contact angles of the best source, and a warning, empty if none."""
         from_motion, warning = self._estimate_from_motion(duration)
         if self._finder is None or not self._odometry_monitor.is_fresh(ODOMETRY, now):
             return from_motion, warning
@@ -284,7 +284,7 @@ class TractionService:
             return from_motion, warning or str(error)
 
     def _estimate_from_motion(self, duration: float) -> tuple[ContactEstimate, str]:
-        """Return the contact angles from motion, zero with a warning where rates are missing."""
+        """Return the contact angles from motion; without rates, zero angles and a warning."""
         if self._suspension_rates is None or self._body_rates is None:
             lacking = "joint_states has no velocities of the suspension"
             if self._suspension_rates is not None:
@@ -312,12 +312,12 @@ class TractionService:
         return state
 
     def _find_push(self, duration: float) -> float:
-        """Return the wanted net traction [N] by the mean travel of the wheels."""
+        """Return the wanted net traction [N], from the mean travel of the wheels."""
         speed = self._mean_rate * self._settings.rover.wheel.radius
         return self._speed.update(self._wanted_speed - speed, duration, self._limited)
 
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
-        """Return the torques by the policy, and note whether a limit holds them back."""
+        """Return the torques of the policy, and record whether a limit is active."""
         answer = solve_traction(
             self._workspace, rows, self._inputs, self._last,
             max_programs=MAX_PROGRAMS if self._optimal else 0,
@@ -329,7 +329,7 @@ class TractionService:
     def _command_torques(
         self, answer: TractionAnswer, rows: BalanceRows, duration: float
     ) -> Floats:
-        """Return the torques (6,) with those of the other loops, limited in size and rate."""
+        """Return the torques (6,) [N m] with the other loops, limited in magnitude and rate."""
         settings, torques = self._settings, answer.torques.copy()
         if self._body_rates is not None:
             error = self._wanted_yaw_rate - float(self._body_rates[2])
@@ -345,13 +345,13 @@ class TractionService:
         return self._torques
 
     def _add_slip_control(self, torques: Floats, rows: BalanceRows, duration: float) -> None:
-        """Add torques against slip, and let speed servos take over from a stalled rover."""
+        """Add torques against slip, and those of the speed servos if the rover is stalled."""
         gain, wheel_rates = self._settings.gains.slip, self._wheel_rates
         wanted = self._wanted_speed / self._settings.rover.wheel.radius
         torques -= gain * (
             wheel_rates - estimate_rolling_rates(wheel_rates, rows.wheel_speeds, wanted)
         )
-        # Wheels that spin turn faster than the rover goes: the median is nearer to that.
+        # The median is close to the rover's speed even if some wheels spin.
         share = self._stall.update(median(wheel_rates.tolist()), wanted, duration)
         if share > 0.0:
             servo = gain * SERVO_STIFFNESS * (wanted - wheel_rates)

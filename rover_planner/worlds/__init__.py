@@ -1,1 +1,1 @@
-"""Made terrains: fractal relief, craters and rocks from a seed."""
+"""Generated terrains: fractal relief, craters and rocks from a seed."""

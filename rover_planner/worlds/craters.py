@@ -1,7 +1,7 @@
-"""Craters: how many of which diameter, and the relief of a simple one with rim and ejecta.
+"""Craters of a generated terrain: size distribution, and relief with rim and ejecta.
 
-Fresh simple craters are about a fifth as deep, rim to floor, as they are wide, and their rim
-stands about 0.036 diameters over the plain (Pike 1977, Size-dependence in the shape of fresh
+Fresh simple craters have a depth, rim to floor, of about a fifth of their diameter. Their rim
+is about 0.036 diameters above the plain (Pike 1977, Size-dependence in the shape of fresh
 impact craters on the Moon). The bowl is a paraboloid; the ejecta blanket thins with the cube of
 the distance (McGetchin, Settle and Head 1973, Radial thickness variation in impact crater
 ejecta). The number of craters of diameter D and larger falls with D^-2, that of a surface in
@@ -20,11 +20,11 @@ RIM_TO_DIAMETER = 0.036
 NUMBER_EXPONENT = 2.0
 """Craters of diameter D and larger are proportional to D to minus this power."""
 EJECTA_REACH = 3.0
-"""Where the ejecta blanket ends [crater radii]."""
+"""Outer radius of the ejecta blanket [crater radii]."""
 
 
 def crater_profile(distance, diameter: float) -> np.ndarray:
-    """Return the height of a fresh crater over the plain it is in.
+    """Return the height of a fresh crater above the surrounding plain.
 
     Args:
         distance: Distances from its centre [m], any shape.
@@ -50,7 +50,7 @@ def sample_diameters(
 
     Args:
         rng: Source of the random numbers.
-        density: Craters of 1 m and larger per square metre [1/m^2] if the law held down to there.
+        density: Craters of 1 m and larger per square metre [1/m^2], by the law above.
         area: Size of the ground [m^2].
         smallest: Diameter [m] of the smallest craters drawn.
         largest: Diameter [m] of the largest.
@@ -87,9 +87,9 @@ def add_crater(
         elevation: Heights (ny, nx) [m].
         resolution: Cell size [m].
         column: Centre along x [cells, may be a fraction or off the grid].
-        row: Centre along y, the same.
+        row: Centre along y [cells, may be a fraction or off the grid].
         diameter: Diameter [m].
-        freshness: 1 for a fresh crater; less scales its relief down as wear does.
+        freshness: Scale of the relief, 1 for a fresh crater, less for a worn one.
     """
     ny, nx = elevation.shape
     reach = EJECTA_REACH * 0.5 * diameter / resolution

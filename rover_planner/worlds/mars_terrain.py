@@ -1,4 +1,4 @@
-"""A Mars-like terrain from a seed: fractal relief, worn and fresh craters, and rocks."""
+"""Generates a Mars-like terrain from a seed: fractal relief, craters and rocks."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from rover_planner.errors import PlanningError
 from rover_planner.worlds import craters, rocks
 
 HURST = 0.8
-"""How the relief grows with distance: its RMS height difference is proportional to distance^HURST.
+"""Default Hurst exponent: the RMS height difference is proportional to distance^HURST.
 
 0.5 is a random walk, 1 a surface equally rough at every scale; natural terrain lies between
 (Shepard et al. 2001, The roughness of natural terrain, Journal of Geophysical Research 106(E12)).
 """
 
 MAX_CELLS = 25_000_000
-"""Largest terrain worth making [cells]; more is a slip in size or resolution."""
+"""Largest terrain [cells]; more is probably an error in size or resolution."""
 
 
 def make_mars_terrain(
@@ -29,10 +29,10 @@ def make_mars_terrain(
     rock_cover: float = 0.03,
     rock_diameters: tuple[float, float] | None = None,
 ) -> Terrain:
-    """Make a Mars-like terrain, the same for the same arguments.
+    """Generate a Mars-like terrain; the same arguments give the same terrain.
 
     Args:
-        seed: Seed of every random number in it.
+        seed: Seed of all random numbers.
         size: Extent along x and y [m], or one number for both.
         resolution: Cell size [m].
         hurst: Exponent of the fractal relief, see HURST.
@@ -43,7 +43,7 @@ def make_mars_terrain(
         rock_diameters: Smallest and largest rock [m]; by default two cells to 1.5 m.
 
     Returns:
-        A terrain with its origin so that (0, 0) is its middle, its mean height zero, no NaN.
+        A terrain centred on (0, 0), with mean height zero and without NaN.
 
     Raises:
         PlanningError: An argument out of range.
@@ -52,7 +52,7 @@ def make_mars_terrain(
     width, height = nx * resolution, ny * resolution
     if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise PlanningError(f"seed is {seed!r}; it must be a whole number of at least 0")
-    # a stream of its own for each kind, so that more rocks do not move the hills
+    # separate random streams, so that the number of rocks does not change the relief
     relief_rng, crater_rng, rock_rng = (
         np.random.default_rng(s) for s in np.random.SeedSequence(int(seed)).spawn(3)
     )
@@ -73,10 +73,13 @@ def make_relief(
     hurst: float,
     roughness: float,
 ) -> np.ndarray:
-    """Make fractal relief by spectral synthesis (Saupe 1988, in The Science of Fractal Images).
+    """Generate fractal relief by spectral synthesis.
 
-    White noise is given a power spectrum that falls with wave number^-(2 hurst + 2). It is made
-    on a grid twice as large, as the result is periodic, cropped, and scaled to the roughness.
+    Source: Saupe 1988, in The Science of Fractal Images.
+
+    White noise is filtered to a power spectrum proportional to wave number^-(2 hurst + 2). Because
+    the result is periodic, it is computed on a grid twice as large and cropped. Then it is scaled
+    to the roughness.
 
     Args:
         rng: Source of the random numbers.
@@ -109,7 +112,7 @@ def make_relief(
 
 
 def _dig_craters(rng, elevation, resolution, density, span) -> None:
-    """Dig craters, the largest first, in and around the map, from worn to fresh."""
+    """Add craters in and around the map, the largest first, with random freshness."""
     ny, nx = elevation.shape
     margin = 0.5 * craters.EJECTA_REACH * span[1] / resolution
     area = (nx + 2 * margin) * (ny + 2 * margin) * resolution**2
@@ -120,7 +123,7 @@ def _dig_craters(rng, elevation, resolution, density, span) -> None:
 
 
 def _strew_rocks(rng, elevation, resolution, cover, span) -> None:
-    """Put rocks anywhere on the map."""
+    """Add rocks at random positions of the map."""
     ny, nx = elevation.shape
     diameters = rocks.sample_diameters(rng, cover, nx * ny * resolution**2, *span)
     columns = rng.uniform(0, nx - 1, len(diameters))

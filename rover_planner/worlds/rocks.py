@@ -1,4 +1,4 @@
-"""Rocks on Mars: how many of which diameter, and their shape on an elevation grid.
+"""Rocks of a generated terrain: size distribution, and shape on an elevation grid.
 
 Size-frequency law of Golombek and Rapp (1997), Size-frequency distributions of rocks on Mars and
 Earth analog sites, Journal of Geophysical Research 102(E2): rocks of diameter D [m] and larger
@@ -8,7 +8,7 @@ of diameter D covers pi D^2 / 4, so per square metre there are
 
     n(D) dD = 4 k q exp(-q D) / (pi D^2) dD
 
-rocks of diameter D to D + dD. Rocks are half-ellipsoids on the ground, about half as high as wide.
+rocks of diameter D to D + dD. Rocks are half-ellipsoids whose height is half of their diameter.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ HEIGHT_TO_DIAMETER = 0.5
 
 
 def decay_rate(k: float) -> float:
-    """Return q(k) [1/m], how fast larger rocks get rarer, for a total rock cover k [-]."""
+    """Return the decay rate q(k) [1/m] of the law for a total rock cover k [-]."""
     return 1.79 + 0.152 / k
 
 
@@ -30,7 +30,7 @@ def cumulative_area(k: float, diameter):
 
 
 def cumulative_number(k: float, diameters: np.ndarray, largest: float) -> np.ndarray:
-    """Return how many rocks per square metre are at least as large as each diameter.
+    """Return the number of rocks per square metre at or above each diameter.
 
     Args:
         k: Fraction of the ground that all rocks cover.
@@ -82,7 +82,7 @@ def sample_diameters(
     sizes = np.geomspace(smallest, largest, 512)
     numbers = cumulative_number(k, sizes, largest)
     count = rng.poisson(numbers[0] * area)
-    # from the largest on, numbers ascend: the inverse of the cumulative law
+    # inverse of the cumulative law; numbers increase from the largest diameter down
     drawn = np.interp(rng.random(count) * numbers[0], numbers[::-1], np.log(sizes[::-1]))
     return np.exp(drawn)
 
@@ -100,7 +100,7 @@ def add_rocks(
         elevation: Heights (ny, nx) [m], without NaN.
         resolution: Cell size [m].
         columns: Centres of the rocks along x (n,) [cells, may be fractions], on the grid.
-        rows: Centres along y (n,), the same.
+        rows: Centres of the rocks along y (n,) [cells, may be fractions], on the grid.
         diameters: Diameters (n,) [m]; a rock stands on the height at its centre.
     """
     ny, nx = elevation.shape
