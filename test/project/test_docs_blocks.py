@@ -6,8 +6,10 @@ here is listed in NOT_RUN; it is read by the parsers of the product all the same
 
 import ast
 import os
+import re
 import subprocess
 import sys
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from support.processes import ProcessToken
-from support.project.checkout import TOP, console_scripts
+from support.project.checkout import TOP, console_scripts, setup_arguments
 from support.project.command_checks import check_command
 from support.project.doc_blocks import PAGES, Block, Command, read_blocks, split_commands
 from support.ros_fixtures import domain_id
@@ -74,6 +76,26 @@ def test_a_block_names_only_what_there_is(block):
     assert (checked.returncode, checked.stderr) == (0, "")
     for command in split_commands(block.text):
         check_command(command.words)
+
+
+def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
+    from_apt = {
+        element.text.removeprefix("python3-")
+        for element in ElementTree.parse(TOP / "package.xml").getroot().iter("exec_depend")
+    }
+    required = {
+        re.match(r"[\w-]+", requirement)[0].lower().removeprefix("py")
+        for requirement in setup_arguments()["install_requires"]
+    }
+    readme = [command for block in BLOCKS if block.page == "README.md" and block.language == "sh"
+              for command in split_commands(block.text)]  # fmt: skip
+    by_pip = {
+        word.removeprefix("py")
+        for command in readme
+        if command.words[:4] == ("pip", "install", "-c", "locked.txt")
+        for word in command.words[4:]
+    }
+    assert required - from_apt == by_pip
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=str)
