@@ -166,6 +166,7 @@ def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(ros, t
     wait_until(lambda: simulator.simulation.steering[0] == 0.0, "the speeds to be forgotten")
 
 
+@pytest.mark.slow
 def test_diagnostics_come_though_nothing_happens_and_say_where_the_rover_is(ros, terrain_file):
     ear = Ear(ros)
     start_simulator(ros, terrain_file)
@@ -176,6 +177,7 @@ def test_diagnostics_come_though_nothing_happens_and_say_where_the_rover_is(ros,
     assert status.values[0].value.startswith(f"[{START_X}, 0.0, ")
 
 
+@pytest.mark.slow
 def test_a_wall_ahead_stops_it_with_the_reason_in_the_diagnostics(ros, tmp_path):
     ear = Ear(ros)
     file = tmp_path / "wall.npz"

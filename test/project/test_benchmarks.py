@@ -29,7 +29,7 @@ SMALL = {
     "walls": {"POSES": 5, "HEIGHTS": (0.3,)},
 }
 """Values of each topic's constants with which it takes seconds."""
-QUICK = ("fan", "growth", "ingestion", "poses", "view")
+QUICK = ("fan", "growth", "ingestion", "view")
 """Topics that take less than two seconds in the small size."""
 
 

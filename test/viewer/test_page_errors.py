@@ -147,6 +147,7 @@ def test_a_path_that_does_not_exist_is_refused_by_its_number(page):
     assert "no path 8; there are paths 1 to" in page.drive_tab._verdict.content
 
 
+@pytest.mark.slow
 def test_a_live_page_tries_again_by_itself_after_an_error(ros, monkeypatch):
     listener = ros.spin(LiveListener(context=ros.context))
     page = LivePage(session_on(ramp), listener, port=0)

@@ -39,6 +39,7 @@ def test_nothing_passable_under_equal_torques_got_stuck_or_tipped():
     assert [drive.label for drive in passable if drive.outcome != PASSED] == []
 
 
+@pytest.mark.slow
 def test_whatever_passed_is_passable_with_traction_control():
     refused = [
         f"{drive.label}: {verdict.reason}"
