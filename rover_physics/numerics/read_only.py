@@ -1,6 +1,5 @@
 """Read-only arrays, so that results derived from an array cannot become stale."""
 
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -42,7 +41,6 @@ def seal_array(array: np.ndarray) -> np.ndarray:
 
 def freeze_fields(record: Any) -> None:
     """Make all arrays of a dataclass read-only in place; no one else may write into them."""
-    for field in fields(record):
-        value = getattr(record, field.name)
+    for value in vars(record).values():
         if isinstance(value, np.ndarray):
             value.flags.writeable = False

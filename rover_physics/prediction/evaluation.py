@@ -128,7 +128,7 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
             those that rest on the ground; (0, 6, 2) if none climbs.
     """
     results = new_results(len(poses))
-    with limit_threads(effort(model[0].settings, len(poses))) as threads:
+    with limit_threads(effort(model["settings"][0], len(poses))) as threads:
         evaluate_poses(model, poses, held, new_works(threads, len(poses)), results)
     return results
 

@@ -1,7 +1,7 @@
 """Rover, terrain and options, checked and packed into the records that kernels read."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -34,15 +34,15 @@ class PackedModel:
             "pickle rover, terrain and options"
         )
 
-    @property
+    @cached_property
     def record(self) -> Any:
         """The MODEL itself."""
         return self.records[0]
 
-    @property
+    @cached_property
     def settings(self) -> Any:
         """SETTINGS of the MODEL."""
-        return self.records[0].settings
+        return self.record.settings
 
 
 def pack_model(
