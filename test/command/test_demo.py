@@ -12,6 +12,7 @@ import pytest
 
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.cli import main
+from rover_planner.demo import demo as demo_module
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.processes import ProcessToken
@@ -122,7 +123,7 @@ def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file, number, 
 @pytest.mark.slow
 def test_ctrl_c_to_the_whole_group_during_compilation_ends_everything(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
-    demo.wait_for("rover_physics.prediction.sweep")
+    demo.wait_for(demo_module.COMPILER)
     os.killpg(demo.process.pid, signal.SIGINT)
     returned, _, err = demo.finish()
     assert returned == 130
@@ -139,6 +140,29 @@ def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     assert err.count("\n") == 1
     assert "traverse_server" in err
     assert_nothing_left(demo)
+
+
+def test_children_find_the_packages_and_the_standard_library():
+    """A folder inside a package on the path would hide modules such as `signal` or `ros`."""
+    first = demo_module._environment()["PYTHONPATH"].split(os.pathsep)[0]
+    assert Path(first) == REPOSITORY
+    ran = subprocess.run(
+        [sys.executable, "-c", "import rover_physics, msg_adapters, rover_planner"],
+        env={"PYTHONPATH": first, "PATH": os.environ["PATH"]},
+        cwd="/",
+        check=False,
+    )
+    assert ran.returncode == 0
+
+
+@pytest.mark.slow
+def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
+    """The step that says so did nothing once its module had moved; the server compiled then."""
+    environment = os.environ | {"PYTHONPATH": str(REPOSITORY), "NUMBA_CACHE_DIR": str(tmp_path)}
+    subprocess.run(
+        [sys.executable, "-m", demo_module.COMPILER], env=environment, check=True, timeout=300
+    )
+    assert len(list(tmp_path.rglob("*.nbc"))) > 50
 
 
 def test_the_picture_is_of_the_same_candidates_as_the_server_judges():
