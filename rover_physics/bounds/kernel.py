@@ -20,6 +20,7 @@ from rover_physics.bounds.pose import SPREAD, bound_configuration
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.stability import CORNERS
+from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.records import new_record, record_type, shared_array_of
 from rover_physics.numerics.threads import limit_threads
@@ -109,7 +110,8 @@ def find_bounds(
         works["rover"]["contacts"][name] = np.nan
     uncertain = shared_array_of(_pack_uncertain(model, ground))
     with limit_threads(BOUNDS_EFFORT * len(poses)):
-        bound_poses(uncertain, poses, nominal, works, bounds)
+        for part in slices(len(poses)):
+            bound_poses(uncertain, poses[part], nominal[part], works, bounds[part])
     return bounds
 
 

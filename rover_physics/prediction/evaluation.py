@@ -18,6 +18,7 @@ from rover_physics.forces.torques import (
     minimise_friction,
     take_equal_torques,
 )
+from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel, sweep_kernel
 from rover_physics.numerics.records import new_record, record_type
 from rover_physics.numerics.threads import limit_threads
@@ -129,7 +130,9 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
     """
     results = new_results(len(poses))
     with limit_threads(effort(model["settings"][0], len(poses))) as threads:
-        evaluate_poses(model, poses, held, new_works(threads, len(poses)), results)
+        works = new_works(threads, len(poses))
+        for part in slices(len(poses)):
+            evaluate_poses(model, poses[part], held[part], works, results[part])
     return results
 
 

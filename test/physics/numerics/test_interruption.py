@@ -1,0 +1,73 @@
+"""Sweeps stop where their caller says so, and slices change no result."""
+
+import numpy as np
+import pytest
+
+from rover_physics.bounds.path import bound_path
+from rover_physics.numerics import interruption
+from rover_physics.numerics.interruption import check_interruption, interruptible, slices
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from support.grounds import make_terrain, waves
+
+
+class Stopped(Exception):
+    """Raised by the checks of these tests."""
+
+
+def stop_at(call: int):
+    """Return a check that raises at its n-th call."""
+    calls = iter(range(1, call + 1))
+
+    def check() -> None:
+        if next(calls) == call:
+            raise Stopped
+
+    return check
+
+
+def along_x(count: int) -> np.ndarray:
+    poses = np.zeros((count, 3))
+    poses[:, 0] = np.linspace(-1.5, 1.5, count)
+    return poses
+
+
+def test_without_a_check_there_is_one_slice():
+    check_interruption()
+    assert list(slices(10**6)) == [slice(0, 10**6)]
+
+
+def test_slices_cover_all_items_once_and_in_order():
+    with interruptible(lambda: None):
+        parts = list(slices(1000))
+    assert parts[0].start == 0 and parts[-1].stop == 1000 and len(parts) > 1
+    assert all(one.stop == other.start for one, other in zip(parts, parts[1:], strict=False))
+
+
+def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
+    rover, ground, poses = load_rover("lsr1"), make_terrain(waves), along_x(500)
+    with pytest.raises(Stopped), interruptible(stop_at(2)):
+        sweep_path(rover, ground, poses)
+    assert sweep_path(rover, ground, poses).settled.all()
+
+
+def test_slices_change_no_bit_of_a_prediction_or_its_bounds(monkeypatch):
+    rover, poses = load_rover("lsr1"), along_x(300)
+    ground = make_terrain(waves)
+    ground = type(ground)(
+        ground.elevation,
+        ground.resolution,
+        ground.origin,
+        elevation_std=np.full(ground.elevation.shape, 0.002),
+    )
+    whole = sweep_path(rover, ground, poses)
+    whole_bounds = bound_path(rover, ground, whole)
+    monkeypatch.setattr(interruption, "FIRST_SLICE", 7)
+    monkeypatch.setattr(interruption, "MAX_GROWTH", 1.0)
+    with interruptible(lambda: None):
+        parts = sweep_path(rover, ground, poses)
+        parts_bounds = bound_path(rover, ground, parts)
+    for name in ("position", "wheel_loads", "friction_utilisation", "tip_over_ratio"):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+    for name in ("roll", "wheel_loads", "belly_clearance"):
+        np.testing.assert_array_equal(getattr(parts_bounds, name), getattr(whole_bounds, name))
