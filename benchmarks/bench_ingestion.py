@@ -10,8 +10,8 @@ from benchmarks.measure import Figure, median_times
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.service_settings import load_service_settings
-from rover_planner.planning.traverse_service import TraverseService
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 CELLS = 1_000

@@ -15,8 +15,8 @@ from benchmarks.measure import Figure, quantile
 from benchmarks.planner_process import SERVER, Planner, planner_and_processes
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.service_settings import load_service_settings
-from rover_planner.planning.traverse_service import TraverseService
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 ECHO = "/echo/can_traverse"

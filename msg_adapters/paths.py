@@ -136,6 +136,10 @@ class PoseStock:
             turn.x, turn.y, turn.z, turn.w = xyzw
         return self._poses[: len(positions)]
 
+    def shrink(self, most: int) -> None:
+        """Drop the poses beyond a number of `most`."""
+        del self._poses[most:], self._parts[most:]
+
 
 def settled_path(
     prediction: PathPrediction,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import Path
+from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan, LoadMap
 from rcl_interfaces.msg import Log, Parameter
 from rcl_interfaces.srv import SetParameters
@@ -58,6 +58,7 @@ class PlannerClient(Node):
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._path = self.create_publisher(Path, f"{SERVER}/path", topic_qos())
         self._joints = self.create_publisher(JointState, "joint_states", topic_qos())
+        self._odometry = self.create_publisher(Odometry, "odometry", topic_qos())
 
     def send_cloud(self, cloud: PointCloud2) -> None:
         """Publish a cloud unchanged."""
@@ -76,6 +77,13 @@ class PlannerClient(Node):
     def send_joints(self, names, positions) -> None:
         """Publish joint positions."""
         self._send(self._joints, JointState(name=list(names), position=list(positions)))
+
+    def send_odometry(self, pose, frame="map") -> None:
+        """Publish odometry of a level pose (3,)."""
+        odometry = Odometry()
+        odometry.header.frame_id, odometry.child_frame_id = frame, "base_link"
+        odometry.pose.pose = stamped_pose(pose, frame).pose
+        self._send(self._odometry, odometry)
 
     def can_traverse(self, start, goal, tolerance=0.0, frame="map") -> Path:
         """Ask for a plan between two poses (3,)."""

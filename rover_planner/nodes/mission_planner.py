@@ -25,7 +25,7 @@ from std_msgs.msg import Float64MultiArray
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
-from msg_adapters.predictions import array_values
+from msg_adapters.results.predictions import array_values
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission_options import MissionOptions
 from rover_planner.nodes.programs import read_words

@@ -5,23 +5,27 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
+from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-from msg_adapters.verdicts import report_to_json
-from rover_planner.planning.reach_query import ReachQuery, refuse_reach
-from rover_planner.planning.traverse_service import TraverseService
-from rover_planner.ros.qos import topic_qos
-from rover_planner.ros.refusals import answer_or_refuse
+from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
+from rover_planner.planning.answering.reach_query import ReachJudgement, ReachQuery, refuse_reach
+from rover_planner.planning.verdict_report import IdentityReport
+from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.requests import subscribe_to_requests
 
 
 class ReachTopics:
     """Connects a ReachQuery to the topics and the service of a node."""
 
-    def __init__(self, node: Node, service: TraverseService, map_frame: str):
-        self._node, self._service, self._map_frame = node, service, map_frame
+    def __init__(self, node: Node, desk: QuestionDesk, map_frame: str, reliability: str):
+        self._node, self._desk, self._map_frame = node, desk, map_frame
         self._query = ReachQuery()
-        node.create_subscription(PoseStamped, "~/tool_target", self._take_target, topic_qos())
-        node.create_subscription(WrenchStamped, "~/tool_wrench", self._take_wrench, topic_qos())
-        node.create_service(Trigger, "~/check_reach", self._check_reach)
+        for kind, name, take in (
+            (PoseStamped, "~/tool_target", self._take_target),
+            (WrenchStamped, "~/tool_wrench", self._take_wrench),
+        ):
+            subscribe_to_requests(node, kind, name, desk.guard.around(take), reliability)
+        serve_later(node, Trigger, "~/check_reach", self._check_reach)
 
     @property
     def query(self) -> ReachQuery:
@@ -43,16 +47,20 @@ class ReachTopics:
             self._node.get_logger().error(f"~/tool_wrench refused: {error}")
 
     def _check_reach(
-        self, _request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
+        self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
+    ) -> None:
+        def deliver(answer: ReachJudgement, _identity: IdentityReport) -> None:
+            response.success = answer.possible
+            response.message = report_to_json(answer)
+            reply(response)
+            self._log(answer)
+
+        query = self._query.copy()
+        self._desk.ask(Inquiry("check_reach", "", query.ask, refuse_reach, deliver))
+
+    def _log(self, answer: ReachJudgement) -> None:
         logger = self._node.get_logger()
-        answer = answer_or_refuse(
-            logger, "check_reach", lambda: self._query.ask(self._service), refuse_reach
-        )
         if answer.possible:
             logger.info("check_reach: possible")
         else:
             logger.warning(f"check_reach: refused ({answer.code}): {answer.reason}")
-        response.success = answer.possible
-        response.message = report_to_json(answer)
-        return response

@@ -1,8 +1,7 @@
 """Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -15,19 +14,23 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
-from msg_adapters.markers import cleared_markers, path_markers
+from msg_adapters.identity import path_hash
 from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
-from msg_adapters.predictions import (
+from msg_adapters.results.markers import cleared_markers, path_markers
+from msg_adapters.results.predictions import (
     MEASURES,
     empty_trajectory,
     joint_trajectory,
     tip_over_array,
     waypoint_array,
 )
-from msg_adapters.verdicts import verdict_to_diagnostics
+from msg_adapters.results.verdicts import verdict_to_diagnostics
+from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
-from rover_planner.planning.judgement import Judgement
+from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.known_map import stamp_text
+from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.lazy_publisher import LazyPublisher
 
@@ -40,6 +43,8 @@ WHEEL_TOPICS = {
 """Topics with one value per waypoint and wheel, and the field of the prediction on each."""
 LOOK_OUT = 0.2
 """Period of the check for new subscribers [s]."""
+MAX_STOCK = 2000
+"""Number of pose and point messages that are kept for reuse."""
 
 _KINDS = {
     "plan": Path,
@@ -58,6 +63,7 @@ class ResultTopics:
         self._node, self._deferred_work, self._frame = node, deferred_work, map_frame
         self._poses = PoseStock()
         self._points: list[JointTrajectoryPoint] = []
+        self._stamp = 0
         self._topics = {
             name: LazyPublisher(node, kind, f"~/{name}") for name, kind in _KINDS.items()
         }
@@ -67,31 +73,60 @@ class ResultTopics:
     def take(
         self,
         judgement: Judgement,
+        identity: IdentityReport,
         rover: Rover,
         plan_spacing: float,
-        log: Callable[[], None],
-    ) -> Path:
-        """Return the plan of a judgement; publish all results after the answer is sent.
+    ) -> tuple[Path, VerdictReport]:
+        """Return plan and report of a judgement; publish all results after the answer is sent.
 
         Args:
             judgement: The answer.
+            identity: What it is about; without a path, that of the plan is added.
             rover: The rover of the query.
             plan_spacing: Distance between poses of the plan [m]; 0 keeps all waypoints.
-            log: Called after the answer is sent, before the results are published.
 
         Returns:
-            The plan; its poses are valid until the next plan is made.
+            The plan, whose poses are valid until the next plan is made, and the report.
         """
-        stamp = self._node.get_clock().now().to_msg()
         results = _Results(
-            judgement, rover, plan_spacing, self._frame, stamp, self._poses, self._points
+            judgement,
+            identity,
+            rover,
+            plan_spacing,
+            self._frame,
+            ns_to_stamp(self._next_stamp()),
+            self._poses,
+            self._points,
         )
+        plan = results.plan()
+        if judgement.traversable and not identity.path_hash:
+            results = replace(results, identity=_add_plan(identity, plan))
         publications = [
             partial(topic.publish, partial(results.message, name))
             for name, topic in self._topics.items()
         ]
-        self._deferred_work.do(log, *publications)
-        return results.plan()
+        log = partial(self._log, results)
+        self._deferred_work.do(log, *publications, self._shrink_stocks)
+        return plan, results.report
+
+    def _next_stamp(self) -> int:
+        """Return the ROS time [ns], later than the last stamp unless the clock was set back."""
+        now = self._node.get_clock().now().nanoseconds
+        self._stamp = self._stamp + 1 if now == self._stamp else now
+        return self._stamp
+
+    def _shrink_stocks(self) -> None:
+        """Drop messages beyond MAX_STOCK, which a long path has left behind."""
+        self._poses.shrink(MAX_STOCK)
+        del self._points[MAX_STOCK:]
+
+    def _log(self, results: "_Results") -> None:
+        judgement, about = results.judgement, results.identity
+        text = f"question {about.request}, {about.service}: {judgement.summary()}"
+        if judgement.traversable:
+            self._node.get_logger().info(text)
+        else:
+            self._node.get_logger().warning(text)
 
     def _serve_late_comers(self) -> None:
         awaited = [topic for topic in self._topics.values() if topic.is_awaited]
@@ -99,17 +134,29 @@ class ResultTopics:
             self._deferred_work.do(*(topic.catch_up for topic in awaited))
 
 
+def _add_plan(identity: IdentityReport, plan: Path) -> IdentityReport:
+    """Return an identity with hash and stamp of a plan."""
+    stamp = stamp_text(stamp_to_ns(plan.header.stamp))
+    return replace(identity, path_hash=path_hash(plan), path_stamp=stamp)
+
+
 @dataclass(frozen=True)
 class _Results:
     """The messages of one judgement; each is made on demand."""
 
     judgement: Judgement
+    identity: IdentityReport
     rover: Rover
     plan_spacing: float
     frame: str
     stamp: Time
     poses: PoseStock
     points: list[JointTrajectoryPoint]
+
+    @cached_property
+    def report(self) -> VerdictReport:
+        """The report, with what it is about."""
+        return replace(self.judgement.report, identity=self.identity)
 
     def message(self, topic: str) -> object:
         """Return the message for a topic."""
@@ -131,8 +178,7 @@ class _Results:
         )
 
     def _verdict(self) -> DiagnosticArray:
-        report = self.judgement.report
-        return verdict_to_diagnostics(report, self.rover.name, self.frame, self.stamp)
+        return verdict_to_diagnostics(self.report, self.rover.name, self.frame, self.stamp)
 
     def _nothing(self, topic: str) -> object:
         """Return the empty message that is published if no path was judged."""

@@ -35,7 +35,7 @@ from msg_adapters.frames import check_frame
 from msg_adapters.imu import imu_to_attitude
 from msg_adapters.joints import joint_positions, joint_velocities
 from msg_adapters.odometry import odometry_to_pose
-from msg_adapters.traction_status import traction_diagnostics
+from msg_adapters.results.traction_status import traction_diagnostics
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.nodes.programs import read_words

@@ -9,6 +9,10 @@ EITHER, TRANSIENT_LOCAL, VOLATILE = "either", "transient_local", "volatile"
 MAP_DURABILITIES = (EITHER, TRANSIENT_LOCAL, VOLATILE)
 """Values of the parameter map_durability; `rover_planner.ros.qos` explains them."""
 
+RELIABLE, BEST_EFFORT = "reliable", "best_effort"
+RELIABILITIES = (RELIABLE, BEST_EFFORT)
+"""Values of the parameter input_reliability."""
+
 
 def max_torque_parameter() -> float:
     """Return the field of the parameter max_torque [N m]."""
@@ -71,5 +75,16 @@ def map_durability_parameter() -> str:
         EITHER,
         "Durability of the map publishers to subscribe to.",
         choices=MAP_DURABILITIES,
+        read_only=True,
+    )
+
+
+def input_reliability_parameter() -> str:
+    """Return the field of the parameter input_reliability."""
+    return parameter(
+        RELIABLE,
+        "Reliability of the subscriptions to maps, paths and tool targets; best_effort also "
+        "hears best-effort publishers, but may lose messages.",
+        choices=RELIABILITIES,
         read_only=True,
     )

@@ -6,6 +6,7 @@ from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_planner.parameters.shared import (
     cell_height_parameter,
+    input_reliability_parameter,
     map_durability_parameter,
     map_resolution_parameter,
     max_torque_parameter,
@@ -63,6 +64,7 @@ class TraverseServerParameters(ParameterTable):
     map_resolution: float = map_resolution_parameter()
     cell_height: str = cell_height_parameter()
     map_durability: str = map_durability_parameter()
+    input_reliability: str = input_reliability_parameter()
     unknown_cells: str = parameter(
         REFUSE,
         "Unknown cells: refuse paths over them, or interpolate small gaps.",
@@ -82,9 +84,29 @@ class TraverseServerParameters(ParameterTable):
         "Map to start with: a preset's name or a terrain file; empty waits for a map.",
         read_only=True,
     )
+    max_map_age: float = parameter(
+        0.0,
+        "Age from which a map is refused as stale_map, by its stamp and its arrival; "
+        "0 allows any age.",
+        unit="s",
+        bounds=(0.0, 1e9),
+    )
+    time_budget: float = parameter(
+        5.0,
+        "Time from the arrival of a question to its answer; beyond it the answer is too_long, "
+        "or busy if other questions took the time.",
+        unit="s",
+        bounds=(0.05, 600.0),
+    )
+    max_waiting: int = parameter(
+        50,
+        "Largest number of waiting questions; further ones are refused as busy.",
+        bounds=(0, 1000),
+    )
     suspension_tolerance: float = parameter(
         0.1,
-        "Largest difference of measured and predicted suspension angles without a warning.",
+        "Largest difference of measured and predicted suspension angles without a warning; "
+        "compared where odometry says that the rover stands.",
         unit="rad",
         bounds=(0.0, 3.2),
     )

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
@@ -17,6 +19,7 @@ from rover_planner.planning.path_query import (
     PathQueryOptions,
     answer_path_query,
     check_path,
+    smallest_radius,
 )
 
 Pose = NDArray[np.float64]
@@ -73,13 +76,27 @@ class PathPlanner:
             RoverError: The model refuses an option or the poses.
         """
         answer, tried = self._query(start, goal), 0
-        if not answer.traversable and answer.chosen.verdict.first_failure > 0:
+        if not answer.traversable and self._fails_at(answer, goal, tolerance):
             for alternative in self._goals_to_stand_on(start, goal, tolerance):
                 tried += 1
                 other = self._query(start, alternative)
                 if other.traversable:
                     return PathSearch(other, goal, alternative, tried)
         return PathSearch(answer, goal, goal, tried)
+
+    def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
+        """Return whether another goal within `tolerance` [m] may help.
+
+        It may if some path fails where the ground under the rover is also ground under a rover
+        at an allowed goal. Other paths fail on the way, which leads to the other goals too.
+        """
+        near = tolerance + smallest_radius(self.rover)
+        failures = [
+            one.poses[one.verdict.first_failure] - goal
+            for one in answer.candidates
+            if one.verdict.first_failure > 0
+        ]
+        return any(np.hypot(*failure[:2]) <= near for failure in failures)
 
     def check(self, poses: NDArray[np.float64]) -> Candidate:
         """Judge one given path of poses (n, 3).
@@ -88,6 +105,15 @@ class PathPlanner:
             RoverError: The model refuses an option or the poses.
         """
         return check_path(self.rover, self.terrain, poses, self.options, self.joint_angles)
+
+    def predict_standing(self, pose: Pose) -> PathPrediction:
+        """Predict the rover standing at a pose.
+
+        Raises:
+            RoverError: The model refuses an option or the pose.
+        """
+        asked = self.options.sweep_options(self.joint_angles)
+        return sweep_path(self.rover, self.terrain, pose[None, :], asked)
 
     def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
         """Return the class of each waypoint of a judged path; may evaluate the path once more."""

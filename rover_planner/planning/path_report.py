@@ -26,7 +26,7 @@ def report_path(
 
     Args:
         candidate: The path.
-        classes: The classes of its waypoints, at least one.
+        classes: The classes of its waypoints; empty if there was no time to find them.
         suspension: The comparison with the measured suspension; None without measurements.
         search: The search that found the path; None if the path was given.
     """
@@ -38,7 +38,7 @@ def report_path(
         first_failure=verdict.first_failure,
         failure=_report_failure(candidate),
         path=_report_extremes(candidate),
-        classes=_report_class(classes),
+        classes=_report_class(classes) if classes else None,
         suspension=suspension,
         search=None if search is None else _report_search(search),
         waypoint_lists=_list_waypoints(candidate, classes),

@@ -79,7 +79,7 @@ class ClassReport:
 
 @dataclass(frozen=True)
 class SuspensionReport:
-    """Comparison of the measured suspension angles with those predicted at the path's start."""
+    """Comparison of the measured suspension angles with those predicted where the rover stands."""
 
     suspension_mismatch: Mapping[str, float]
     """Measured minus predicted angle [rad] by joint, for the joints that were measured."""
@@ -105,6 +105,32 @@ class SearchReport:
     """Number of the judged candidate, counted from 1: the best, or the one that gets furthest."""
     explanation: str
     """One sentence that explains the choice."""
+
+
+@dataclass(frozen=True)
+class IdentityReport:
+    """What an answer is about: which question, which path, and which map."""
+
+    request: int
+    """Number of the question; it rises strictly while the server runs, over all its services."""
+    service: str
+    """Name of the service that was called, such as can_traverse."""
+    server: str
+    """Random text that a server keeps while it runs; another one after a restart."""
+    question_hash: str
+    """`msg_adapters.identity.plan_request_hash` of a plan request, or `path_hash` of the path that
+    was checked."""
+    path_hash: str
+    """`msg_adapters.identity.path_hash` of the path that was checked or of the plan that was
+    returned; empty without path."""
+    path_stamp: str
+    """Stamp of that path, "seconds.nanoseconds"; empty without path."""
+    map_hash: str
+    """Fingerprint of the map; empty without map."""
+    map_stamp: str
+    """Stamp of the map's header, "seconds.nanoseconds"; empty if it has none."""
+    map_age: float
+    """Age of the map when the question arrived [s]; NaN without map."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +177,8 @@ class VerdictReport:
     """Comparison with the measured suspension; None without measured joints."""
     search: SearchReport | None = None
     """The search for the path; None if the path was given."""
+    identity: IdentityReport | None = None
+    """What the answer is about; None if it was not asked for over ROS."""
     waypoint_lists: WaypointLists | None = None
     """Values per waypoint."""
 

@@ -1,12 +1,12 @@
 """Turns every error of a request into a refusal with a reason, so that the node continues."""
 
-import traceback
 from collections.abc import Callable
 from typing import TypeVar
 
 from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
 from rover_planner.errors import PlanningError
+from rover_planner.ros.guard import Guard
 
 INPUT_ERRORS = (MessageError, PlanningError, RoverError)
 """Errors of the input; any other error is an internal error."""
@@ -14,15 +14,11 @@ INPUT_ERRORS = (MessageError, PlanningError, RoverError)
 Answer = TypeVar("Answer")
 
 
-def answer_or_refuse(
-    logger, request: str, answer: Callable[[], Answer], refuse: Callable[[str, str], Answer]
+def refuse_error(
+    guard: Guard, request: str, error: Exception, refuse: Callable[[str, str], Answer]
 ) -> Answer:
-    """Return `answer()`, or after an error `refuse(code, reason)`; log internal errors."""
-    try:
-        return answer()
-    except INPUT_ERRORS as error:
+    """Return `refuse(code, reason)` for an error; the guard counts and logs internal errors."""
+    if isinstance(error, INPUT_ERRORS):
         return refuse("bad_request", str(error))
-    except Exception as error:
-        # An internal error must not end the node.
-        logger.error(f"{request}: {traceback.format_exc()}")
-        return refuse("internal_error", f"{type(error).__name__}: {error}")
+    text = guard.report(request, error)
+    return refuse("internal_error", f"internal error: {text}")

@@ -167,7 +167,7 @@ def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
 
 def test_the_picture_is_of_the_same_candidates_as_the_server_judges():
     from rover_planner.parameters.traverse_server import TraverseServerParameters
-    from rover_planner.planning.service_settings import load_service_settings
+    from rover_planner.planning.answering.service_settings import load_service_settings
 
     assert load_service_settings(TraverseServerParameters()).query == PathQueryOptions()
 

@@ -10,9 +10,9 @@ from std_msgs.msg import Float64MultiArray
 from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
-from msg_adapters.markers import IMPASSABLE, PASSABLE, path_markers
 from msg_adapters.paths import PoseStock, settled_path
-from msg_adapters.predictions import (
+from msg_adapters.results.markers import IMPASSABLE, PASSABLE, path_markers
+from msg_adapters.results.predictions import (
     JOINTS,
     MEASURES,
     array_values,

@@ -9,7 +9,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from msg_adapters.verdicts import report_to_json, verdict_to_diagnostics
+from msg_adapters.results.verdicts import report_to_json, verdict_to_diagnostics
 
 
 @dataclass

@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from msg_adapters.markers import WITH_TRACTION_CONTROL as AMBER
+from msg_adapters.results.markers import WITH_TRACTION_CONTROL as AMBER
 from rover_physics.names import WHEELS
 from rover_physics.traversability.classification import (
     IMPASSABLE,

@@ -14,7 +14,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
-from msg_adapters.predictions import JOINTS, MEASURES, array_values
+from msg_adapters.results.predictions import JOINTS, MEASURES, array_values
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
@@ -170,9 +170,10 @@ def test_a_padded_big_endian_cloud_in_doubles_gives_the_same_answer(mapped, clie
         for name in ("z", "x", "y")
     ]
     cloud.data = array.array("B", raw.tobytes())
-    client.logs.clear()
+    before = mapped.service.known_map
     client.send_cloud(cloud)
-    client.wait_for_log("map from elevation_cloud: 161 x 161 cells of 0.05 m")
+    wait_until(lambda: mapped.service.known_map is not before, "the map")
+    assert mapped.service.known_map.fingerprint == before.fingerprint
     plan, _, _ = ask(client)
     assert [pose.pose for pose in plan.poses] == [pose.pose for pose in expected.poses]
 
@@ -255,6 +256,9 @@ def test_the_measured_suspension_raises_a_warning_where_it_disagrees(mapped, cli
     poses = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
     client.send_joints(["camera", "rocker_left"], [math.nan, 0.5])
     wait_until(lambda: mapped.service.joints, "the joints")
+    client.send_odometry((-0.5, 0.0, 0.0))
+    standing = mapped.service.situation
+    wait_until(lambda: standing().measured_pose is not None, "the odometry")
     answer, results = client.next_results(lambda: client.check_poses(mapped, poses))
     verdict = json.loads(answer.message)
     assert answer.success and not verdict["suspension_agrees"]

@@ -11,6 +11,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
+from rover_planner.planning.answering.situation import Situation
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, START, ask, verdict_of
 from support.ros_fixtures import wait_until
@@ -205,11 +206,11 @@ def test_a_fault_of_the_program_is_a_refusal_and_not_the_end(mapped, client, ros
     def fail(*_):
         raise ZeroDivisionError("a fault")
 
-    monkeypatch.setattr(mapped.service, "answer", fail)
+    monkeypatch.setattr(Situation, "answer", fail)
     assert_refused(
         client,
         "internal_error",
-        "ZeroDivisionError: a fault",
+        "internal error: ZeroDivisionError: a fault",
         lambda: client.can_traverse(START, GOAL),
     )
     monkeypatch.undo()

@@ -21,7 +21,7 @@ from std_msgs.msg import Float64MultiArray
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.paths import path_to_poses, stamped_pose, yaw_from_quaternion
-from msg_adapters.predictions import array_values
+from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw

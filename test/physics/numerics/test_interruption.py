@@ -1,5 +1,7 @@
 """Sweeps stop where their caller says so, and slices change no result."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from rover_physics.rover.rover_file import load_rover
 from support.grounds import make_terrain, waves
 
 
-class Stopped(Exception):
+class StoppedError(Exception):
     """Raised by the checks of these tests."""
 
 
@@ -21,7 +23,7 @@ def stop_at(call: int):
 
     def check() -> None:
         if next(calls) == call:
-            raise Stopped
+            raise StoppedError
 
     return check
 
@@ -41,12 +43,12 @@ def test_slices_cover_all_items_once_and_in_order():
     with interruptible(lambda: None):
         parts = list(slices(1000))
     assert parts[0].start == 0 and parts[-1].stop == 1000 and len(parts) > 1
-    assert all(one.stop == other.start for one, other in zip(parts, parts[1:], strict=False))
+    assert all(one.stop == other.start for one, other in itertools.pairwise(parts))
 
 
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
     rover, ground, poses = load_rover("lsr1"), make_terrain(waves), along_x(500)
-    with pytest.raises(Stopped), interruptible(stop_at(2)):
+    with pytest.raises(StoppedError), interruptible(stop_at(2)):
         sweep_path(rover, ground, poses)
     assert sweep_path(rover, ground, poses).settled.all()
 

@@ -1,5 +1,6 @@
 """Queries whether the arm can reach a target and hold a load there, without ROS."""
 
+import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
 from rover_physics.traversability.reach import ReachAnswer, judge_reach
-from rover_planner.planning.traverse_service import TraverseService
+from rover_planner.planning.answering.situation import Situation
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,33 +75,40 @@ class ReachQuery:
         self._force = self._moment = None
         self._wrench_refusal = f"the last wrench was refused: {reason}"
 
-    def ask(self, service: TraverseService) -> ReachJudgement:
+    def copy(self) -> "ReachQuery":
+        """Return a query that later targets and wrenches do not change."""
+        return copy.copy(self)
+
+    def ask(self, situation: Situation) -> ReachJudgement:
         """Judge the rover at the last pose of the last path with its tool at the target.
+
+        Args:
+            situation: What is known of rover, map and path.
 
         Raises:
             RoverError: The rover has no arm, or the model refuses an option.
         """
-        missing = service.refuse_if_missing()
+        missing = situation.refuse_if_missing()
         if missing is not None:
             return refuse_reach(missing.code, missing.reason)
         if self._target is None:
             return refuse_reach("no_target", self._target_refusal)
         if self._wrench_refusal:
             return refuse_reach("no_wrench", self._wrench_refusal)
-        settings = service.settings
+        settings = situation.settings
         arm = settings.rover.manipulator
         if arm is None:
             raise ModelError(f"rover {settings.rover.name!r} has no manipulator to reach with")
-        unknown = [name for name in arm.joints if name not in service.joints]
+        unknown = [name for name in arm.joints if name not in situation.joints]
         if 0 < len(unknown) < len(arm.joints):
             text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
             return refuse_reach("missing_joints", f"{text}; it must have all of them, or none")
-        assert service.path is not None
-        assert service.terrain is not None
+        assert situation.path.poses is not None
+        assert situation.terrain is not None
         answer = judge_reach(
             settings.rover,
-            service.terrain,
-            service.path[-1],
+            situation.terrain,
+            situation.path.poses[-1],
             self._target,
             settings.query.sweep_options(),
             force=self._force,

@@ -19,12 +19,18 @@ class ServiceSettings:
     """The rover of all queries."""
     query: PathQueryOptions
     """How candidates are generated and judged."""
-    interpolate: bool
-    """Whether small unknown regions of a map are interpolated."""
-    max_gap: float
-    """Widest unknown region that is interpolated [m]."""
+    largest_gap: float
+    """Widest unknown region of a map that is interpolated [m]; 0 interpolates none."""
     suspension_tolerance: float
     """Largest allowed difference between measured and predicted suspension angles [rad]."""
+    max_map_age: float
+    """Age from which a map is too old to be used [s]; 0 allows any age."""
+
+    @property
+    def manipulator_joints(self) -> tuple[str, ...]:
+        """Names of the manipulator's joints, () if the rover has no manipulator."""
+        manipulator = self.rover.manipulator
+        return tuple(manipulator.joints) if manipulator is not None else ()
 
 
 def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettings:
@@ -53,7 +59,7 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             payload=payload,
             map_sigmas=parameters.map_sigmas,
         ),
-        interpolate=parameters.unknown_cells == INTERPOLATE,
-        max_gap=parameters.max_gap,
+        largest_gap=parameters.max_gap if parameters.unknown_cells == INTERPOLATE else 0.0,
         suspension_tolerance=parameters.suspension_tolerance,
+        max_map_age=parameters.max_map_age,
     )

@@ -1,4 +1,4 @@
-"""Compares measured suspension angles with those predicted at the start of a path."""
+"""Compares measured suspension angles with those predicted where the rover stands."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ def compare_suspension(
     """Compare measured and predicted suspension angles.
 
     Args:
-        prediction: Prediction of a path; the rover is assumed to be at its first waypoint.
+        prediction: Prediction of the rover where it stands, the first waypoint.
         measured: Joint angles [rad] by name; joints outside the suspension are ignored.
         tolerance: Largest difference that counts as agreement [rad].
 

@@ -1,7 +1,7 @@
 """The answer to one request: the verdict at once, its report on demand."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.names import EQUAL
 from rover_physics.traversability.classification import ClassifiedWaypoint
+from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.path_report import report_path
@@ -41,6 +42,14 @@ class Judgement:
     def classes(self) -> tuple[ClassifiedWaypoint, ...]:
         """The class of each waypoint; empty if no path was judged. Computed on first use."""
         return self.classify()
+
+    def complete(self) -> "Judgement":
+        """Return the judgement with its report computed; without classes if there is no time."""
+        try:
+            _ = self.report, self.changes()
+        except QuestionStoppedError:
+            return replace(self, classify=tuple).complete()
+        return self
 
     @cached_property
     def report(self) -> VerdictReport:

@@ -13,13 +13,14 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.judgement import refusal
-from rover_planner.planning.service_settings import load_service_settings
-from rover_planner.planning.traverse_service import TraverseService
+from rover_planner.planning.answering.identity import Register
+from rover_planner.planning.answering.judgement import refusal
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import VerdictReport, WaypointLists
 from support.grounds import make_terrain, wall_at
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "traverse_server.md"
+DOCS = Path(__file__).parents[3] / "docs" / "traverse_server.md"
 LISTS = [field.name for field in fields(WaypointLists)]
 
 
@@ -41,12 +42,28 @@ def full():
     service = TraverseService(load_service_settings(TraverseServerParameters(candidate_count=2)))
     service.take_terrain(make_terrain(wall_at(0.5)))
     service.take_joints(dict.fromkeys(SUSPENSION_JOINTS, 0.0))
+    service.take_pose(np.array([-2.0, 0.0, 0.0]))
     return service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0))
 
 
-def test_all_keys_are_there_once_where_all_can_be_said(full):
+@pytest.fixture(scope="module")
+def identified(full):
+    """Return the full report with what it is about."""
+    service = TraverseService(load_service_settings(TraverseServerParameters()))
+    service.take_terrain(make_terrain(wall_at(0.5)))
+    identity = Register().identify(1, "can_traverse", "ab", service.situation())
+    return replace(full.report, identity=identity)
+
+
+def test_all_keys_are_there_once_where_all_can_be_said(identified):
     assert len(set(KEYS)) == len(KEYS)
-    assert list(full.report.to_dict()) == KEYS
+    assert list(identified.to_dict()) == KEYS
+
+
+def test_numbers_of_questions_rise_and_a_restart_shows():
+    register = Register()
+    numbers = [register.next_number() for _ in range(5)]
+    assert numbers == sorted(set(numbers)) and register.server != Register().server
 
 
 def test_verdict_code_and_reason_come_first_and_the_long_lists_last(full):

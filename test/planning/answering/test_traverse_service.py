@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rover_planner.planning.traverse_service as traverse_service_module
+import rover_planner.planning.answering.traverse_service as traverse_service_module
 from rover_physics.errors import RoverFileError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.table import ParameterError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.path_geometry import densify
-from rover_planner.planning.service_settings import load_service_settings
-from rover_planner.planning.traverse_service import TraverseService
 from support.grounds import make_terrain, rocky, wall_at, waves
 
 
@@ -88,8 +88,10 @@ def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     service = make_service(replace(terrain, elevation=elevation))
     assert np.isnan(service.terrain.elevation[80, 80])
     service.settings = load(unknown_cells="interpolate")
+    service.refresh_map()
     assert np.isfinite(service.terrain.elevation[80, 80])
     service.settings = load()
+    service.refresh_map()
     assert np.isnan(service.terrain.elevation[80, 80])
 
 
@@ -172,10 +174,14 @@ def test_the_measured_suspension_is_compared_with_the_predicted_one():
     )
     assert abs(predicted["rocker_left"]) > 0.001
     service.take_joints(predicted)
+    assert service.check_last_path().suspension is None  # where the rover stands is not known
+    service.take_pose(np.array([0.0, 0.0, 0.3]))
     report = service.check_last_path().report
     assert report.suspension.suspension_agrees and not report.has_warning
     assert report.suspension.suspension_mismatch == dict.fromkeys(SUSPENSION_JOINTS, 0.0)
     service.take_joints({"bogie_left": predicted["bogie_left"] + 0.2})
+    service.take_pose(np.array([0.0, 0.0, 0.3]))
+    service.take_path(np.array([[0.5, 0.15, 0.3], [1.0, 0.3, 0.3]]))  # starts elsewhere
     report = service.check_last_path().report
     assert report.has_warning and report.traversable
     assert report.suspension.suspension_mismatch["bogie_left"] == pytest.approx(0.2)

@@ -1,0 +1,1 @@
+"""Writes results as messages: predictions, verdicts, markers and diagnostics."""

@@ -1,0 +1,35 @@
+"""Writes the health of a traverse server as a diagnostic status."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+STATUS_NAME = "traverse_server: health"
+
+_LEVELS = {
+    "ok": DiagnosticStatus.OK,
+    "warning": DiagnosticStatus.WARN,
+    "error": DiagnosticStatus.ERROR,
+}
+
+
+def server_diagnostics(
+    level: str, text: str, values: Mapping[str, Any], hardware_id: str, stamp: Any
+) -> DiagnosticArray:
+    """Return the health of a traverse server as one status.
+
+    Args:
+        level: "ok", "warning" or "error".
+        text: What is wrong, in words.
+        values: Keys and values of the status.
+        hardware_id: Name of the rover.
+        stamp: builtin_interfaces/Time.
+    """
+    status = DiagnosticStatus(
+        level=_LEVELS[level], name=STATUS_NAME, message=text, hardware_id=hardware_id
+    )
+    status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = stamp
+    return message

@@ -1,0 +1,17 @@
+"""Converts stamps of messages to nanoseconds and back."""
+
+from builtin_interfaces.msg import Time
+
+NANOSECONDS = 1_000_000_000
+"""Nanoseconds in a second."""
+
+
+def stamp_to_ns(stamp: Time) -> int | None:
+    """Return a stamp [ns]; None if it is zero, which means that the sender set none."""
+    total = stamp.sec * NANOSECONDS + stamp.nanosec
+    return total or None
+
+
+def ns_to_stamp(time: int) -> Time:
+    """Return a time [ns] as a stamp."""
+    return Time(sec=time // NANOSECONDS, nanosec=time % NANOSECONDS)

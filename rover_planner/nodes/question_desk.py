@@ -1,0 +1,121 @@
+"""Takes the questions of a node's services and answers them in a thread, within their budget."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from rover_planner.nodes.map_topics import MapTopics
+from rover_planner.planning.answering.budget import Budget
+from rover_planner.planning.answering.identity import Register
+from rover_planner.planning.answering.question_queue import Question, QuestionQueue
+from rover_planner.planning.answering.server_health import ServerHealth
+from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.verdict_report import IdentityReport
+from rover_planner.ros.guard import Guard
+from rover_planner.ros.refusals import refuse_error
+
+PATROL = 0.05
+"""Period of the check for questions that have run out of time [s]."""
+GRACE = 0.1
+"""Time after its deadline in which a question in work may still end by itself [s]."""
+
+
+@dataclass(frozen=True)
+class Inquiry:
+    """A question as a service puts it to the desk."""
+
+    service: str
+    """Name of the service, for logs."""
+    question_hash: str
+    """Hash of the request."""
+    answer: Callable[[Situation], Any]
+    """Finds the answer, which has a `code`; called in the thread."""
+    refuse: Callable[[str, str], Any]
+    """Makes an answer of a refusal's code and reason."""
+    deliver: Callable[[Any, IdentityReport], None]
+    """Sends an answer, with what it is about; called in the executor's thread."""
+
+
+class QuestionDesk:
+    """Numbers questions, queues them, and delivers each answer once."""
+
+    def __init__(self, node: Node, service: TraverseService, maps: MapTopics, guard: Guard):
+        self._node, self._service, self._maps = node, service, maps
+        self.guard = guard
+        """Takes unexpected errors."""
+        self._register = Register()
+        self._time_budget = 1.0
+        self.health = ServerHealth()
+        """Counts of answers and faults."""
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        ready = node.create_guard_condition(guard.around(self._deliver))
+        self._queue = QuestionQueue(0, ready.trigger)
+        self._patrol = node.create_timer(
+            PATROL, guard.around(self._refuse_overdue), clock=steady, autostart=False
+        )
+
+    @property
+    def open_count(self) -> int:
+        """Number of questions without an answer."""
+        return self._queue.open_count
+
+    def set_limits(self, time_budget: float, max_waiting: int) -> None:
+        """Set the time [s] of each question to come, and the number of questions that may wait."""
+        self._time_budget = time_budget
+        self._queue.max_waiting = max_waiting
+
+    def ask(self, inquiry: Inquiry) -> None:
+        """Take a question; its answer follows within its budget and GRACE."""
+        now = self._node.get_clock().now().nanoseconds
+        asked = _Asked(self._register.next_number(), self._service.situation(now))
+        ticket = self._maps.ticket()
+
+        def answer(budget: Budget) -> Any:
+            self._maps.wait(ticket, budget.check)
+            asked.situation = self._service.add_map(asked.situation, now)
+            return inquiry.answer(asked.situation)
+
+        def fail(error: Exception) -> Any:
+            return refuse_error(self.guard, inquiry.service, error, inquiry.refuse)
+
+        def deliver(given: Any) -> None:
+            self.health.take_answer(given.code, time.monotonic())
+            identity = self._register.identify(
+                asked.number, inquiry.service, inquiry.question_hash, asked.situation
+            )
+            inquiry.deliver(given, identity)
+
+        budget = Budget(self._time_budget)
+        self._queue.ask(Question(answer, inquiry.refuse, fail, self.guard.around(deliver), budget))
+        if self._queue.open_count:
+            self._patrol.reset()
+
+    def cancel(self, code: str, reason: str) -> int:
+        """Answer all open questions with a refusal; return their number."""
+        return self._queue.stop_all(code, reason)
+
+    def close(self) -> None:
+        """Refuse all open questions and end the thread."""
+        self._queue.close()
+
+    def _deliver(self) -> None:
+        self._queue.deliver()
+        if not self._queue.open_count:
+            self._patrol.cancel()
+
+    def _refuse_overdue(self) -> None:
+        self._queue.refuse_overdue(GRACE)
+        self._deliver()
+
+
+@dataclass
+class _Asked:
+    """A question's number, and the situation in which it is answered."""
+
+    number: int
+    situation: Situation

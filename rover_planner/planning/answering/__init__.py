@@ -1,0 +1,1 @@
+"""What a traverse server knows, and its answers to questions; without ROS."""

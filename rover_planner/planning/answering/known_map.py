@@ -1,0 +1,62 @@
+"""The map that a traverse server knows: its terrain, where it comes from, and its age."""
+
+from dataclasses import dataclass
+
+from rover_physics.terrain.grid import Terrain
+
+NANOSECONDS = 1_000_000_000
+"""Nanoseconds in a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownMap:
+    """A valid map and when it came."""
+
+    received: Terrain
+    """The map as it was received."""
+    terrain: Terrain
+    """The map to plan on: small gaps are interpolated if so set."""
+    source: str
+    """Topic or file."""
+    stamp: int | None
+    """Stamp of the map's header [ns, ROS time]; None if it has none."""
+    arrival: float
+    """Time of arrival [s], steady clock."""
+
+    fingerprint: str
+    """The content of the received map, see `rover_physics.terrain.fingerprint`."""
+
+    def age(self, ros_time: int, steady_time: float) -> float:
+        """Return the age [s]: the longer of the times since its stamp and since its arrival.
+
+        Args:
+            ros_time: Present ROS time [ns].
+            steady_time: Present time of the steady clock [s].
+        """
+        since_arrival = steady_time - self.arrival
+        if self.stamp is None:
+            return since_arrival
+        return max(since_arrival, (ros_time - self.stamp) / NANOSECONDS)
+
+    def describe_age(self, ros_time: int, steady_time: float, max_age: float) -> str:
+        """Return why the map is too old, or from the future; empty if it is neither.
+
+        Args:
+            ros_time: Present ROS time [ns].
+            steady_time: Present time of the steady clock [s].
+            max_age: Largest age, and largest lead of its stamp over the ROS time [s].
+        """
+        age = self.age(ros_time, steady_time)
+        if age > max_age:
+            return f"the map is {age:.1f} s old; max_map_age is {max_age:g} s"
+        lead = 0.0 if self.stamp is None else (self.stamp - ros_time) / NANOSECONDS
+        if lead > max_age:
+            return f"the map's stamp is {lead:.1f} s in the future; check the clocks"
+        return ""
+
+
+def stamp_text(stamp: int | None) -> str:
+    """Return a stamp [ns] as "seconds.nanoseconds", exact to the nanosecond; empty for None."""
+    if stamp is None:
+        return ""
+    return f"{stamp // NANOSECONDS}.{stamp % NANOSECONDS:09d}"

@@ -1,0 +1,64 @@
+"""What a traverse server has done and what is wrong with it, for its diagnostics."""
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+MEMORY = 10.0
+"""Time for which a refused question or an internal error counts as a present fault [s]."""
+OK, WARN, ERROR = "ok", "warning", "error"
+"""Levels of the health."""
+OVERLOADS = ("busy", "too_long")
+"""Codes of questions for which there was no time."""
+
+
+@dataclass(frozen=True)
+class Health:
+    """The state of a server at one time."""
+
+    level: str
+    """OK, WARN or ERROR."""
+    message: str
+    """What is wrong, in words."""
+    values: dict[str, Any]
+    """Counts by name."""
+
+
+class ServerHealth:
+    """Counts questions and faults of a server."""
+
+    def __init__(self) -> None:
+        self._codes: Counter[str] = Counter()
+        self._overload, self._overload_time = "", -float("inf")
+        self._map_refusal = ""
+
+    def take_answer(self, code: str, now: float) -> None:
+        """Count an answer by the code of its reason, empty if the path is traversable."""
+        self._codes[code or "traversable"] += 1
+        if code in OVERLOADS:
+            self._overload, self._overload_time = code, now
+
+    def take_map(self, refusal: str = "") -> None:
+        """Note a map that was taken, or the reason why it was refused."""
+        self._map_refusal = refusal
+
+    def describe(self, now: float, map_fault: str, error: str, counts: dict[str, Any]) -> Health:
+        """Return the health at time `now` [s].
+
+        Args:
+            now: Time of the steady clock [s].
+            map_fault: Why there is no map to plan on; empty if there is one.
+            error: The last internal error if it is recent, else empty.
+            counts: Further values to show.
+        """
+        values = {**counts, **{f"answers {code}": n for code, n in sorted(self._codes.items())}}
+        if error:
+            return Health(ERROR, f"internal error in {error}", values)
+        overload = now - self._overload_time <= MEMORY
+        faults = [
+            map_fault,
+            f"last map refused: {self._map_refusal}" if self._map_refusal else "",
+            f"questions refused: {self._overload}" if overload else "",
+        ]
+        told = "; ".join(fault for fault in faults if fault)
+        return Health(WARN if told else OK, told or "ready", values)

@@ -1,0 +1,153 @@
+"""All that a traverse server knows when a question is asked, and the answers from it."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.planning.answering.service_settings import ServiceSettings
+from rover_planner.planning.answering.suspension_check import compare_suspension
+from rover_planner.planning.path_geometry import densify
+from rover_planner.planning.path_planner import PathPlanner, PathSearch
+from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.verdict_report import SuspensionReport
+
+NO_PATH = "no path was received yet; publish one on ~/path"
+
+
+@dataclass(frozen=True, eq=False)
+class GivenPath:
+    """The path of the topic ~/path, or the reason why it was refused."""
+
+    poses: NDArray[np.float64] | None = None
+    """(n, 3) x, y [m] and yaw [rad], map frame; None if there is none or it was refused."""
+    refusal: str = NO_PATH
+    """Reason why there is none."""
+    hash: str = ""
+    """`msg_adapters.identity.path_hash` of the message."""
+    stamp: str = ""
+    """Stamp of the message, "seconds.nanoseconds"."""
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Settings, map, path and measurements at one time; answers do not change with later ones."""
+
+    settings: ServiceSettings
+    """The settings."""
+    path: GivenPath = field(default_factory=GivenPath)
+    """The last path."""
+    joints: Mapping[str, float] = field(default_factory=dict)
+    """Measured joint angles [rad] by name."""
+    known_map: KnownMap | None = None
+    """The map; None before the first one."""
+    map_age: float = math.nan
+    """Age of the map [s]; NaN without map."""
+    measured_pose: NDArray[np.float64] | None = None
+    """(3,) x, y [m] and yaw [rad] of the body, map frame, measured just now together with the
+    suspension; None if it is not known."""
+    stale_map: str = ""
+    """Why the map is too old to be used; empty if it is not."""
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """The map to plan on; None if there is none."""
+        return None if self.known_map is None else self.known_map.terrain
+
+    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> Judgement:
+        """Find a path from start to goal, or the reason why there is none.
+
+        Args:
+            start: (3,) x, y [m], yaw [rad] of the body origin, map frame.
+            goal: (3,) x, y [m], yaw [rad] of the body origin, map frame.
+            tolerance: Largest distance from the goal's position [m] at which the path may end
+                if the goal cannot be reached; the heading stays. 0 tries the goal only.
+
+        Raises:
+            PlanningError: The request is invalid.
+            RoverError: The model refuses the request.
+        """
+        if not (math.isfinite(tolerance) and tolerance >= 0.0):
+            raise PlanningError(f"tolerance is {tolerance}; it must be a distance of at least 0 m")
+
+        def judge(planner: PathPlanner) -> Judgement:
+            search = planner.search(
+                np.asarray(start, np.float64), np.asarray(goal, np.float64), tolerance
+            )
+            return self._judgement(planner, search.answer.chosen, search)
+
+        return self.refuse_map() or judge(self._planner())
+
+    def check_path(self) -> Judgement:
+        """Judge the last path.
+
+        Raises:
+            PlanningError: The path is too long.
+            RoverError: The model refuses the path.
+        """
+        missing = self.refuse_if_missing()
+        if missing is not None:
+            return missing
+        assert self.path.poses is not None
+        planner = self._planner()
+        poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
+        return self._judgement(planner, planner.check(poses))
+
+    def refuse_if_missing(self) -> Judgement | None:
+        """Return a refusal if there is no path or no map to use, else None."""
+        if self.path.poses is None:
+            return refusal("no_path", self.path.refusal)
+        return self.refuse_map()
+
+    def refuse_map(self) -> Judgement | None:
+        """Return a refusal if there is no map, or if it is too old, else None."""
+        if self.known_map is None:
+            return refusal(
+                "no_map",
+                "no map was received yet; publish one on elevation_cloud or call ~/load_map",
+            )
+        return refusal("stale_map", self.stale_map) if self.stale_map else None
+
+    def _planner(self) -> PathPlanner:
+        """Return a planner for the map, the settings and the measured arm angles."""
+        assert self.terrain is not None
+        return PathPlanner(
+            self.settings.rover, self.terrain, self.settings.query, self._manipulator_angles()
+        )
+
+    def _judgement(
+        self, planner: PathPlanner, candidate: Candidate, search: PathSearch | None = None
+    ) -> Judgement:
+        """Return the judgement of a judged path; its classes are computed on demand."""
+        return Judgement(
+            candidate.verdict.code,
+            candidate.verdict.reason,
+            candidate,
+            partial(planner.classify, candidate),
+            self._compare_suspension(planner.predict_standing),
+            search,
+        )
+
+    def _compare_suspension(
+        self, predict: Callable[[NDArray[np.float64]], PathPrediction]
+    ) -> SuspensionReport | None:
+        """Compare measured and predicted suspension where the rover stands, if that is known."""
+        if self.measured_pose is None:
+            return None
+        tolerance = self.settings.suspension_tolerance
+        return compare_suspension(predict(self.measured_pose), self.joints, tolerance)
+
+    def _manipulator_angles(self) -> dict[str, float] | None:
+        """Return the measured manipulator angles [rad], None (stowed) until all are known."""
+        names = self.settings.manipulator_joints
+        if not names or any(name not in self.joints for name in names):
+            return None
+        return {name: self.joints[name] for name in names}

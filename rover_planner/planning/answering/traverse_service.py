@@ -1,0 +1,165 @@
+"""The traverse server without ROS: keeps map, path and measurements, and answers queries."""
+
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.terrain.fingerprint import fingerprint
+from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.ground import pack_ground
+from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.planning.answering.measurements import Measurements
+from rover_planner.planning.answering.service_settings import ServiceSettings
+from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.candidates import generate_candidates
+
+
+class TraverseService:
+    """Keeps the last valid map, path and measurements, and answers queries about them.
+
+    Maps may be taken in another thread than the rest.
+    """
+
+    def __init__(self, settings: ServiceSettings):
+        self._settings = settings
+        self._map: KnownMap | None = None
+        self._map_lock = threading.Lock()
+        self._path = GivenPath()
+        self._measurements = Measurements()
+        # Compiles or loads the kernels, so that the first query is fast.
+        generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+
+    @property
+    def settings(self) -> ServiceSettings:
+        """The current settings; after a change of `largest_gap` call `refresh_map`."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: ServiceSettings) -> None:
+        self._settings = settings
+
+    @property
+    def known_map(self) -> KnownMap | None:
+        """The last valid map; None if there is none."""
+        return self._map
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """The last valid map, with small gaps interpolated if so set; None if there is none."""
+        return None if self._map is None else self._map.terrain
+
+    @property
+    def path(self) -> NDArray[np.float64] | None:
+        """Poses (n, 3) of the last path; None if there is none or it was refused."""
+        return self._path.poses
+
+    @property
+    def given_path(self) -> GivenPath:
+        """The last path, or the reason why it was refused."""
+        return self._path
+
+    @property
+    def joints(self) -> dict[str, float]:
+        """Measured joint angles [rad] by name."""
+        return self._measurements.joints
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints whose angles are used: those of suspension and manipulator."""
+        return SUSPENSION_JOINTS + self._settings.manipulator_joints
+
+    def take_terrain(self, terrain: Terrain, source: str = "", stamp: int | None = None) -> bool:
+        """Keep a map until the next one; return whether its content is new.
+
+        Args:
+            terrain: The map.
+            source: Topic or file it comes from.
+            stamp: Stamp of its header [ns, ROS time]; None if it has none.
+        """
+        return self._keep_map(terrain, source, stamp, time.monotonic())
+
+    def renew_map(self) -> None:
+        """Note that the present map has arrived once more."""
+        known = self._map
+        if known is not None:
+            self._map = replace(known, arrival=time.monotonic())
+
+    def refresh_map(self) -> None:
+        """Interpolate the gaps of the received map again, with the present settings."""
+        known = self._map
+        if known is not None:
+            self._keep_map(known.received, known.source, known.stamp, known.arrival)
+
+    def take_path(self, poses: NDArray[np.float64], path_hash: str = "", stamp: str = "") -> None:
+        """Keep a path for `check_last_path`.
+
+        Args:
+            poses: (n, 3) x, y [m] and yaw [rad], map frame.
+            path_hash: `msg_adapters.identity.path_hash` of the message.
+            stamp: Its stamp, "seconds.nanoseconds".
+        """
+        self._path = GivenPath(poses, "", path_hash, stamp)
+
+    def refuse_path(self, reason: str, path_hash: str = "", stamp: str = "") -> None:
+        """Discard the path and keep the reason; later queries must not use an outdated one."""
+        self._path = GivenPath(None, f"the last path was refused: {reason}", path_hash, stamp)
+
+    def take_joints(self, positions: Mapping[str, float]) -> None:
+        """Keep measured joint angles [rad] by name; angles of other joints stay."""
+        self._measurements.take_joints(positions, time.monotonic())
+
+    def take_pose(self, pose: NDArray[np.float64]) -> None:
+        """Keep the measured pose (3,) x, y [m], yaw [rad] of the body, map frame."""
+        self._measurements.take_pose(pose, time.monotonic())
+
+    def situation(self, ros_time: int | None = None) -> Situation:
+        """Return all that is known now.
+
+        Args:
+            ros_time: Present ROS time [ns], for the age of the map; None is the system's time.
+        """
+        now = time.monotonic()
+        standing = self._measurements.pose_with_suspension(now)
+        known = Situation(
+            self._settings, self._path, self._measurements.joints, measured_pose=standing
+        )
+        return self.add_map(known, ros_time)
+
+    def add_map(self, situation: Situation, ros_time: int | None = None) -> Situation:
+        """Return a situation with the present map; `ros_time` as for `situation`."""
+        ros_time = time.time_ns() if ros_time is None else ros_time
+        known, most = self._map, situation.settings.max_map_age
+        if known is None:
+            return replace(situation, known_map=None)
+        steady = time.monotonic()
+        return replace(
+            situation,
+            known_map=known,
+            map_age=known.age(ros_time, steady),
+            stale_map=known.describe_age(ros_time, steady, most) if most > 0.0 else "",
+        )
+
+    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> Judgement:
+        """Find a path from start to goal; see `Situation.answer`."""
+        return self.situation().answer(start, goal, tolerance)
+
+    def check_last_path(self) -> Judgement:
+        """Judge the last path that was received; see `Situation.check_path`."""
+        return self.situation().check_path()
+
+    def _keep_map(self, received: Terrain, source: str, stamp: int | None, arrival: float) -> bool:
+        """Keep a map; return whether its content is new."""
+        with self._map_lock:
+            gap = self._settings.largest_gap
+            terrain = received.fill_gaps(gap) if gap > 0.0 else received
+            pack_ground(terrain)  # now, so that the first query is fast
+            before = self._map
+            content = fingerprint(received)
+            self._map = KnownMap(received, terrain, source, stamp, arrival, content)
+            return before is None or before.fingerprint != content

@@ -1,0 +1,94 @@
+"""Keeps a node alive: an unexpected error is logged once with its trace, and counted."""
+
+import functools
+import math
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.executors import SingleThreadedExecutor
+
+
+class Guard:
+    """Counts the unexpected errors of a node by place; logs each kind once."""
+
+    def __init__(self, logger: Any):
+        self._logger = logger
+        self._last, self._time = "", -math.inf
+        self.counts: Counter[str] = Counter()
+        """Number of errors by place, kind and text."""
+
+    @property
+    def total(self) -> int:
+        """Number of all errors."""
+        return sum(self.counts.values())
+
+    def recent(self, seconds: float) -> str:
+        """Return the place and kind of the last error if it is that recent [s], else empty."""
+        return self._last if time.monotonic() - self._time <= seconds else ""
+
+    def report(self, place: str, error: Exception) -> str:
+        """Count an error, log it with its trace if it is new, and return it in one line."""
+        text = f"{type(error).__name__}: {error}"[:300]
+        key = f"{place}: {type(error).__name__}"
+        self._last, self._time = key, time.monotonic()
+        self.counts[key] += 1
+        if self.counts[key] == 1:
+            trace = "".join(traceback.format_exception(error))
+            self._logger.error(
+                f"internal error in {place}, the node goes on; logged once:\n{trace}"
+            )
+        return text
+
+    def around(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a callback that reports errors instead of raising them."""
+
+        @functools.wraps(callback)
+        def guarded(*values: Any) -> Any:
+            try:
+                return callback(*values)
+            except Exception as error:
+                self.report(getattr(callback, "__name__", "a callback"), error)
+                return None
+
+        return guarded
+
+
+class GuardedExecutor(SingleThreadedExecutor):
+    """An executor that outlives errors in callbacks and in messages that cannot be read.
+
+    In rclpy such an error ends `spin`, and the node's callback group stays blocked for ever.
+    """
+
+    def __init__(self, guard: Guard, **executor_arguments: Any):
+        super().__init__(**executor_arguments)
+        self._errors = guard
+
+    def _make_handler(self, entity, node, take_from_wait_list):
+        """Return a handler of an entity's work, as rclpy does, that raises no error."""
+
+        def take(ready):
+            try:
+                work = take_from_wait_list(ready)
+            except Exception as error:
+                self._errors.report(f"reading of {_name(ready)}", error)
+                return None
+            return None if work is None else functools.partial(self._run, ready, work)
+
+        return super()._make_handler(entity, node, take)
+
+    async def _run(self, entity, work) -> None:
+        try:
+            await work()
+        except Exception as error:
+            self._errors.report(_name(entity), error)
+
+
+def _name(entity: Any) -> str:
+    """Return the name of the topic or service of an entity, else its kind."""
+    for name in ("topic_name", "srv_name"):
+        if hasattr(entity, name):
+            return str(getattr(entity, name))
+    return type(entity).__name__
