@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -24,6 +24,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64MultiArray
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.identity import plan_request_hash
 from msg_adapters.paths import stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.terrain.grid import Terrain, load_terrain
@@ -41,8 +42,12 @@ from rover_planner.shell.exit_codes import (
 )
 
 NODE_NAME = "mission_planner"
-SERVER = "/traverse_server"
-"""Name of the server's node; remap services and topics to use another one."""
+SERVER = "traverse_server"
+"""Name of the server's node, relative to this node's namespace; remap services and topics to use
+another one."""
+
+TEXTS = ("_hash", "_stamp", "server")
+"""Ends of keys whose values are texts, even if they look like numbers."""
 
 
 class NoAnswerError(Exception):
@@ -65,7 +70,8 @@ class MissionPlanner(Node):
         self._frame = map_frame
         self._timeout = timeout
         self._changed = threading.Condition()
-        self._verdicts: dict[tuple[int, int], dict[str, Any]] = {}
+        self._verdict: dict[str, Any] = {}
+        self._verdict_about: tuple[Any, Any] | None = None
         self._arrays: dict[str, np.ndarray] = {}
         self._plan = Path()
         self._place: tuple[float, float] | None = None
@@ -135,9 +141,10 @@ class MissionPlanner(Node):
         future.add_done_callback(self._notify)
         self._wait(future.done, f"the answer of {SERVER}/can_traverse")
         plan = self._plan = future.result().plan
-        stamp = (plan.header.stamp.sec, plan.header.stamp.nanosec)
-        self._wait(lambda: stamp in self._verdicts, f"the verdict on {SERVER}/verdict")
-        answer = dict(self._verdicts[stamp])
+        # The hash tells this question from those of other clients, the stamp from earlier ones.
+        about = plan.header.stamp, plan_request_hash(request.start, request.goal, 0.0)
+        self._wait(lambda: self._verdict_about == about, f"the verdict on {SERVER}/verdict")
+        answer = dict(self._verdict)
         positions = [pose.pose.position for pose in plan.poses]
         answer["plan"] = [[p.x, p.y, p.z] for p in positions]
         answer["max_wheel_load"] = self._largest("wheel_loads", answer)
@@ -191,10 +198,10 @@ class MissionPlanner(Node):
         return float(np.nanmax(values)) if np.isfinite(values).any() else None
 
     def _take_verdict(self, message: DiagnosticArray) -> None:
-        stamp = (message.header.stamp.sec, message.header.stamp.nanosec)
-        status = message.status[0]
+        verdict = {entry.key: _value(entry) for entry in message.status[0].values}
         with self._changed:
-            self._verdicts = {stamp: {v.key: _value(v.value) for v in status.values}}
+            self._verdict = verdict
+            self._verdict_about = message.header.stamp, verdict.get("question_hash")
             self._changed.notify_all()
 
     def _taker(self, name: str) -> Callable[[Float64MultiArray], None]:
@@ -320,12 +327,14 @@ def _print_text(event: dict[str, Any]) -> None:
         print(event["event"], flush=True)
 
 
-def _value(text: str) -> Any:
+def _value(entry: KeyValue) -> Any:
     """Parse a value of a diagnostic status as JSON; other texts are returned as they are."""
+    if entry.key.endswith(TEXTS):
+        return entry.value
     try:
-        return json.loads(text)
+        return json.loads(entry.value)
     except ValueError:
-        return text
+        return entry.value
 
 
 if __name__ == "__main__":

@@ -74,15 +74,15 @@ PROGRAMS = {
     ),
     "rover_simulator": Program(
         "Simulate a rover on a terrain, with the topics of a real one.",
-        "subscribes path, cmd_vel, /traction_controller/commands; publishes joint_states, "
-        "odometry, imu, elevation_cloud, cmd_vel, /diagnostics",
+        "subscribes path, cmd_vel, traction_controller/commands; publishes joint_states, "
+        "odometry, imu, elevation_cloud, cmd_vel, diagnostics",
         read_engine,
         specs_of(RoverSimulatorParameters),
     ),
     "mission_planner": Program(
         "Query a traverse_server over ROS 2 for a list of goals.",
-        "calls /traverse_server/can_traverse; subscribes /traverse_server/verdict, "
-        "/traverse_server/wheel_loads, /traverse_server/slip_ratios, odometry; publishes "
+        "calls traverse_server/can_traverse; subscribes traverse_server/verdict, "
+        "traverse_server/wheel_loads, traverse_server/slip_ratios, odometry; publishes "
         "elevation_cloud, path",
         read_mission,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "

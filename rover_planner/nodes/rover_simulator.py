@@ -38,7 +38,7 @@ from rover_planner.simulator.simulation import Simulation, load_simulation_setti
 from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "rover_simulator"
-COMMANDS = "/traction_controller/commands"
+COMMANDS = "traction_controller/commands"
 """Topic of the torque commands; remap it for another controller."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
@@ -84,7 +84,7 @@ class RoverSimulator(Node):
         self._odometry = self.create_publisher(Odometry, "odometry", qos)
         self._imu = self.create_publisher(Imu, "imu", qos)
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", topic_qos())
+        self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._commands = None
         if self._settings.follow_commands:
             self._commands = self.create_publisher(TwistStamped, "cmd_vel", qos)

@@ -29,6 +29,7 @@ from msg_adapters.stamps import stamp_to_ns
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes.map_file_service import MapFileService
 from rover_planner.nodes.map_topics import MapTopics
+from rover_planner.nodes.path_validity import PathValidity
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
@@ -81,6 +82,7 @@ class TraverseServer(Node):
         self._create_subscriptions(reliability)
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
+        PathValidity(self._desk, frame, self._publish).serve(self)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self._files = MapFileService(self, self._maps, frame, self.guard)
         self._reach = ReachTopics(self, self._desk, frame, reliability)

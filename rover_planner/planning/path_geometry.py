@@ -33,6 +33,30 @@ def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
     """
     steps = np.diff(poses, axis=0)
     steps[:, 2] = np.arctan2(np.sin(steps[:, 2]), np.cos(steps[:, 2]))
+    counts = _count_pieces(steps, spacing)
+    segment = np.repeat(np.arange(len(steps)), counts)
+    within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
+    dense = poses[segment] + steps[segment] * (within / counts[segment])[:, None]
+    return np.vstack([dense, poses[-1:]])
+
+
+def next_given_poses(poses: NDArray[np.float64], spacing: float) -> NDArray[np.intp]:
+    """Return for each waypoint of `densify` the index of the given pose at or after it, (m,).
+
+    Raises:
+        PlanningError: As `densify`.
+    """
+    counts = _count_pieces(np.diff(poses, axis=0), spacing)
+    places = np.concatenate([[0], np.cumsum(counts)])  # of the given poses among the waypoints
+    return np.searchsorted(places, np.arange(places[-1] + 1))
+
+
+def _count_pieces(steps: NDArray[np.float64], spacing: float) -> NDArray[np.intp]:
+    """Return the number of pieces of each step (n, 3) between given poses.
+
+    Raises:
+        PlanningError: There are MAX_WAYPOINTS or more.
+    """
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     pieces = np.maximum(1.0, np.ceil(lengths / spacing - 1e-9))
     if pieces.sum() >= MAX_WAYPOINTS:
@@ -40,11 +64,7 @@ def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
             f"path is {lengths.sum():.4g} m long, which at {spacing:g} m are more than "
             f"{MAX_WAYPOINTS} waypoints; ask for a shorter one"
         )
-    counts = pieces.astype(np.intp)
-    segment = np.repeat(np.arange(len(steps)), counts)
-    within = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts)
-    dense = poses[segment] + steps[segment] * (within / counts[segment])[:, None]
-    return np.vstack([dense, poses[-1:]])
+    return pieces.astype(np.intp)
 
 
 def rings_within(
