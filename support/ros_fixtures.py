@@ -43,9 +43,9 @@ class RosRun:
         self._ending = threading.Event()
         self._spinning: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
 
-    def spin(self, node: Node) -> Node:
+    def spin(self, node: Node, executor: SingleThreadedExecutor | None = None) -> Node:
         """Spin a node of this context in the background from now on."""
-        executor = SingleThreadedExecutor(context=self.context)
+        executor = executor or SingleThreadedExecutor(context=self.context)
         executor.add_node(node)
         thread = threading.Thread(target=self._spin, args=(executor,), daemon=True)
         thread.start()

@@ -1,5 +1,6 @@
 """Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -45,6 +46,8 @@ LOOK_OUT = 0.2
 """Period of the check for new subscribers [s]."""
 MAX_STOCK = 2000
 """Number of pose and point messages that are kept for reuse."""
+SET_BACK = 1_000_000_000
+"""Time [ns] up to which a clock that was set back counts as standing still."""
 
 _KINDS = {
     "plan": Path,
@@ -76,7 +79,7 @@ class ResultTopics:
         identity: IdentityReport,
         rover: Rover,
         plan_spacing: float,
-    ) -> tuple[Path, VerdictReport]:
+    ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; publish all results after the answer is sent.
 
         Args:
@@ -86,7 +89,8 @@ class ResultTopics:
             plan_spacing: Distance between poses of the plan [m]; 0 keeps all waypoints.
 
         Returns:
-            The plan, whose poses are valid until the next plan is made, and the report.
+            The plan, whose poses are valid until the next plan is made, and a function that
+            returns the report.
         """
         results = _Results(
             judgement,
@@ -107,12 +111,16 @@ class ResultTopics:
         ]
         log = partial(self._log, results)
         self._deferred_work.do(log, *publications, self._shrink_stocks)
-        return plan, results.report
+        return plan, lambda: results.report
 
     def _next_stamp(self) -> int:
-        """Return the ROS time [ns], later than the last stamp unless the clock was set back."""
+        """Return the ROS time [ns], or just after the last stamp if the clock stands still.
+
+        A clock that was set back by more than SET_BACK is followed.
+        """
         now = self._node.get_clock().now().nanoseconds
-        self._stamp = self._stamp + 1 if now == self._stamp else now
+        stands = self._stamp - SET_BACK < now <= self._stamp
+        self._stamp = self._stamp + 1 if stands else now
         return self._stamp
 
     def _shrink_stocks(self) -> None:

@@ -77,15 +77,16 @@ class TraverseServer(Node):
         self._maps = MapTopics(
             self, self._service, self._values, self.guard, lambda error: self._note_map(error)
         )
-        self._desk = QuestionDesk(self, self._service, self._maps, self.guard)
-        self._desk.set_limits(self._values.time_budget, self._values.max_waiting)
+        self.desk = QuestionDesk(self, self._service, self._maps, self.guard)
+        """Takes the questions of all services."""
+        self.desk.set_limits(self._values.time_budget, self._values.max_waiting)
         self._create_subscriptions(reliability)
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
-        PathValidity(self._desk, frame, self._publish).serve(self)
+        PathValidity(self.desk, frame, self.publish).serve(self)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self._files = MapFileService(self, self._maps, frame, self.guard)
-        self._reach = ReachTopics(self, self._desk, frame, reliability)
+        self._reach = ReachTopics(self, self.desk, frame, reliability)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(
@@ -107,7 +108,7 @@ class TraverseServer(Node):
 
     def destroy_node(self) -> None:
         """Refuse open questions, end the threads and destroy the node."""
-        self._desk.close()
+        self.desk.close()
         self._maps.close()
         super().destroy_node()
 
@@ -130,11 +131,11 @@ class TraverseServer(Node):
     def _apply_parameters(self, parameters: TraverseServerParameters) -> None:
         self._values = parameters
         self._service.settings = load_service_settings(parameters)
-        self._desk.set_limits(parameters.time_budget, parameters.max_waiting)
+        self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
         self._maps.apply(parameters)
 
     def _note_map(self, error: str) -> None:
-        self._desk.health.take_map(error)
+        self.desk.health.take_map(error)
 
     def _take_joints(self, state: JointState) -> None:
         try:
@@ -172,11 +173,11 @@ class TraverseServer(Node):
             return situation.answer(start, goal, request.tolerance).complete()
 
         def deliver(judgement: Judgement, identity: IdentityReport) -> None:
-            response.plan, _ = self._publish(judgement, identity)
+            response.plan, _ = self.publish(judgement, identity)
             reply(response)
 
         about = plan_request_hash(request.start, request.goal, request.tolerance)
-        self._desk.ask(Inquiry("can_traverse", about, answer, refusal, deliver))
+        self.desk.ask(Inquiry("can_traverse", about, answer, refusal, deliver))
 
     def _check_path(
         self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
@@ -188,22 +189,22 @@ class TraverseServer(Node):
 
         def deliver(judgement: Judgement, identity: IdentityReport) -> None:
             about = replace(identity, path_hash=path.hash, path_stamp=path.stamp)
-            _, report = self._publish(judgement, about)
+            _, report = self.publish(judgement, about)
             response.success = judgement.traversable
-            response.message = report_to_json(report)
+            response.message = report_to_json(report())
             reply(response)
 
-        self._desk.ask(Inquiry("check_path", path.hash, answer, refusal, deliver))
+        self.desk.ask(Inquiry("check_path", path.hash, answer, refusal, deliver))
 
-    def _publish(
+    def publish(
         self, judgement: Judgement, identity: IdentityReport
-    ) -> tuple[Path, VerdictReport]:
+    ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; its results are published after the answer."""
         rover, spacing = self._service.settings.rover, self._values.plan_spacing
         return self._results.take(judgement, identity, rover, spacing)
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        count = self._desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
+        count = self.desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
         response.success = count > 0
         response.message = f"{count} open questions cancelled"
         return response
@@ -212,10 +213,10 @@ class TraverseServer(Node):
         now = self.get_clock().now()
         missing = self._service.situation(now.nanoseconds).refuse_map()
         counts = {
-            "open questions": self._desk.open_count,
+            "open questions": self.desk.open_count,
             "internal errors": self.guard.total,
         }
-        health = self._desk.health.describe(
+        health = self.desk.health.describe(
             time.monotonic(),
             "" if missing is None else missing.reason,
             self.guard.recent(MEMORY),
@@ -251,9 +252,9 @@ def _run(make_node: Callable[[], TraverseServer]) -> None:
     """Make a node and spin it until the context ends."""
     node = None
     try:
+        executor = GuardedExecutor()
         node = make_node()
-        executor = GuardedExecutor(node.guard)
-        executor.add_node(node)
+        executor.add_guarded(node, node.guard)
         gc.collect()
         gc.freeze()  # objects that live as long as the node are excluded from garbage collection
         executor.spin()

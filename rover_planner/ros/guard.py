@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 
 
 class Guard:
@@ -57,14 +58,20 @@ class Guard:
 
 
 class GuardedExecutor(SingleThreadedExecutor):
-    """An executor that outlives errors in callbacks and in messages that cannot be read.
+    """An executor of one node that outlives errors in callbacks and in the reading of messages.
 
-    In rclpy such an error ends `spin`, and the node's callback group stays blocked for ever.
+    In rclpy such an error ends `spin`. After an error in the reading of a message, the node's
+    callback group stays blocked for ever.
     """
 
-    def __init__(self, guard: Guard, **executor_arguments: Any):
+    def __init__(self, **executor_arguments: Any):
         super().__init__(**executor_arguments)
-        self._errors = guard
+        self._guard_of_node: Guard | None = None
+
+    def add_guarded(self, node: Node, guard: Guard) -> None:
+        """Add the node; errors of its callbacks go to the guard."""
+        self._guard_of_node = guard
+        self.add_node(node)
 
     def _make_handler(self, entity, node, take_from_wait_list):
         """Return a handler of an entity's work, as rclpy does, that raises no error."""
@@ -73,7 +80,7 @@ class GuardedExecutor(SingleThreadedExecutor):
             try:
                 work = take_from_wait_list(ready)
             except Exception as error:
-                self._errors.report(f"reading of {_name(ready)}", error)
+                self._report(f"reading of {_name(ready)}", error)
                 return None
             return None if work is None else functools.partial(self._run, ready, work)
 
@@ -83,12 +90,17 @@ class GuardedExecutor(SingleThreadedExecutor):
         try:
             await work()
         except Exception as error:
-            self._errors.report(_name(entity), error)
+            self._report(_name(entity), error)
+
+    def _report(self, place: str, error: Exception) -> None:
+        if self._guard_of_node is None:
+            raise error
+        self._guard_of_node.report(place, error)
 
 
 def _name(entity: Any) -> str:
     """Return the name of the topic or service of an entity, else its kind."""
-    for name in ("topic_name", "srv_name"):
+    for name in ("topic_name", "service_name"):
         if hasattr(entity, name):
             return str(getattr(entity, name))
     return type(entity).__name__

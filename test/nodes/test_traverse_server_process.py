@@ -4,11 +4,16 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
+from nav_msgs.srv import GetPlan
+from rclpy.node import Node
 
+from msg_adapters.paths import stamped_pose
 from rover_physics.terrain.grid import Terrain, save_terrain
+from support.grounds import make_terrain, waves
 from support.planner_client import PlannerClient
 from support.ros_fixtures import RosRun, domain_id
 
@@ -72,6 +77,32 @@ def test_another_process_gets_an_answer(start_process, tmp_path):
         run.close()
 
 
+def test_a_signal_ends_it_in_the_middle_of_a_question(start_process, tmp_path):
+    save_terrain(tmp_path / "waves.npz", make_terrain(waves))
+    run = RosRun()
+    try:
+        asker = run.spin(Node("asker", context=run.context))
+        process = start_process(
+            f"terrain_file:={tmp_path / 'waves.npz'}",
+            "time_budget:=600.0",
+            "waypoint_spacing:=0.001",
+            "candidate_count:=99",
+            "candidate_spacing:=0.01",
+        )
+        read_until(process, "ready for rover lsr1")
+        service = asker.create_client(GetPlan, "/traverse_server/can_traverse")
+        assert service.wait_for_service(20.0)
+        start, goal = (stamped_pose((x, 0.0, 0.0), "map") for x in (-3.0, 3.0))
+        future = service.call_async(GetPlan.Request(start=start, goal=goal))
+        time.sleep(1.0)
+        assert not future.done()
+        process.send_signal(signal.SIGINT)
+        rest, _ = process.communicate(timeout=10.0)
+        assert process.returncode == 0 and "Traceback" not in rest
+    finally:
+        run.close()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameter", "text"),
@@ -80,6 +111,7 @@ def test_another_process_gets_an_answer(start_process, tmp_path):
         ("rover:=lsr9", "lsr9"),
         ("policy:=fair", "fair"),
         ("candidate_count:=9.5", "candidate_count"),
+        ("terrain_file:=/no/such/file.npz", "/no/such/file.npz"),
     ],
 )
 def test_a_wrong_parameter_ends_it_with_one_line(start_process, parameter, text):

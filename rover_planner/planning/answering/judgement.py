@@ -44,12 +44,21 @@ class Judgement:
         return self.classify()
 
     def complete(self) -> "Judgement":
-        """Return the judgement with its report computed; without classes if there is no time."""
+        """Return the judgement with all done that needs the model; later calls are quick.
+
+        If there is no time for classes, the judgement has none.
+        """
         try:
-            _ = self.report, self.changes()
+            _ = self.changes() if self._is_equal_and_traversable else self.classes
         except QuestionStoppedError:
-            return replace(self, classify=tuple).complete()
+            return replace(self, classify=tuple)
         return self
+
+    @property
+    def _is_equal_and_traversable(self) -> bool:
+        """Whether all waypoints are passable with equal torques, which needs no other sweep."""
+        candidate = self.candidate
+        return candidate is not None and self.traversable and candidate.verdict.policy == EQUAL
 
     @cached_property
     def report(self) -> VerdictReport:
@@ -60,8 +69,7 @@ class Judgement:
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""
-        candidate = self.candidate
-        if candidate is None or (self.traversable and candidate.verdict.policy == EQUAL):
+        if self.candidate is None or self._is_equal_and_traversable:
             return np.empty(0, np.intp)  # all waypoints have the same class
         names = np.array([waypoint.traversability_class for waypoint in self.classes])
         return np.flatnonzero(names[1:] != names[:-1]) + 1

@@ -320,3 +320,9 @@ def test_the_real_martian_ground_is_passed_where_it_is_known():
     shadow = lenient.answer((-48.0, -20.0, 0.0), (-40.0, -20.0, 0.0)).report
     assert shadow.code == "unknown_ground"
     assert -46.0 < shadow.failure.failure_pose[0] < -42.0
+
+
+def test_where_the_way_fails_far_from_the_goal_no_other_goal_is_tried():
+    service = make_service(make_terrain(wall_at(-1.0)))
+    report = service.answer((-3.0, 0.0, 0.0), (3.0, 0.0, 0.0), tolerance=0.1).report
+    assert not report.traversable and report.search.alternative_goals_tried == 0

@@ -1,0 +1,147 @@
+"""Nothing that a callback raises, and no message that cannot be read, ends a node."""
+
+import contextlib
+import time
+
+import pytest
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from rover_physics.errors import PoseError
+from rover_planner.ros.guard import Guard, GuardedExecutor
+from rover_planner.ros.handover import Handover
+from rover_planner.ros.refusals import refuse_error
+from support.ros_fixtures import call, wait_until
+
+
+class Log:
+    """Keeps what is logged as errors."""
+
+    def __init__(self):
+        self.lines: list[str] = []
+
+    def error(self, text):
+        self.lines.append(text)
+
+
+class Fragile(Node):
+    """A node whose callbacks raise."""
+
+    def __init__(self, context):
+        super().__init__("fragile", context=context)
+        self.guard = Guard(Log())
+        self.heard: list[str] = []
+        self.create_subscription(String, "words", self._take, 10)
+        self.create_service(Trigger, "~/fail", lambda *_: 1 / 0)
+        self.create_service(Trigger, "~/work", lambda _, response: response)
+        self.timer = self.create_timer(0.05, self._tick)
+        self.ticks = 0
+
+    def _take(self, word):
+        self.heard.append(word.data)
+        if word.data == "bad":
+            raise ValueError("a bad word")
+
+    def _tick(self):
+        self.ticks += 1
+        raise RuntimeError("tick")
+
+
+def spin_guarded(ros, node):
+    executor = GuardedExecutor(context=ros.context)
+    executor.add_guarded(node, node.guard)
+    return ros.spin(node, executor)
+
+
+def test_a_node_outlives_errors_of_timers_subscriptions_and_services(ros):
+    node = Fragile(ros.context)
+    spin_guarded(ros, node)
+    other = ros.spin(Node("other", context=ros.context))
+    words = other.create_publisher(String, "words", 10)
+    wait_until(lambda: words.get_subscription_count() > 0, "the subscription")
+    words.publish(String(data="bad"))
+    wait_until(lambda: node.heard == ["bad"], "the bad word")
+    failing = other.create_client(Trigger, "fragile/fail")
+    assert failing.wait_for_service(20.0)
+    failing.call_async(Trigger.Request())
+    wait_until(lambda: node.guard.counts["/fragile/fail: ZeroDivisionError"] == 1, "the failure")
+    call(other.create_client(Trigger, "fragile/work"), Trigger.Request())
+    words.publish(String(data="good"))
+    wait_until(lambda: node.heard[-1] == "good", "the good word")
+    ticks = node.ticks
+    wait_until(lambda: node.ticks > ticks + 2, "the timer")
+
+
+def test_bytes_that_are_no_message_end_nothing(ros):
+    node = Fragile(ros.context)
+    spin_guarded(ros, node)
+    other = ros.spin(Node("other", context=ros.context))
+    words = other.create_publisher(String, "words", 10)
+    wait_until(lambda: words.get_subscription_count() > 0, "the subscription")
+    good = serialize_message(String(data="x" * 40))
+    words.publish(good.replace(b"xxxx", b"\xff\xfe\xfa\xf9"))  # no UTF-8
+    words.publish(good[:12])
+    words.publish(String(data="good"))
+    wait_until(lambda: "good" in node.heard, "the good word")
+
+
+@pytest.mark.parametrize("guarded", [True, False])
+def test_an_entity_that_cannot_be_read_blocks_a_node_only_without_the_guard(ros, guarded):
+    node = Fragile(ros.context)
+    node.timer.cancel()
+    if guarded:
+        executor = GuardedExecutor(context=ros.context)
+        executor.add_guarded(node, node.guard)
+    else:
+        executor = SingleThreadedExecutor(context=ros.context)
+        executor.add_node(node)
+
+    def fail(_):
+        raise MemoryError("no room for the message")
+
+    handler = executor._make_handler(next(iter(node.subscriptions)), node, fail)
+    with contextlib.suppress(MemoryError):
+        handler()
+        if handler.exception() is not None:
+            raise handler.exception()
+    assert node.default_callback_group.can_execute(node.timer) == guarded
+    executor.shutdown()
+    node.destroy_node()
+
+
+def test_an_error_is_logged_once_with_its_trace_and_counted():
+    log = Log()
+    guard = Guard(log)
+    fails = guard.around(lambda: 1 / 0)
+    for _ in range(5):
+        fails()
+    assert guard.total == 5 and len(log.lines) == 1
+    assert "Traceback" in log.lines[0] and "ZeroDivisionError" in log.lines[0]
+    assert guard.recent(20.0) and not Guard(log).recent(20.0)
+    assert len(guard.report("x", ValueError("y" * 10_000))) <= 300
+
+
+def test_errors_of_the_input_are_bad_requests_and_others_internal_errors():
+    log = Log()
+    guard = Guard(log)
+    told = refuse_error(guard, "check", PoseError("no pose"), lambda *both: both)
+    assert told == ("bad_request", "no pose") and not log.lines
+    code, reason = refuse_error(guard, "check", KeyError("k"), lambda *both: both)
+    assert code == "internal_error" and reason.startswith("internal error: KeyError")
+    assert guard.total == 1
+
+
+def test_functions_of_other_threads_run_in_order_and_an_error_ends_nothing(ros):
+    node = Fragile(ros.context)
+    node.timer.cancel()
+    spin_guarded(ros, node)
+    handover, told = Handover(node, node.guard), []
+    time.sleep(0.01)
+    for k in range(50):
+        handover.call(lambda k=k: told.append(k))
+        handover.call(lambda: 1 / 0)
+    wait_until(lambda: len(told) == 50, "the calls")
+    assert told == list(range(50))

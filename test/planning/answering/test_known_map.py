@@ -1,0 +1,78 @@
+"""The age of a map counts from its stamp and from its arrival; its content has a hash."""
+
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+
+from rover_physics.terrain.fingerprint import fingerprint
+from rover_physics.terrain.grid import Terrain
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.known_map import KnownMap, stamp_text
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
+from support.grounds import make_terrain, waves
+
+SECOND = 10**9
+FLAT = Terrain(np.zeros((30, 30)), 0.1)
+
+
+def known(stamp, arrival=0.0):
+    return KnownMap(FLAT, FLAT, "a topic", stamp, arrival, fingerprint(FLAT))
+
+
+@pytest.mark.parametrize(
+    ("stamp", "ros_time", "steady", "age"),
+    [
+        (None, 50 * SECOND, 3.0, 3.0),
+        (10 * SECOND, 15 * SECOND, 3.0, 5.0),
+        (14 * SECOND, 15 * SECOND, 3.0, 3.0),
+        (3600 * SECOND, 15 * SECOND, 3.0, 3.0),
+    ],
+)
+def test_the_longer_of_both_ages_counts(stamp, ros_time, steady, age):
+    assert known(stamp).age(ros_time, steady) == pytest.approx(age)
+
+
+def test_old_maps_and_maps_from_the_future_are_told_apart():
+    assert known(None).describe_age(0, 3.0, 5.0) == ""
+    assert "6.0 s old" in known(None).describe_age(0, 6.0, 5.0)
+    assert "10.0 s in the future" in known(20 * SECOND).describe_age(10 * SECOND, 1.0, 5.0)
+
+
+def test_a_stale_map_is_refused_and_the_same_map_again_is_not():
+    settings = load_service_settings(TraverseServerParameters(max_map_age=0.5))
+    service = TraverseService(settings)
+    assert service.take_terrain(make_terrain(waves))
+    time.sleep(0.7)
+    assert service.answer((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).code == "stale_map"
+    service.renew_map()
+    assert service.answer((0.0, 0.0, 0.0), (0.5, 0.0, 0.0)).traversable
+    assert not service.take_terrain(make_terrain(waves))  # nothing new in it
+
+
+def test_any_change_of_a_terrain_changes_its_hash_and_nothing_else_does():
+    layer = np.full((30, 30), 0.5)
+    other = np.zeros((30, 30))
+    other[3, 4] = 1e-9
+    kinds = [
+        FLAT,
+        Terrain(other, 0.1),
+        Terrain(np.zeros((30, 30)), 0.2),
+        Terrain(np.zeros((30, 30)), 0.1, (0.0, 1.0)),
+        Terrain(np.zeros((20, 45)), 0.1),
+        dataclasses.replace(FLAT, friction=layer),
+        dataclasses.replace(FLAT, elevation_std=layer),
+    ]
+    hashes = [fingerprint(kind) for kind in kinds]
+    assert len(set(hashes)) == len(kinds) and all(len(text) == 16 for text in hashes)
+    assert fingerprint(Terrain(np.zeros((30, 30), np.float32), 0.1)) == fingerprint(FLAT)
+    holes = np.zeros((2, 30, 30))
+    holes[0, 1, 1], holes[1, 1, 1] = np.nan, -np.nan
+    assert fingerprint(Terrain(holes[0], 0.1)) == fingerprint(Terrain(holes[1], 0.1))
+
+
+def test_stamps_are_exact_texts():
+    assert stamp_text(1_700_000_000_123_456_789) == "1700000000.123456789"
+    assert stamp_text(5) == "0.000000005" and stamp_text(None) == ""

@@ -1,0 +1,158 @@
+"""Questions are answered in order, within their time, once, or refused with the reason."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from rover_physics.numerics.interruption import check_interruption
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.planning.answering.budget import (
+    BUSY,
+    CANCELLED,
+    STOPPING,
+    TOO_LONG,
+    Budget,
+    QuestionStoppedError,
+)
+from rover_planner.planning.answering.question_queue import Question, QuestionQueue
+from support.grounds import make_terrain, waves
+from support.ros_fixtures import wait_until
+
+
+class Desk:
+    """A queue whose answers are collected as (name, answer)."""
+
+    def __init__(self, max_waiting: int = 100):
+        self.told: list[tuple[str, object]] = []
+        self.queue = QuestionQueue(max_waiting, lambda: None)
+
+    def ask(self, name, answer, seconds: float = 20.0) -> Question:
+        question = Question(
+            answer,
+            lambda code, _reason: code,
+            lambda error: type(error).__name__,
+            lambda given: self.told.append((name, given)),
+            Budget(seconds),
+        )
+        self.queue.ask(question)
+        return question
+
+    def wait(self, count: int) -> list[tuple[str, object]]:
+        def enough() -> bool:
+            self.queue.deliver()
+            return len(self.told) >= count
+
+        wait_until(enough, f"{count} answers")
+        return self.told
+
+
+@pytest.fixture
+def desk():
+    made = Desk()
+    yield made
+    made.queue.close()
+
+
+def work_on(budget: Budget) -> None:
+    """Work until the budget ends it."""
+    while True:
+        budget.check()
+        time.sleep(0.001)
+
+
+def test_answers_come_in_the_order_of_the_questions(desk):
+    for k in range(20):
+        desk.ask(str(k), lambda _, k=k: k)
+    assert desk.wait(20) == [(str(k), k) for k in range(20)]
+
+
+def test_an_error_is_an_answer_and_the_next_question_is_answered(desk):
+    desk.ask("bad", lambda _: 1 / 0)
+    desk.ask("good", lambda _: 5)
+    assert desk.wait(2) == [("bad", "ZeroDivisionError"), ("good", 5)]
+
+
+def test_work_beyond_the_budget_is_too_long(desk):
+    desk.ask("long", work_on, seconds=0.05)
+    assert desk.wait(1) == [("long", TOO_LONG)]
+
+
+def test_a_sweep_stops_at_the_deadline_of_its_question(desk):
+    rover, ground = load_rover("lsr1"), make_terrain(waves)
+    poses = np.zeros((2_000_000, 3))
+    desk.ask("sweep", lambda _: sweep_path(rover, ground, poses), seconds=0.3)
+    assert desk.wait(1) == [("sweep", TOO_LONG)]
+
+
+def test_a_question_that_never_began_is_busy(desk):
+    desk.ask("first", work_on, seconds=0.2)
+    desk.ask("second", lambda _: 5, seconds=0.1)
+    assert desk.wait(2) == [("first", TOO_LONG), ("second", BUSY)]
+
+
+def test_beyond_the_queue_the_answer_is_busy_at_once():
+    desk = Desk(max_waiting=1)
+    begun = threading.Event()
+
+    def block(budget: Budget) -> None:
+        begun.set()
+        work_on(budget)
+
+    desk.ask("works", block, seconds=0.5)
+    assert begun.wait(10.0)
+    desk.ask("waits", lambda _: 5, seconds=20.0)
+    desk.ask("too many", lambda _: 6)
+    assert desk.told == [("too many", BUSY)]
+    assert sorted(desk.wait(3)[1:]) == [("waits", 5), ("works", TOO_LONG)]
+    desk.queue.close()
+
+
+def test_work_that_checks_nothing_is_refused_all_the_same_and_its_answer_is_dropped(desk):
+    go_on = threading.Event()
+    desk.ask("deaf", lambda _: go_on.wait(20.0), seconds=0.05)
+
+    def overdue() -> bool:
+        desk.queue.refuse_overdue(0.02)
+        return bool(desk.told)
+
+    wait_until(overdue, "the refusal")
+    assert desk.told == [("deaf", TOO_LONG)]
+    go_on.set()
+    desk.ask("next", lambda _: 5)
+    assert desk.wait(2) == [("deaf", TOO_LONG), ("next", 5)]
+    assert desk.queue.open_count == 0
+
+
+def test_all_open_questions_can_be_cancelled(desk):
+    desk.ask("one", work_on)
+    desk.ask("two", work_on)
+    assert desk.queue.stop_all(CANCELLED, "told so") == 2
+    assert desk.told == [("one", CANCELLED), ("two", CANCELLED)]
+    desk.ask("next", lambda _: 5)
+    assert desk.wait(3)[2] == ("next", 5)
+
+
+def test_closing_answers_what_is_open_and_ends_the_thread():
+    desk = Desk()
+    desk.ask("one", work_on)
+    desk.queue.close()
+    assert desk.told == [("one", STOPPING)]
+    assert not any(thread.name == "questions" for thread in threading.enumerate())
+
+
+def test_a_budget_tells_why_it_stopped_and_the_first_reason_counts():
+    now = [0.0]
+    budget = Budget(2.0, lambda: now[0])
+    budget.check()
+    assert budget.remaining == 2.0 and not budget.is_over
+    now[0] = 2.5
+    with pytest.raises(QuestionStoppedError, match="time budget of 2 s") as stopped:
+        budget.check()
+    budget.stop(CANCELLED, "later")
+    assert stopped.value.code == TOO_LONG and budget.is_over
+    with pytest.raises(QuestionStoppedError, match="time budget"):
+        budget.check()
+    check_interruption()  # outside a question nothing stops
