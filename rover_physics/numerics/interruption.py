@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-FIRST_SLICE = 64
+FIRST_SLICE = 512
 """Number of items in the first slice."""
-SLICE_TIME = 0.02
+SLICE_TIME = 0.05
 """Time of a slice that the size of the next one aims at [s]."""
-MAX_GROWTH = 4.0
+MAX_GROWTH = 8.0
 """Largest growth from one slice to the next."""
 
 Check = Callable[[], object]

@@ -41,13 +41,13 @@ def test_without_a_check_there_is_one_slice():
 
 def test_slices_cover_all_items_once_and_in_order():
     with interruptible(lambda: None):
-        parts = list(slices(1000))
-    assert parts[0].start == 0 and parts[-1].stop == 1000 and len(parts) > 1
+        parts = list(slices(3000))
+    assert parts[0].start == 0 and parts[-1].stop == 3000 and len(parts) > 1
     assert all(one.stop == other.start for one, other in itertools.pairwise(parts))
 
 
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
-    rover, ground, poses = load_rover("lsr1"), make_terrain(waves), along_x(500)
+    rover, ground, poses = load_rover("lsr1"), make_terrain(waves), along_x(2000)
     with pytest.raises(StoppedError), interruptible(stop_at(2)):
         sweep_path(rover, ground, poses)
     assert sweep_path(rover, ground, poses).settled.all()
