@@ -81,7 +81,7 @@ def test_the_manifest_depends_on_every_ros_package_that_is_imported():
     }
     ros = {name for name in used if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
     ros |= used & {"rcl_interfaces", "builtin_interfaces"}
-    assert ros - {"grid_map_msgs"} <= declared
+    assert ros - {"grid_map_msgs", "nav2_msgs"} <= declared
 
 
 def test_every_console_script_is_a_function_that_exists(setup_arguments):
