@@ -100,7 +100,8 @@ class TraverseServerParameters(ParameterTable):
     )
     max_waiting: int = parameter(
         50,
-        "Largest number of waiting questions; further ones are refused as busy.",
+        "Largest number of questions that wait while one is in work; further ones are refused as "
+        "busy.",
         bounds=(0, 1000),
     )
     suspension_tolerance: float = parameter(

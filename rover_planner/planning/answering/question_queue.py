@@ -49,7 +49,7 @@ class QuestionQueue:
         """Start the thread.
 
         Args:
-            max_waiting: Largest number of questions that wait.
+            max_waiting: Largest number of questions that wait while one is in work.
             wake: Called in the thread when an answer is ready for `deliver`.
         """
         self.max_waiting = max_waiting
@@ -69,8 +69,8 @@ class QuestionQueue:
 
     def ask(self, question: Question) -> None:
         """Queue a question, or refuse it as BUSY."""
-        if len(self._waiting) >= self.max_waiting:
-            reason = f"{len(self._waiting)} questions wait already; ask again later"
+        if len(self._open) > self.max_waiting:
+            reason = f"{len(self._open)} questions are open already; ask again later"
             question.deliver(question.refuse(BUSY, reason))
             return
         self._open.append(question)

@@ -113,9 +113,13 @@ def test_a_question_without_time_is_too_long_and_the_next_is_answered(start_serv
 def test_questions_beyond_the_queue_are_busy_at_once(start_server, client, ros):
     server = start_server(time_budget=60.0, max_waiting=0, **LONG_WORK)
     client.send_terrain(make_terrain(waves))
-    # No place to wait: even a question to an idle server is refused.
-    _, results = client.next_results(lambda: client.can_traverse(START, FAR))
-    assert verdict_of(results)["code"] == "busy" and server.desk.open_count == 0
+    _, first = begin(ros)
+    wait_until(lambda: server.desk.open_count == 1, "the question")
+    assert client.can_traverse(START, FAR).poses == [] and not first.done()
+    wait_until(lambda: client.heard["verdict"], "the verdict")
+    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+    assert verdict["code"] == "busy" and verdict["request"] == "2"
+    server.desk.cancel("cancelled", "the end of the test")
 
 
 def test_each_of_two_clients_can_tell_its_own_verdict(mapped, client, ros):
