@@ -19,6 +19,8 @@ MISSING_KEY = "missing"
 RULE_BROKEN = "rule"
 MAX_SHOWN = 60
 """Largest number of characters of a value or key in an error text."""
+MAX_FILE_SHOWN = 150
+"""Largest number of characters of a file's name in an error text."""
 Key = tuple[str | int, ...]
 
 _brief = reprlib.Repr()
@@ -67,7 +69,15 @@ def errors_of(source: object, kind: type[RoverError] = RoverFileError) -> Iterat
     try:
         yield
     except RoverFileError as error:
-        raise kind(f"{source}: {error}") from None
+        raise kind(f"{show_file(source)}: {error}") from None
+
+
+def show_file(name: object) -> str:
+    """Return the name of a file as an error shows it: printable, and cut in the middle if long."""
+    text = str(name)
+    text = text if text.isprintable() else ascii(text)[1:-1]
+    half = MAX_FILE_SHOWN // 2
+    return text if len(text) <= MAX_FILE_SHOWN else f"{text[:half]}...{text[-half:]}"
 
 
 def suggest(name: str, known: Sequence[str]) -> str:

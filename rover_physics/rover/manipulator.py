@@ -39,7 +39,8 @@ def distance_to_reach(arm: Manipulator, point: ArrayLike) -> float:
     the tip can reach it. Joint limits are not checked.
     """
     _, upper, fore = arm.link_lengths
-    distance = float(np.linalg.norm(_from_shoulder(arm, point)))
+    with np.errstate(over="ignore"):  # a point so far away is infinitely far
+        distance = float(np.linalg.norm(_from_shoulder(arm, point)))
     return max(distance - (upper + fore), 0.0) + min(distance - abs(upper - fore), 0.0)
 
 

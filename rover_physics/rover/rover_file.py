@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
-from rover_physics.files.validation import describe, errors_of, read_as
+from rover_physics.files.validation import errors_of, read_as, show_file
 from rover_physics.files.yaml_file import read_yaml
 from rover_physics.rover.checks import check_rover
 from rover_physics.rover.model import Rover
@@ -33,7 +33,7 @@ def load_rover(name_or_path: str | Path) -> Rover:
         path = Path(name_or_path)
         if not os.path.exists(path):
             raise RoverFileError(
-                f"no rover {describe(name, 200)}: there is no such file, and the presets are "
+                f"no rover {show_file(name)!r}: there is no such file, and the presets are "
                 f"{', '.join(presets)}"
             )
     return rover_from_dict(read_yaml(path), str(path))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.errors import TerrainError
+from rover_physics.files.validation import describe
 
 
 def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
@@ -51,13 +52,13 @@ def as_soil_names(values: Any) -> tuple[str, ...]:
     must = "a list of different names, none of them empty"
     is_array = isinstance(values, np.ndarray)
     if not isinstance(values, list | tuple) and not (is_array and values.ndim == 1):
-        raise TerrainError(f"soil_names is {values}; it must be {must}")
+        raise TerrainError(f"soil_names is {values!s:.60}; it must be {must}")
     names = tuple(values.tolist() if is_array else values)
     if not all(isinstance(name, str) and name.strip() for name in names):
-        raise TerrainError(f"soil_names is {list(names)}; it must be {must}")
+        raise TerrainError(f"soil_names is {describe(list(names))}; it must be {must}")
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise TerrainError(f"soil_names has {twice!r} twice; it must be {must}")
+        raise TerrainError(f"soil_names has {describe(twice)} twice; it must be {must}")
     return tuple(str(name) for name in names)
 
 
@@ -78,7 +79,7 @@ def as_resolution(value: Any) -> float:
         resolution = float(number.reshape(()))
         if np.isfinite(resolution) and resolution > 0.0:
             return resolution
-    raise TerrainError(f"resolution is {value}; it must be one number above 0 in m")
+    raise TerrainError(f"resolution is {value!s:.60}; it must be one number above 0 in m")
 
 
 def as_origin(value: Any) -> tuple[float, float]:
@@ -90,7 +91,8 @@ def as_origin(value: Any) -> tuple[float, float]:
     if point.dtype.kind in "fiu" and point.shape == (2,) and np.isfinite(point).all():
         return (float(point[0]), float(point[1]))
     raise TerrainError(
-        f"origin is {value}; it must be two numbers in m, x and y of the centre of cell [0, 0]"
+        f"origin is {value!s:.60}; it must be two numbers in m, x and y of the centre of cell "
+        "[0, 0]"
     )
 
 

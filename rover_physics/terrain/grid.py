@@ -1,15 +1,15 @@
 """Terrain: an elevation grid with unknown cells and layers of friction, soil and uncertainty."""
 
-import zipfile
-import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.errors import TerrainError
+from rover_physics.files.user_file import open_regular_file
+from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.read_only import freeze_array, seal_array
 from rover_physics.terrain.checks import (
     as_elevation,
@@ -21,6 +21,7 @@ from rover_physics.terrain.checks import (
     as_soil_names,
 )
 from rover_physics.terrain.presets import find_terrain_file
+from rover_physics.terrain.terrain_file import MAX_CELLS, read_entries, write_entries
 
 _EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
 
@@ -164,7 +165,7 @@ class Terrain:
         return column, row
 
 
-def load_terrain(name_or_path: str | Path) -> Terrain:
+def load_terrain(name_or_path: str | Path, max_cells: int = MAX_CELLS) -> Terrain:
     """Load a terrain by the name of a preset or from an ``.npz`` file.
 
     Args:
@@ -172,30 +173,33 @@ def load_terrain(name_or_path: str | Path) -> Terrain:
             ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
             optionally layers (ny, nx): ``friction``, ``soil`` with ``soil_names``, and
             ``elevation_std`` [m]. Other entries, such as ``source``, are ignored.
+        max_cells: Largest number of cells; a larger terrain is refused before it is unpacked.
 
     Raises:
-        TerrainError: Neither a preset nor a file, an unreadable file, or a missing or invalid
-            entry; the text names file and entry.
+        TerrainError: Neither a preset nor a regular file, an unreadable file, more cells, or a
+            missing or invalid entry; the text names file and entry.
     """
     path = find_terrain_file(name_or_path)
-    entries = _read_npz(path)
-    for key in ("elevation", "resolution", "origin"):
-        if key not in entries:
-            raise TerrainError(
-                f"{path}: no entry {key}; a terrain file has elevation, resolution and origin"
-            )
+    with errors_of(path, TerrainError), open_regular_file(path) as file:
+        return read_terrain(file, path, max_cells)
+
+
+def read_terrain(file: BinaryIO, source: str | Path, max_cells: int = MAX_CELLS) -> Terrain:
+    """Read a terrain from an open file; `load_terrain` describes it.
+
+    Args:
+        file: The file, open for reading.
+        source: Its name, at the start of every error text.
+        max_cells: Largest number of cells.
+
+    Raises:
+        TerrainError: As for `load_terrain`.
+    """
+    entries = read_entries(file, source, max_cells)
     try:
-        return Terrain(
-            elevation=entries["elevation"],
-            resolution=entries["resolution"],
-            origin=entries["origin"],
-            friction=entries.get("friction"),
-            soil=entries.get("soil"),
-            soil_names=entries.get("soil_names", ()),
-            elevation_std=entries.get("elevation_std"),
-        )
+        return Terrain(**entries)
     except TerrainError as error:
-        raise TerrainError(f"{path}: {error}") from None
+        raise TerrainError(f"{show_file(source)}: {error}") from None
 
 
 def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
@@ -218,40 +222,7 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
             entries[layer] = getattr(terrain, layer)
     if terrain.soil_names:
         entries["soil_names"] = np.array(terrain.soil_names)
-    try:
-        with open(path, "wb") as file:
-            np.savez_compressed(file, **entries)
-    except OSError as error:
-        raise TerrainError(f"{path}: cannot be written: {error.strerror or error}") from error
-
-
-def _read_npz(path: Path) -> dict[str, Any]:
-    """Read the entries of a terrain from a file, without unpickling."""
-    wanted = (
-        "elevation",
-        "resolution",
-        "origin",
-        "friction",
-        "soil",
-        "soil_names",
-        "elevation_std",
-    )
-    name = ""
-    try:
-        archive = np.load(path, allow_pickle=False)
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise TerrainError(f"{path}: a single array; it must be an .npz file with elevation")
-        with archive:
-            entries = {}
-            for name in (key for key in wanted if key in archive.files):
-                entries[name] = seal_array(archive[name])
-            return entries
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-        if isinstance(error, OSError) and error.strerror:
-            raise TerrainError(f"{path}: cannot be read: {error.strerror}") from error
-        what = f"entry {name} is damaged or not numeric" if name else "not an .npz file"
-        reason = " ".join(str(error).split())
-        raise TerrainError(f"{path}: {what} ({reason})") from error
+    write_entries(path, entries)
 
 
 def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:

@@ -1,9 +1,11 @@
 """Preset terrains of the package, by name."""
 
+import os
 from pathlib import Path
 
 from rover_physics.errors import TerrainError
 from rover_physics.files.config_files import find_config
+from rover_physics.files.validation import show_file
 
 
 def terrain_presets() -> dict[str, Path]:
@@ -25,9 +27,9 @@ def find_terrain_file(name_or_path: str | Path) -> Path:
     if not isinstance(name_or_path, Path) and name_or_path in presets:
         return presets[name_or_path]
     path = Path(name_or_path)
-    if not path.exists():
+    if not os.path.exists(path):
         raise TerrainError(
-            f"no terrain {str(name_or_path)!r}: there is no such file, and the presets are "
+            f"no terrain {show_file(name_or_path)!r}: there is no such file, and the presets are "
             f"{', '.join(presets)}"
         )
     return path

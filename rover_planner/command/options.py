@@ -31,4 +31,10 @@ MaxGap = Annotated[
         metavar="M", help="Widest unknown region of the map to interpolate in m; 0: none."
     ),
 ]
+MaxCells = Annotated[
+    int,
+    typer.Option(metavar="N", min=4, help="Largest terrain file in cells; more are not unpacked."),
+]
+MAX_CELLS = 25_000_000
+"""Default of the option --max-cells; a test compares it with that of `load_terrain`."""
 Payload = Annotated[float | None, typer.Option(metavar="KG", help="Mass at the arm's tip in kg.")]

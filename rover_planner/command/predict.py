@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_planner.command.options import (
+    MAX_CELLS,
     Friction,
+    MaxCells,
     MaxTorque,
     Payload,
     Policy,
@@ -62,6 +64,7 @@ def predict(
         bool,
         typer.Option("--torque-ranges", help="Add the range of feasible torques of each wheel."),
     ] = False,
+    max_cells: MaxCells = MAX_CELLS,
 ) -> None:
     """Predict loads, slip and margins along a path of poses and write them to a file.
 
@@ -78,7 +81,7 @@ def predict(
     from rover_planner.progress import show_progress
 
     model = load_rover(rover)
-    ground = load_terrain(terrain)
+    ground = load_terrain(terrain, max_cells)
     path = read_poses(poses)
     options = SweepOptions(
         policy=policy,

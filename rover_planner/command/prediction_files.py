@@ -1,94 +1,93 @@
 """Reads and writes the files of the `predict` command: poses and predictions."""
 
-import io
-import zipfile
-import zlib
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from rover_physics.bounds.path import BOUNDED_VALUES
+from rover_physics.errors import RoverFileError
+from rover_physics.files.npz_file import ArrayHeader, open_npz, write_npz
+from rover_physics.files.validation import errors_of, show_file
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.traversability.classification import ClassifiedWaypoint
 from rover_physics.traversability.torque_ranges import TorqueRanges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 
-ARRAYS = (
-    "settled",
-    "position",
-    "roll",
-    "pitch",
-    "rocker_angle",
-    "bogie_angle",
-    "wheel_centres",
-    "wheel_loads",
-    "tangential",
-    "lateral",
-    "friction_utilisation",
-    "slip_ratio",
-    "torque_saturation",
-    "tip_over_ratio",
-    "tip_over_force_angle",
-    "belly_clearance",
-    "energy",
-    "time",
-)
-"""Arrays of a prediction in the output file, under the same names."""
-REPLAY_ARRAYS = (
-    "poses",
-    "status",
-    "contact_points",
-    "contact_angle",
-    "torque",
-    "friction",
-    "sinkage",
-    "motion_resistance",
-    "power",
-    "distance",
-    "wheel_drop",
-    "falling",
-)
+Shape = tuple[int, ...]
+
+ARRAYS: dict[str, Shape] = {
+    "settled": (),
+    "position": (3,),
+    "roll": (),
+    "pitch": (),
+    "rocker_angle": (2,),
+    "bogie_angle": (2,),
+    "wheel_centres": (6, 3),
+    "wheel_loads": (6,),
+    "tangential": (6,),
+    "lateral": (6,),
+    "friction_utilisation": (6,),
+    "slip_ratio": (6,),
+    "torque_saturation": (6,),
+    "tip_over_ratio": (),
+    "tip_over_force_angle": (),
+    "belly_clearance": (),
+    "energy": (),
+    "time": (),
+}
+"""Arrays of a prediction in the output file, under the same names: shape of a waypoint's part."""
+REPLAY_ARRAYS: dict[str, Shape] = {
+    "poses": (3,),
+    "status": (),
+    "contact_points": (6, 3),
+    "contact_angle": (6,),
+    "torque": (6,),
+    "friction": (6,),
+    "sinkage": (6,),
+    "motion_resistance": (6,),
+    "power": (),
+    "distance": (),
+    "wheel_drop": (6,),
+    "falling": (6,),
+}
 """Further arrays in the file that `rover_planner view` needs to replay it."""
 SOIL_ARRAYS = ("sinkage", "motion_resistance")
 """Further arrays in the file if a soil was given or the terrain has soils."""
+FLAGS = ("settled", "falling")
+"""Arrays of bools; `status` holds whole numbers, `reason` texts, and the others numbers."""
+SHOWN = ("position", "wheel_centres", "distance", "time")
+"""Arrays that a replay cannot do without where the rover settled."""
+MAX_NUMBER = 1e9
+"""Largest magnitude in `poses` and SHOWN [m, rad, s]."""
+MAX_POSES = 1_000_000
+"""Largest number of poses or waypoints in a file."""
+MAX_REASONS = 200_000_000
+"""Largest size of the reasons in a file [bytes]."""
 
 
 def read_poses(path: Path) -> NDArray[np.float64]:
     """Read `poses` (n, 3), x, y [m] and yaw [rad] of the body origin, from an .npz file.
 
     Raises:
-        PlanningError: The file is missing or not an .npz file, or has no such array of numbers.
+        PlanningError: The file is missing or not an .npz file, has no such array of numbers, or
+            one of more than MAX_POSES poses.
     """
-    poses = _read_arrays(path, ("poses",), "poses")["poses"]
-    if poses.dtype.kind not in "fiu":
-        raise PlanningError(f"poses in {path} are of type {poses.dtype}; they must be numbers")
-    if poses.ndim != 2 or poses.shape[1] != 3 or len(poses) == 0:
-        raise PlanningError(
-            f"poses in {path} have shape {poses.shape}; they must be (n, 3): x, y, yaw"
-        )
-    return poses.astype(np.float64)
-
-
-def _read_arrays(path: Path, names: Sequence[str], what: str) -> dict[str, Any]:
-    """Read arrays by name from an .npz file; errors name its kind, `what`."""
-    try:
-        archive = np.load(path, allow_pickle=False)
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            raise PlanningError(f"{path} holds one bare array; it must be an .npz file")
-        with archive:
-            for name in names:
-                if name not in archive:
-                    there = ", ".join(archive.files) or "nothing"
-                    raise PlanningError(f"{path} has no array {name!r}; it has {there}")
-            return {name: archive[name] for name in names}
-    except FileNotFoundError:
-        raise PlanningError(f"no {what} file {path}") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise PlanningError(f"{path} is no readable .npz file of {what}: {error}") from None
+    with _errors_of(path), open_npz(path) as archive:
+        header = archive.read_header("poses")
+        if header.dtype.kind not in "fiu":
+            raise RoverFileError(f"poses are of type {header.dtype}; they must be numbers")
+        if len(header.shape) != 2 or header.shape[1] != 3 or header.shape[0] == 0:
+            raise RoverFileError(
+                f"poses have shape {header.shape}; they must be (n, 3): x, y, yaw"
+            )
+        _check_count("poses", header.shape[0])
+        return archive.read("poses", np.float64, most=MAX_POSES * 24)
 
 
 def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
@@ -101,13 +100,70 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
     Raises:
         PlanningError: The file is missing or is not a file of predictions.
     """
-    arrays = _read_arrays(path, (*ARRAYS, *REPLAY_ARRAYS, "reason"), "predictions")
-    reasons = tuple(arrays.pop("reason").tolist())
-    lengths = {name: len(values) for name, values in arrays.items()}
-    if set(lengths.values()) != {len(reasons)}:
-        raise PlanningError(f"the arrays of {path} differ in length: {lengths}")
+    with _errors_of(path), open_npz(path) as archive:
+        reason = archive.read_header("reason")
+        if reason.dtype.kind != "U" or len(reason.shape) != 1 or reason.size == 0:
+            raise RoverFileError("reason must be an array (n,) of texts, one for each waypoint")
+        _check_count("reason", reason.size)
+        shapes = ARRAYS | REPLAY_ARRAYS
+        for name, shape in shapes.items():
+            _check_header(archive.read_header(name), name, (reason.size, *shape))
+        arrays: dict[str, Any] = {
+            name: archive.read(name, _type_of(name), most=8 * reason.size * math.prod(shape))
+            for name, shape in shapes.items()
+        }
+        reasons = tuple(archive.read("reason", most=MAX_REASONS).tolist())
+    _check_numbers(path, arrays)
     rest: dict[str, Any] = {"between": None, "policy": "recorded"}
     return PathPrediction(**arrays, waypoint=np.arange(len(reasons)), **rest), reasons
+
+
+@contextmanager
+def _errors_of(path: Path) -> Iterator[None]:
+    """Turn the errors of files into a PlanningError that names the file."""
+    try:
+        with errors_of(path):
+            yield
+    except RoverFileError as error:
+        raise PlanningError(str(error)) from None
+
+
+def _check_count(name: str, count: int) -> None:
+    if count > MAX_POSES:
+        raise RoverFileError(f"{name} has {count} rows; a file may have {MAX_POSES}")
+
+
+def _type_of(name: str) -> DTypeLike:
+    if name in FLAGS:
+        return np.bool_
+    return np.int8 if name == "status" else np.float64
+
+
+def _check_header(header: ArrayHeader, name: str, shape: Shape) -> None:
+    """Check type and shape of an array of a prediction."""
+    kinds, what = "fiu", "numbers"
+    if name in FLAGS:
+        kinds, what = "b", "bools"
+    elif name == "status":
+        kinds, what = "i", "whole numbers"
+    if header.dtype.kind not in kinds:
+        raise RoverFileError(f"{name} is of type {header.dtype}; it must hold {what}")
+    if header.shape != shape:
+        raise RoverFileError(
+            f"{name} has shape {header.shape}; it must be {shape}, as there are {shape[0]} reasons"
+        )
+
+
+def _check_numbers(path: Path, arrays: dict[str, Any]) -> None:
+    """Check that poses, and all that is shown of a settled waypoint, are finite numbers."""
+    settled = arrays["settled"]
+    for name in ("poses", *SHOWN):
+        rows = arrays[name] if name == "poses" else arrays[name][settled]
+        if not (np.abs(rows) < MAX_NUMBER).all():
+            raise PlanningError(
+                f"{show_file(path)}: {name} has a value that is NaN or beyond {MAX_NUMBER:g}; "
+                "where the rover settled it must be a position or time"
+            )
 
 
 def write_prediction(
@@ -137,7 +193,7 @@ def write_prediction(
     Raises:
         PlanningError: The file cannot be written.
     """
-    names = dict.fromkeys(ARRAYS + REPLAY_ARRAYS + (SOIL_ARRAYS if on_soil else ()))
+    names = (*ARRAYS, *REPLAY_ARRAYS, *(SOIL_ARRAYS if on_soil else ()))
     arrays = {name: getattr(prediction, name) for name in names}
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
     arrays["traversable"] = np.array(verdict.traversable, dtype=np.bool_)
@@ -153,9 +209,5 @@ def write_prediction(
         arrays["class_margin"] = np.array([waypoint.margin for waypoint in classes])
     if ranges is not None:
         arrays["torque_range"] = np.stack([ranges.lowest, ranges.highest], axis=-1)
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    try:
-        path.write_bytes(buffer.getvalue())
-    except OSError as error:
-        raise PlanningError(f"cannot write {path}: {error.strerror}") from None
+    with _errors_of(path):
+        write_npz(path, arrays)

@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 
 from rover_planner.command.options import (
+    MAX_CELLS,
     Friction,
+    MaxCells,
     MaxTorque,
     Payload,
     Policy,
@@ -39,6 +41,7 @@ def reach(
     max_torque: MaxTorque = None,
     policy: Policy = "equal",
     soil: SoilName = None,
+    max_cells: MaxCells = MAX_CELLS,
 ) -> None:
     """Print as JSON whether the rover at rest can reach a point with its arm and push there.
 
@@ -50,7 +53,7 @@ def reach(
     from rover_physics.traversability.reach import judge_reach
     from rover_planner.progress import show_progress
 
-    model, ground = load_rover(rover), load_terrain(terrain)
+    model, ground = load_rover(rover), load_terrain(terrain, max_cells)
     with show_progress() as progress:
         progress(f"ask {model.name} (the first run compiles the model)")
         answer = judge_reach(

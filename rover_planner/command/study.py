@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 
@@ -35,7 +36,7 @@ def study(
         output.mkdir(parents=True, exist_ok=True)
         result.write_csv(output / f"{file.stem}.csv")
     except OSError as error:
-        raise PlanningError(f"cannot write into {output}: {error.strerror}") from None
+        raise PlanningError(f"cannot write into {show_file(output)}: {error.strerror}") from None
     draw_study(result, output / f"{file.stem}.png")
     _print_answer(result)
     typer.echo(f"wrote {output / file.stem}.csv and .png")

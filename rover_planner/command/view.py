@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.options import MaxGap, RoverName, Vector
+from rover_planner.command.options import MAX_CELLS, MaxCells, MaxGap, RoverName, Vector
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 
@@ -47,6 +47,7 @@ def view(
         typer.Option(metavar="X Y YAW", help="Goal in m and rad, map frame."),
     ] = None,
     max_gap: MaxGap = 0.2,
+    max_cells: MaxCells = MAX_CELLS,
     prediction: Annotated[
         Path | None,
         typer.Option(metavar="OUT", help="Replay a file of `predict` instead of planning."),
@@ -69,10 +70,12 @@ def view(
     if follow:
         need("rclpy", "--follow")
     from rover_physics.rover.rover_file import load_rover
+    from rover_planner.viewer.pages.address import check_address
     from rover_planner.viewer.state.session import ViewSession
 
     model = load_rover(rover)
-    ground = _load_or_make(terrain, follow)
+    check_address(host, port)
+    ground = _load_or_make(terrain, follow, max_cells)
     if prediction is None:  # predictions were made on the original map
         ground = ground.fill_gaps(max_gap)
     _compile()
@@ -122,7 +125,7 @@ def _follow(
     return LivePage(session, link.listener, host, port, has_ground=has_ground)
 
 
-def _load_or_make(name: str | None, follow: bool) -> "Terrain":
+def _load_or_make(name: str | None, follow: bool, max_cells: int) -> "Terrain":
     """Load the named terrain; without a name return level ground to follow, else generate one."""
     import numpy as np
 
@@ -130,7 +133,7 @@ def _load_or_make(name: str | None, follow: bool) -> "Terrain":
     from rover_planner.worlds.mars_terrain import make_mars_terrain
 
     if name is not None:
-        return load_terrain(name)
+        return load_terrain(name, max_cells)
     if follow:
         return Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
     return make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)

@@ -20,6 +20,8 @@ import numpy as np
 from rich.markup import escape
 
 import rover_planner
+from rover_physics.files.user_file import open_without_waiting
+from rover_physics.files.validation import show_file
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
@@ -110,13 +112,15 @@ def _check_environment() -> None:
 def _prepare_folder(picture: Path) -> None:
     """Create the picture's folder and check that the picture can be written."""
     if picture.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise PlanningError(f"picture {picture} must be a .png, .svg or .pdf file")
+        raise PlanningError(f"picture {show_file(picture)} must be a .png, .svg or .pdf file")
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
-        with open(picture, "ab"):
+        with open(picture, "ab", opener=open_without_waiting):
             pass
     except OSError as error:
-        raise PlanningError(f"cannot write the picture {picture}: {error.strerror}") from None
+        raise PlanningError(
+            f"cannot write the picture {show_file(picture)}: {error.strerror}"
+        ) from None
 
 
 def _prepare_map(

@@ -1,12 +1,18 @@
 """The common style of all pictures, and writing a picture to a file."""
 
+import io
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from rover_physics.errors import RoverFileError
+from rover_physics.files.user_file import write_file
+from rover_physics.files.validation import errors_of, show_file
 from rover_planner.errors import PlanningError
 
+SUFFIXES = (".png", ".svg", ".pdf")
+"""Suffixes of pictures."""
 STYLE: dict[str, Any] = {
     "font.size": 9.5,
     "axes.titlesize": 10.5,
@@ -27,9 +33,14 @@ def save_figure(path: Path, figure: Figure) -> None:
     """Write a picture to a file; the suffix sets the format.
 
     Raises:
-        PlanningError: The file cannot be written.
+        PlanningError: The suffix names no format, or the file cannot be written.
     """
+    if path.suffix.lower() not in SUFFIXES:
+        raise PlanningError(f"picture {show_file(path)} must be a {', '.join(SUFFIXES)} file")
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
     try:
-        figure.savefig(path, dpi=130)
-    except (OSError, ValueError) as error:
-        raise PlanningError(f"cannot write the picture {path}: {error}") from None
+        with errors_of(path):
+            write_file(path, picture.getvalue())
+    except RoverFileError as error:
+        raise PlanningError(str(error)) from None

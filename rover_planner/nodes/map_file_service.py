@@ -1,26 +1,35 @@
 """The service ~/load_map of a traverse server: loads a terrain file on request."""
 
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-from urllib.parse import unquote, urlparse
 
 from nav_msgs.srv import LoadMap
 from rclpy.node import Node
 
 from msg_adapters.elevation import terrain_to_occupancy_grid
-from rover_physics.terrain.grid import load_terrain
+from rover_physics.files.validation import show_file
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover
 from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.worlds.map_file import MapFileError, MapLimits, open_map
 
 
 class MapFileService:
     """Serves ~/load_map; files are read in the thread of the maps."""
 
-    def __init__(self, node: Node, maps: MapTopics, map_frame: str, guard: Guard):
+    def __init__(
+        self,
+        node: Node,
+        maps: MapTopics,
+        map_frame: str,
+        guard: Guard,
+        limits: Callable[[], MapLimits],
+    ):
+        """Serve; `limits` returns what may be loaded at the time."""
         self._node, self._maps, self._frame, self._guard = node, maps, map_frame, guard
+        self._limits = limits
         self._handover = Handover(node, guard)
         serve_later(node, LoadMap, "~/load_map", self._take)
 
@@ -37,17 +46,13 @@ class MapFileService:
 
     def _load(self, url: str, response: LoadMap.Response) -> None:
         """Take the map of a file and fill the response."""
-        file = _file_of_url(url)
-        if file is None or not file.is_file():
-            self._node.get_logger().error(
-                f"load_map: no file {url!r}; it must be the path or file:// URL of a "
-                "terrain file on this machine"
-            )
+        try:
+            terrain = open_map(url, self._limits())
+            self._maps.take_file(terrain, show_file(url))
+        except MapFileError as error:
+            self._node.get_logger().error(f"load_map: {error}")
             response.result = LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
             return
-        try:
-            terrain = load_terrain(file)
-            self._maps.take_file(terrain, str(file))
         except INPUT_ERRORS as error:
             self._node.get_logger().error(f"load_map: {error}")
             response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
@@ -55,11 +60,3 @@ class MapFileService:
         stamp = self._node.get_clock().now().to_msg()
         response.map = terrain_to_occupancy_grid(terrain, self._frame, stamp)
         response.result = LoadMap.Response.RESULT_SUCCESS
-
-
-def _file_of_url(url: str) -> Path | None:
-    """Return the file of a path or a file:// URL, None for other URLs."""
-    parts = urlparse(url)
-    if parts.scheme == "file":
-        return Path(unquote(parts.path)) if parts.netloc in ("", "localhost") else None
-    return Path(url) if "://" not in url else None

@@ -61,7 +61,8 @@ class MapTopics:
         self._settings = _settings_of(parameters)
         self._is_from_cloud = False
         if parameters.terrain_file:
-            service.take_terrain(load_terrain(parameters.terrain_file), parameters.terrain_file)
+            terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
+            service.take_terrain(terrain, parameters.terrain_file)
         self._intake = MapIntake(self._take_cloud, self._refuse)
         take = guard.around(self._offer)
         for qos, mends in map_subscriptions(

@@ -6,6 +6,8 @@ from typing import Annotated, NamedTuple
 
 import typer
 
+from rover_planner.errors import PlanningError
+
 
 class Pose(NamedTuple):
     """A pose of the body in the map frame."""
@@ -84,5 +86,11 @@ def read_mission(
         bool, typer.Option("--json", help="Print a JSON object a line; goals count from 1.")
     ] = False,
 ) -> MissionOptions:
-    """Return the options given on the command line."""
+    """Return the options given on the command line.
+
+    Raises:
+        PlanningError: The timeout is not above 0.
+    """
+    if not 0.0 < timeout < math.inf:
+        raise PlanningError(f"timeout is {timeout}; it must be a time above 0 in s")
     return MissionOptions(start, tuple(goal), map_name, drive, map_frame, timeout, as_json)

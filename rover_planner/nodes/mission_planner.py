@@ -40,6 +40,7 @@ from rover_planner.shell.exit_codes import (
     EXIT_NOT_TRAVERSABLE,
     EXIT_OK,
 )
+from rover_planner.shell.run_program import end_with, run_program
 
 NODE_NAME = "mission_planner"
 SERVER = "traverse_server"
@@ -238,13 +239,17 @@ class MissionPlanner(Node):
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the node and return its exit code; see `rover_planner.nodes.programs`."""
+    return run_program(NODE_NAME, lambda: _run(words))
+
+
+def _run(words: Sequence[str] | None) -> int:
     try:
         options = read_words(NODE_NAME, words)
         if options == EXIT_OK:  # help was printed
             return EXIT_OK
         terrain = load_terrain(options.map_name) if options.map_name else None
     except INPUT_ERRORS as error:
-        return _end_with(EXIT_BAD_INPUT, error)
+        return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
     rclpy.init(args=words)
     node = MissionPlanner(options.map_frame, options.timeout)
     executor = SingleThreadedExecutor()
@@ -254,21 +259,15 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         return _carry_out(node, terrain, options)
     except NoAnswerError as error:
-        return _end_with(EXIT_NO_ANSWER, error)
+        return end_with(NODE_NAME, EXIT_NO_ANSWER, str(error))
     except DriveFailedError as error:
-        return _end_with(EXIT_FAILED, error)
+        return end_with(NODE_NAME, EXIT_FAILED, str(error))
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_INTERRUPTED
     finally:
         rclpy.try_shutdown()
         thread.join(2.0)
         node.destroy_node()
-
-
-def _end_with(code: int, error: Exception) -> int:
-    """Print in one line why the node ends, and return the exit code."""
-    print(f"{NODE_NAME}:", " ".join(str(error).split()), file=sys.stderr)
-    return code
 
 
 def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOptions) -> int:

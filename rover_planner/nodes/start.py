@@ -7,6 +7,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.nodes.programs import HELP_WORDS, print_help
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.extras import need
+from rover_planner.shell.run_program import end_with
 
 
 def start_traverse_server() -> int:
@@ -36,6 +37,5 @@ def _start(name: str) -> int:
     try:
         need("rclpy", "the node")
     except PlanningError as error:
-        print(f"{name}: {error}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return end_with(name, EXIT_BAD_INPUT, str(error))
     return importlib.import_module(f"rover_planner.nodes.{name}").main()

@@ -41,7 +41,7 @@ from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.server_health import MEMORY
-from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
@@ -85,7 +85,9 @@ class TraverseServer(Node):
         serve_later(self, Trigger, "~/check_path", self._check_path)
         PathValidity(self.desk, frame, self.publish).serve(self)
         self.create_service(Trigger, "~/cancel", self._cancel)
-        self._files = MapFileService(self, self._maps, frame, self.guard)
+        self._files = MapFileService(
+            self, self._maps, frame, self.guard, lambda: map_limits(self._values)
+        )
         self._reach = ReachTopics(self, self.desk, frame, reliability)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)

@@ -1,5 +1,6 @@
 """Declares a node's parameters from their table, checks changes and passes them to the node."""
 
+import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -23,6 +24,7 @@ from rover_planner.parameters.table import (
     ParameterTable,
     specs_of,
 )
+from rover_planner.shell.one_line import one_line
 
 Table = TypeVar("Table", bound=ParameterTable)
 
@@ -71,13 +73,23 @@ def follow_changes(
             if changes:
                 accept(replace(values, **changes))
         except (MessageError, PlanningError, RoverError) as error:
-            return SetParametersResult(successful=False, reason=str(error))
+            return SetParametersResult(successful=False, reason=one_line(str(error)))
+        except Exception as error:
+            # An internal error must not end the node.
+            node.get_logger().error(f"set_parameters: {traceback.format_exc()}")
+            reason = f"internal error: {type(error).__name__}: {error}"
+            return SetParametersResult(successful=False, reason=one_line(reason))
         return SetParametersResult(successful=True)
 
     def pass_on(parameters: list[Parameter]) -> None:
         changes = _changes(type(current()), parameters)
-        if changes:
+        if not changes:
+            return
+        try:
             apply(replace(current(), **changes))
+        except Exception:
+            # A file that was good in the check may be gone by now; the node goes on as before.
+            node.get_logger().error(f"parameters not applied: {traceback.format_exc()}")
 
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(pass_on)

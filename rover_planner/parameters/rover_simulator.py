@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from rover_physics.names import EQUAL, TORQUE_POLICIES, WHEEL_JOINTS
+from rover_planner.parameters.shared import max_map_cells_parameter
 from rover_planner.parameters.table import ParameterTable, parameter
 
 QUASI_STATIC, MUJOCO = "quasi_static", "mujoco"
@@ -22,6 +23,7 @@ class RoverSimulatorParameters(ParameterTable):
         "Terrain to drive on: a preset's name or a terrain file; empty generates a Mars-like one.",
         read_only=True,
     )
+    max_map_cells: int = max_map_cells_parameter(read_only=True)
     start_x: float = parameter(
         0.0, "Start of the rover, x.", unit="m", bounds=(-1e6, 1e6), read_only=True
     )

@@ -1,6 +1,7 @@
 """Parameters that several nodes share."""
 
 from msg_adapters.gridding import CELL_HEIGHTS
+from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.parameters.table import ParameterError, parameter
 
 OWN_PAYLOAD = -1.0
@@ -66,6 +67,17 @@ def cell_height_parameter() -> str:
         CELL_HEIGHTS[0],
         "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
         choices=CELL_HEIGHTS,
+    )
+
+
+def max_map_cells_parameter(read_only: bool = False) -> int:
+    """Return the field of the parameter max_map_cells [cells]."""
+    return parameter(
+        MAX_CELLS,
+        "Largest terrain file; a larger one is refused before it is unpacked.",
+        unit="cells",
+        bounds=(4, 10**9),
+        read_only=read_only,
     )
 
 

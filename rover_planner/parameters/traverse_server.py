@@ -9,11 +9,14 @@ from rover_planner.parameters.shared import (
     input_reliability_parameter,
     map_durability_parameter,
     map_resolution_parameter,
+    max_map_cells_parameter,
     max_torque_parameter,
     payload_parameter,
 )
-from rover_planner.parameters.table import ParameterTable, parameter
+from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 
+MIN_PLAN_SPACING = 0.001
+"""Smallest plan_spacing other than 0 [m]."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
 """Values of the parameter unknown_cells."""
 
@@ -54,7 +57,7 @@ class TraverseServerParameters(ParameterTable):
     plan_spacing: float = parameter(
         0.1,
         "Distance between poses of a plan, which also has those where the class changes; "
-        "0 returns every waypoint.",
+        "0 returns every waypoint, else at least 0.001.",
         unit="m",
         bounds=(0.0, 100.0),
     )
@@ -104,6 +107,18 @@ class TraverseServerParameters(ParameterTable):
         "busy.",
         bounds=(0, 1000),
     )
+    map_folder: str = parameter(
+        "/",
+        "Folder below which ~/load_map reads; links out of it are refused. / is every file that "
+        "the node may read: a robot sets the folder of its maps.",
+    )
+    max_map_bytes: int = parameter(
+        1_000_000_000,
+        "Largest file that ~/load_map reads.",
+        unit="bytes",
+        bounds=(1000, 10**12),
+    )
+    max_map_cells: int = max_map_cells_parameter()
     suspension_tolerance: float = parameter(
         0.1,
         "Largest difference of measured and predicted suspension angles without a warning; "
@@ -111,3 +126,16 @@ class TraverseServerParameters(ParameterTable):
         unit="rad",
         bounds=(0.0, 3.2),
     )
+
+    def __post_init__(self) -> None:
+        """Check all values.
+
+        Raises:
+            ParameterError: As for all tables, or plan_spacing is too small.
+        """
+        super().__post_init__()
+        if 0.0 < self.plan_spacing < MIN_PLAN_SPACING:
+            raise ParameterError(
+                f"parameter plan_spacing is {self.plan_spacing}; it must be 0, or at least "
+                f"{MIN_PLAN_SPACING:g} m"
+            )

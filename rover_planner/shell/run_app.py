@@ -19,11 +19,16 @@ def run_app(app: typer.Typer, name: str, words: Sequence[str] | None) -> Any:
     Raises:
         PlanningError: The arguments are invalid; the text says which and why.
         KeyboardInterrupt: It was interrupted.
+        BrokenPipeError: Nobody reads its output any more.
     """
     try:
         return typer.main.get_command(app).main(
             args=None if words is None else list(words), prog_name=name, standalone_mode=False
         )
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # typer's answer to a closed pipe
+            raise BrokenPipeError from error
+        raise
     except Exception as error:
         # typer vendors click since 0.26, so that no common error class exists.
         if hasattr(error, "format_message"):

@@ -59,7 +59,7 @@ def load_simulation_settings(parameters: RoverSimulatorParameters) -> Simulation
     """
     rover = load_rover(parameters.rover)
     if parameters.terrain_file:
-        terrain = load_terrain(parameters.terrain_file)
+        terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
     else:
         terrain = make_mars_terrain(parameters.seed, MADE_SIZE, MADE_RESOLUTION)
     return SimulationSettings(

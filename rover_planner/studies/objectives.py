@@ -5,12 +5,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from rover_physics.errors import ModelError
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.verdict import judge
 from rover_planner.studies.study_file import Study, StudyDrive
@@ -23,6 +25,10 @@ STEP_TOLERANCE = 0.002
 """Tolerance of the height of the tallest step [m]."""
 SEARCH_STEP = 0.02
 """Increment of step heights in the search, before bisection [m]."""
+MAX_STEP = 10.0
+"""Tallest step that is tried [m]."""
+MAX_WAYPOINTS = 200_000
+"""Largest number of waypoints of a drive."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +72,7 @@ def load_shares(rover: Rover) -> Floats:
 def _score_drive(study: Study, rover: Rover, k: int) -> Score:
     """Return the score of drive k; all limits must hold except that of the objective."""
     drive, where = study.drives[k], f"drive {k + 1}"
-    path = drive.length * np.linspace(0.0, 1.0, max(round(drive.length / SPACING), 1) + 1)
+    path = drive.length * np.linspace(0.0, 1.0, _count_steps(drive.length) + 1)
     x, y, yaw = drive.start
     poses = np.column_stack(
         [x + path * np.cos(yaw), y + path * np.sin(yaw), np.full_like(path, yaw)]
@@ -89,6 +95,34 @@ def _score_drive(study: Study, rover: Rover, k: int) -> Score:
     return Score(verdict.min_tip_over_ratio * flat_angle, where)
 
 
+def _count_steps(length: float) -> int:
+    """Return the number of steps of about SPACING on a way of a length [m], at least 1.
+
+    Raises:
+        ModelError: There are more than MAX_WAYPOINTS.
+    """
+    if not length / SPACING <= MAX_WAYPOINTS:
+        raise ModelError(
+            f"a drive is {length:g} m long; it must be at most {MAX_WAYPOINTS * SPACING:g} m"
+        )
+    return max(round(length / SPACING), 1)
+
+
+def _make_axis(half: float, cell: float, aspect: float = 1.0) -> Floats:
+    """Return the coordinates [m] of cells from -half to half; aspect is width over length.
+
+    Raises:
+        ModelError: The ground would have more than MAX_CELLS.
+    """
+    count = 2.0 * half / cell + 1.0
+    if not aspect * count * count <= MAX_CELLS:
+        raise ModelError(
+            f"a ground of {2.0 * half:.3g} m in cells of {cell:.3g} m has more than {MAX_CELLS} "
+            "cells; drives, starts and wheels must be smaller"
+        )
+    return np.asarray(cell * np.arange(-int(half / cell), int(half / cell) + 1))
+
+
 def _lift_limit(study: Study, rover: Rover) -> Rover:
     """Return the rover without the limit that the objective measures."""
     lifted = {
@@ -103,7 +137,7 @@ def _ground(rover: Rover, drive: StudyDrive) -> Terrain:
         return _load_once(drive.file)
     reach = drive.length + 2.0 * _length(rover) + abs(drive.start[0]) + abs(drive.start[1])
     cell = 0.2 * rover.wheel.radius
-    axis = cell * np.arange(-int(reach / cell), int(reach / cell) + 1)
+    axis = _make_axis(reach, cell)
     x = np.broadcast_to(axis, (len(axis), len(axis)))
     if drive.slope is not None:
         return Terrain(np.tan(drive.slope) * x, cell, (axis[0], axis[0]))
@@ -128,8 +162,8 @@ def step_ground(rover: Rover, height: float) -> Terrain:
     """Return level ground that rises by a step across x = 0."""
     cell = 0.1 * rover.wheel.radius
     half = 2.0 * _length(rover)
-    axis = cell * np.arange(-int(half / cell), int(half / cell) + 1)
-    wide = cell * np.arange(-int(0.6 * half / cell), int(0.6 * half / cell) + 1)
+    axis = _make_axis(half, cell, 0.6)
+    wide = _make_axis(0.6 * half, cell)
     profile = np.where(axis > 0.0, height, 0.0)
     return Terrain(np.tile(profile, (len(wide), 1)), cell, (axis[0], wide[0]))
 
@@ -142,7 +176,9 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
     step that is higher than one that it cannot climb.
     """
     climbed, height = 0.0, SEARCH_STEP
-    while height < 4.0 * rover.wheel.radius and climbs(rover, height, policy, friction):
+    while height < min(4.0 * rover.wheel.radius, MAX_STEP) and climbs(
+        rover, height, policy, friction
+    ):
         climbed, height = height, height + SEARCH_STEP
     low, high = climbed, height
     while high - low > STEP_TOLERANCE:
@@ -166,7 +202,7 @@ def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | 
     )
     able = replace(rover, limits=limits)
     reach = 0.75 * _length(rover)
-    x = np.linspace(-reach, reach, round(2.0 * reach / SPACING) + 1)
+    x = np.linspace(-reach, reach, _count_steps(2.0 * reach) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
     prediction = sweep_path(
         able, step_ground(rover, height), poses, SweepOptions(policy=policy, friction=friction)

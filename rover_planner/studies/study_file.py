@@ -19,7 +19,7 @@ from rover_physics.files.rules import (
     choice,
     number,
 )
-from rover_physics.files.validation import Key, errors_of, read_as, refuse
+from rover_physics.files.validation import Key, errors_of, read_as, refuse, show_file
 from rover_physics.files.yaml_file import read_yaml
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
@@ -35,6 +35,8 @@ OBJECTIVES = {
     "load_imbalance": ("smallest", "largest wheel load over the mean, level ground", ""),
 }
 """Objectives by name: best value, description, unit."""
+MAX_TRIALS = 100_000
+"""Largest number of rovers that a study tries."""
 ABOUT_DRIVES = ("worst_utilisation", "tip_over_margin", "drive_energy")
 """Objectives that need drives."""
 
@@ -116,7 +118,7 @@ class StudyOptions:
     """Coulomb friction; None takes that of the rover."""
     soil: Text | None = None
     """Preset soil of the ground; None is firm ground."""
-    evaluations: Annotated[int, _whole(3, 100_000)] = 60
+    evaluations: Annotated[int, _whole(3, MAX_TRIALS)] = 60
     """Maximum number of evaluations of an optimisation."""
 
 
@@ -152,8 +154,8 @@ def load_study(path: Path) -> Study:
     Raises:
         RoverFileError: The file cannot be read, or a key is missing, unknown or invalid.
     """
-    if not path.is_file():
-        raise RoverFileError(f"no study file {path}")
+    if not os.path.exists(path):
+        raise RoverFileError(f"no study file {show_file(path)}")
     return study_from_dict(read_yaml(path), str(path), path.parent)
 
 
@@ -183,6 +185,12 @@ def study_from_dict(data: object, source: str, folder: Path = Path()) -> Study:
 
 def _check_use(file: _StudyFile) -> None:
     """Check that drives are given if needed, and drives and soil only if they are used."""
+    count = math.prod(parameter.count for parameter in file.parameters)
+    if file.method == "sweep" and count > MAX_TRIALS:
+        raise RoverFileError(
+            f"parameters have {count:.3g} combinations; a sweep tries at most {MAX_TRIALS}: lower "
+            "their counts"
+        )
     if file.soil is not None:
         soil_named(file.soil)
     if file.objective in ABOUT_DRIVES and not file.drives:

@@ -19,6 +19,8 @@ RIM_TO_DIAMETER = 0.036
 """Height of a fresh crater's rim over the plain, over its diameter."""
 NUMBER_EXPONENT = 2.0
 """Craters of diameter D and larger are proportional to D to minus this power."""
+MAX_COUNT = 100_000
+"""Largest expected number of craters."""
 EJECTA_REACH = 3.0
 """Outer radius of the ejecta blanket [crater radii]."""
 
@@ -59,7 +61,8 @@ def sample_diameters(
         Diameters (n,) [m], largest first; n is Poisson distributed.
 
     Raises:
-        PlanningError: A negative density, or diameters that are not 0 < smallest < largest.
+        PlanningError: A negative density, one of more than MAX_COUNT craters, or diameters that
+            are not 0 < smallest < largest.
     """
     if not 0 <= density < np.inf:
         raise PlanningError(f"crater density is {density!r} 1/m^2; it must not be negative")
@@ -68,7 +71,13 @@ def sample_diameters(
             f"crater diameters are {smallest!r} to {largest!r} m; they must be above 0 and ascend"
         )
     most, least = smallest**-NUMBER_EXPONENT, largest**-NUMBER_EXPONENT
-    count = rng.poisson(density * area * (most - least))
+    expected = density * area * (most - least)
+    if expected > MAX_COUNT:
+        raise PlanningError(
+            f"crater density is {density!r} 1/m^2, which are {expected:.2g} craters; it must be "
+            f"at most {MAX_COUNT / expected * density:.2g} 1/m^2"
+        )
+    count = rng.poisson(expected)
     drawn = (least + rng.random(count) * (most - least)) ** (-1 / NUMBER_EXPONENT)
     return np.sort(drawn)[::-1]
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.worlds import craters, rocks
 
@@ -13,8 +14,10 @@ HURST = 0.8
 (Shepard et al. 2001, The roughness of natural terrain, Journal of Geophysical Research 106(E12)).
 """
 
-MAX_CELLS = 25_000_000
-"""Largest terrain [cells]; more is probably an error in size or resolution."""
+MAX_SIZE = 1e6
+"""Largest width and height [m]."""
+MAX_ROUGHNESS = 100.0
+"""Largest RMS height difference of points 1 m apart [m]."""
 
 
 def make_mars_terrain(
@@ -92,21 +95,27 @@ def make_relief(
         Heights (ny, nx) [m].
 
     Raises:
-        PlanningError: hurst or roughness out of range.
+        PlanningError: hurst or roughness out of range, or a size of at most 0.5 m.
     """
     if not 0 < hurst < 1:
         raise PlanningError(f"hurst is {hurst!r}; it must be above 0 and below 1")
-    if not 0 <= roughness < np.inf:
-        raise PlanningError(f"roughness is {roughness!r} m; it must not be negative")
+    if not 0 <= roughness <= MAX_ROUGHNESS:
+        raise PlanningError(
+            f"roughness is {roughness!r} m; it must not be negative, and at most {MAX_ROUGHNESS} m"
+        )
     ny, nx = shape
-    n = 2 * max(ny, nx)
+    n, lag = 2 * max(ny, nx), max(1, round(1.0 / resolution))
+    if n <= lag:
+        raise PlanningError(
+            f"size is {nx * resolution:g} x {ny * resolution:g} m; it must be more than 0.5 m, "
+            "because the roughness is that of points 1 m apart"
+        )
     ky = np.fft.fftfreq(n)[:, None]
     kx = np.fft.rfftfreq(n)[None, :]
     wave_number = np.hypot(ky, kx)
     wave_number[0, 0] = np.inf
     spectrum = np.fft.rfft2(rng.standard_normal((n, n))) * wave_number ** -(hurst + 1)
     surface = np.fft.irfft2(spectrum, s=(n, n))
-    lag = max(1, round(1.0 / resolution))
     difference = np.sqrt(np.mean((np.roll(surface, lag, axis=1) - surface) ** 2))
     return surface[:ny, :nx] * (roughness * (lag * resolution) ** hurst / difference)
 
@@ -142,8 +151,11 @@ def _count_cells(size, resolution) -> tuple[int, int]:
         ) from None
     if not 0 < resolution < np.inf:
         raise PlanningError(f"resolution is {resolution!r}; it must be above 0 m")
-    if not (2 * resolution <= width < np.inf and 2 * resolution <= height < np.inf):
-        raise PlanningError(f"size is {width} x {height} m; it must be at least two cells wide")
+    if not (2 * resolution <= width <= MAX_SIZE and 2 * resolution <= height <= MAX_SIZE):
+        raise PlanningError(
+            f"size is {width} x {height} m; it must be at least two cells wide, and at most "
+            f"{MAX_SIZE:g} m"
+        )
     if width / resolution * height / resolution > MAX_CELLS:
         raise PlanningError(
             f"{width} x {height} m at {resolution} m are more than {MAX_CELLS} cells"

@@ -15,6 +15,8 @@ import numpy as np
 
 from rover_planner.errors import PlanningError
 
+MAX_COUNT = 500_000
+"""Largest expected number of rocks."""
 HEIGHT_TO_DIAMETER = 0.5
 """Height of a rock over its diameter (Golombek and Rapp 1997 find about one half)."""
 
@@ -69,7 +71,8 @@ def sample_diameters(
         Diameters (n,) [m]; n is Poisson distributed about the number that the law expects.
 
     Raises:
-        PlanningError: k outside 0 to 1, or diameters that are not 0 < smallest < largest.
+        PlanningError: k outside 0 to 1, more than MAX_COUNT rocks, or diameters that are not
+            0 < smallest < largest.
     """
     if not 0 <= k < 1:
         raise PlanningError(f"rock cover is {k!r}; it is a fraction of the ground, 0 to 1")
@@ -81,6 +84,11 @@ def sample_diameters(
         return np.zeros(0)
     sizes = np.geomspace(smallest, largest, 512)
     numbers = cumulative_number(k, sizes, largest)
+    if numbers[0] * area > MAX_COUNT:
+        raise PlanningError(
+            f"rock cover is {k!r}, which are {numbers[0] * area:.2g} rocks; there may be at most "
+            f"{MAX_COUNT}: lower it, or make the cells larger"
+        )
     count = rng.poisson(numbers[0] * area)
     # inverse of the cumulative law; numbers increase from the largest diameter down
     drawn = np.interp(rng.random(count) * numbers[0], numbers[::-1], np.log(sizes[::-1]))

@@ -121,9 +121,9 @@ def test_nothing_to_draw_and_nowhere_to_write_are_refused(tmp_path, rover, holed
     with pytest.raises(PlanningError, match="no answers"):
         draw_answers(tmp_path / "picture.png", rover, holed, [])
     answers = [ask(rover, holed, "A", (0, 0, 0))]
-    with pytest.raises(PlanningError, match="cannot write"):
+    with pytest.raises(PlanningError, match="cannot be written"):
         draw_answers(tmp_path / "no" / "picture.png", rover, holed, answers)
-    with pytest.raises(PlanningError, match="cannot write"):
+    with pytest.raises(PlanningError, match="must be a .png, .svg, .pdf file"):
         draw_answers(tmp_path / "picture.tiger", rover, holed, answers)
 
 

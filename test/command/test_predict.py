@@ -154,7 +154,7 @@ def test_output_goes_to_exactly_the_file_named(files):
         ({"terrain": "poses.npz"}, "elevation"),
         ({"poses": "terrain.npz"}, "poses"),
         ({"out": "no/such/folder/out.npz"}, "out.npz"),
-        ({"out": "."}, "cannot write"),
+        ({"out": "."}, "cannot be written"),
     ],
 )
 def test_wrong_files_are_one_line(capfd, files, change, names):

@@ -211,3 +211,34 @@ def test_what_the_node_cannot_accept_is_refused_with_its_reason(make_node):
 @pytest.mark.parametrize("durability", MAP_DURABILITIES)
 def test_every_durability_of_maps_has_subscriptions(durability):
     assert map_subscriptions_qos(durability)
+
+
+def test_an_unexpected_error_in_a_check_is_a_refusal(make_node):
+    def fail(_values):
+        raise ZeroDivisionError("a fault" * 100)
+
+    node = make_node()
+    values = Values(node, fail)
+    result = node.set_parameters([Parameter("friction", value=0.5)])[0]
+    assert not result.successful
+    assert result.reason.startswith("internal error: ZeroDivisionError: a fault")
+    assert len(result.reason) == 300
+    assert values.value.friction == 0.0
+
+
+def test_an_error_while_a_change_is_applied_does_not_end_the_node(make_node):
+    def fail(_values):
+        raise FileNotFoundError("gone since the check")
+
+    node = make_node()
+    values = declare_parameters(node, TraverseServerParameters)
+    follow_changes(node, lambda: values, lambda _: None, fail)
+    assert node.set_parameters([Parameter("max_gap", value=0.5)])[0].successful
+
+
+@pytest.mark.parametrize("value", [1e-9, 0.0009])
+def test_a_tiny_plan_spacing_is_refused_and_0_is_not(value):
+    with pytest.raises(ParameterError, match=r"it must be 0, or at least 0\.001 m"):
+        TraverseServerParameters(plan_spacing=value)
+    assert TraverseServerParameters(plan_spacing=0.0).plan_spacing == 0.0
+    assert TraverseServerParameters(plan_spacing=0.001).plan_spacing == 0.001

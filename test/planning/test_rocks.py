@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rover_planner.errors import PlanningError
 from rover_planner.worlds import rocks
 
 
@@ -48,3 +49,8 @@ def test_a_rock_smaller_than_a_cell_or_at_the_edge_does_no_harm():
     rocks.add_rocks(elevation, 1.0, np.array([1.4, 0.0]), np.array([2.4, 0.0]), np.array([0.2, 3]))
     assert np.isfinite(elevation).all()
     assert elevation[0, 0] == pytest.approx(1.5)
+
+
+def test_more_rocks_than_can_be_made_are_refused():
+    with pytest.raises(PlanningError, match=r"rock cover is 0\.9, which are .* rocks"):
+        rocks.sample_diameters(np.random.default_rng(1), 0.9, 1e6, 0.01, 1.5)

@@ -148,7 +148,7 @@ def test_a_recorded_reason_takes_precedence_over_the_model(tmp_path):
 
 def test_a_file_without_predictions_is_refused_by_name(tmp_path):
     np.savez(tmp_path / "poses.npz", poses=straight())
-    with pytest.raises(PlanningError, match=r"no array 'settled'"):
+    with pytest.raises(PlanningError, match=r"no array reason; it has poses"):
         read_prediction(tmp_path / "poses.npz")
 
 

@@ -9,6 +9,7 @@ from rover_physics.terrain.soil_file import soil_named
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
 from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.worlds.map_file import MapLimits
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,11 @@ class ServiceSettings:
         """Names of the manipulator's joints, () if the rover has no manipulator."""
         manipulator = self.rover.manipulator
         return tuple(manipulator.joints) if manipulator is not None else ()
+
+
+def map_limits(parameters: TraverseServerParameters) -> MapLimits:
+    """Return what clients may load as a map."""
+    return MapLimits(parameters.map_folder, parameters.max_map_bytes, parameters.max_map_cells)
 
 
 def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettings:

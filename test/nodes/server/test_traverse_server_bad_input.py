@@ -3,14 +3,18 @@
 import array
 import json
 import math
+import time
 
 import numpy as np
+import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import PointCloud2, PointField
 
+from benchmarks.hostile_files import archive_of, make_oddities, npy
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
+from rover_physics.terrain.grid import save_terrain
 from rover_planner.planning.answering.situation import Situation
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, START, ask, verdict_of
@@ -164,6 +168,69 @@ def test_a_terrain_that_cannot_be_loaded_is_refused_by_result(mapped, client, tm
         response = client.load_map(url)
         assert response.result == getattr(response, result), url
         assert mapped.service.terrain is before and ros.is_alive(mapped)
+
+
+def test_hostile_files_and_urls_do_not_end_load_map(mapped, client, tmp_path, ros):
+    before = mapped.service.terrain
+    (tmp_path / "maps").mkdir()
+    for name in ("outside.npz", "maps/large.npz"):
+        save_terrain(tmp_path / name, make_terrain(waves))
+    (tmp_path / "maps" / "out.npz").symlink_to(tmp_path / "outside.npz")
+    bomb = npy("{'descr': '<f8', 'fortran_order': False, 'shape': (900000, 900000), }")
+    (tmp_path / "maps" / "bomb.npz").write_bytes(archive_of(bomb, "elevation.npy"))
+    assert client.set_parameter("map_folder", str(tmp_path / "maps")) == (True, "")
+    assert client.set_parameter("max_map_cells", before.elevation.size - 1) == (True, "")
+    urls = [
+        "u" * 300,
+        "//[",
+        "http://[bad",
+        "a\nb",
+        "/dev/zero",
+        "/etc/passwd",
+        tmp_path / "outside.npz",
+        tmp_path / "maps" / "out.npz",
+        *make_oddities(tmp_path),
+    ]
+    for url in [url for url in urls if "\0" not in str(url) and str(url).isprintable()]:
+        began = time.monotonic()
+        response = client.load_map(url)
+        assert response.result == response.RESULT_MAP_DOES_NOT_EXIST, url
+        assert time.monotonic() - began < 2.0, url
+    for name in ("bomb.npz", "large.npz"):
+        response = client.load_map(tmp_path / "maps" / name)
+        assert response.result == response.RESULT_INVALID_MAP_DATA, name
+    assert mapped.service.terrain is before and ros.is_alive(mapped)
+    client.wait_for_log("the limit is")
+    assert client.set_parameter("max_map_cells", before.elevation.size) == (True, "")
+    response = client.load_map(tmp_path / "maps" / "large.npz")
+    assert response.result == response.RESULT_SUCCESS
+
+
+@pytest.mark.parametrize("content", ["!!timestamp foo", "!!python/name:os.system", "&a [*a]", ""])
+def test_a_rover_file_with_odd_contents_is_refused_over_the_node(
+    mapped, client, tmp_path, ros, content
+):
+    rover = tmp_path / "rover.yaml"
+    rover.write_text(f"wheel: {content}\n")
+    began = time.monotonic()
+    accepted, reason = client.set_parameter("rover", str(rover))
+    assert not accepted and "rover.yaml" in reason and len(reason) <= 300
+    assert time.monotonic() - began < 2.0 and ros.is_alive(mapped)
+
+
+def test_a_rover_that_is_no_file_is_refused_over_the_node_at_once(mapped, client, tmp_path, ros):
+    for name in [*make_oddities(tmp_path), "r" * 100_000]:
+        if "\0" in name or not name.isprintable():
+            continue
+        began = time.monotonic()
+        accepted, reason = client.set_parameter("rover", name)
+        assert not accepted and 0 < len(reason) <= 300, name
+        assert time.monotonic() - began < 2.0 and ros.is_alive(mapped), name
+    accepted, reason = client.set_parameter("plan_spacing", 1e-9)
+    assert not accepted and reason == (
+        "parameter plan_spacing is 1e-09; it must be 0, or at least 0.001 m"
+    )
+    assert client.can_traverse(START, GOAL).poses
 
 
 def test_bad_joint_states_leave_the_angles_known_before(mapped, client, ros):

@@ -102,3 +102,44 @@ def test_of_merged_keys_the_nearest_counts():
 def test_a_key_that_stands_twice_is_refused_below_a_merge_too():
     with pytest.raises(RoverFileError, match="duplicate key x in lines 2 and 2"):
         parse_yaml("a: &a {x: 1}\nb: {<<: *a, x: 2, x: 3}")
+
+
+def test_many_merges_of_a_large_mapping_are_refused_at_once():
+    keys = ",".join(f"k{k}: 1" for k in range(3000))
+    start = time.perf_counter()
+    with pytest.raises(RoverFileError, match=r"references stand for 6e\+07 values"):
+        parse_yaml(f"a: &a {{{keys}}}\nb: {{<<: [{'*a,' * 10_000}]}}\n")
+    assert time.perf_counter() - start < 3.0
+
+
+def test_a_mapping_that_contains_itself_is_refused():
+    with pytest.raises(RoverFileError, match="references stand for inf values"):
+        parse_yaml("a: &a {b: *a}\n")
+
+
+def test_a_large_file_is_refused_before_it_is_parsed(tmp_path):
+    text = error_of(tmp_path, "- 1\n" * 1_000_000)
+    assert text == "is larger than 100000 bytes, the most that is read"
+
+
+@pytest.mark.parametrize("text", ["- " * 50_000, "[" * 100_000, "? " * 50_000, "{a: " * 25_000])
+def test_deep_nesting_is_refused_at_once(tmp_path, text):
+    start = time.perf_counter()
+    assert "recursion" in error_of(tmp_path, text)
+    assert time.perf_counter() - start < 3.0
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"a: \xff\xfe", "not a text file in UTF-8"),
+        (b"a: \0", "special characters are not allowed"),
+        ("a: 1".encode("utf-16"), "not a text file in UTF-8"),
+        (b"a: \xed\xa0\x80", "not a text file in UTF-8"),
+    ],
+)
+def test_bytes_that_are_no_text_are_refused(tmp_path, content, reason):
+    path = tmp_path / "file.yaml"
+    path.write_bytes(content)
+    with pytest.raises(RoverFileError, match=reason):
+        load_rover(path)

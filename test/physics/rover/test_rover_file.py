@@ -340,7 +340,7 @@ def test_broken_yaml_is_refused_in_one_line(tmp_path, text):
 
 
 def test_an_unreadable_file_is_refused(tmp_path):
-    with pytest.raises(RoverFileError, match="cannot be read: Is a directory"):
+    with pytest.raises(RoverFileError, match="it is a directory; it must be a regular file"):
         load_rover(tmp_path)
     path = tmp_path / "binary.yaml"
     path.write_bytes(b"\xff\xfe\x00name")

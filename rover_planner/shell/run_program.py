@@ -1,0 +1,79 @@
+"""Runs a program so that it always ends with an exit code and at most one line on stderr."""
+
+import contextlib
+import os
+import sys
+import traceback
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+from rover_physics.errors import RoverError
+from rover_planner.errors import DemoError, PlanningError
+from rover_planner.shell.exit_codes import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    EXIT_OK,
+    EXIT_PIPE_CLOSED,
+)
+from rover_planner.shell.one_line import MAX_LINE, one_line
+
+
+def run_program(name: str, run: Callable[[], Any]) -> int:
+    """Run a program and return its exit code.
+
+    Bad input, a failure and an internal error print one line of at most MAX_LINE characters on
+    stderr. In Python's development mode (-X dev) an internal error prints its trace as well.
+    Warnings of libraries are not printed unless a filter asks for them (python -W).
+
+    Args:
+        name: Name of the program, at the start of the line.
+        run: The program; an int that it returns is the exit code, anything else means 0.
+    """
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
+    try:
+        with _without_warnings():
+            code = run()
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (RoverError, PlanningError) as error:
+        return end_with(name, EXIT_BAD_INPUT, str(error))
+    except DemoError as error:
+        return end_with(name, EXIT_FAILED, str(error))
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        _drop_output()
+        return EXIT_PIPE_CLOSED
+    except OSError as error:
+        _drop_output()
+        return end_with(name, EXIT_FAILED, f"the system refused: {error}")
+    except Exception as error:
+        if sys.flags.dev_mode:
+            traceback.print_exc()
+        return end_with(name, EXIT_FAILED, f"internal error: {type(error).__name__}: {error}")
+    return code if isinstance(code, int) else EXIT_OK
+
+
+def end_with(name: str, code: int, text: str) -> int:
+    """Print in one line on stderr why a program ends; return the exit code."""
+    with contextlib.suppress(OSError):  # stderr itself may be closed or full
+        print(one_line(f"{name}: {text}", MAX_LINE), file=sys.stderr, flush=True)
+    return code
+
+
+@contextlib.contextmanager
+def _without_warnings() -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", append=True)  # filters that are set already come first
+        yield
+
+
+def _drop_output() -> None:
+    """Send what is left of the output nowhere; else Python complains about it when it ends."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):  # no real file in tests
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -1,0 +1,111 @@
+"""Opens the terrain file that a client names by a URL, below a folder and within limits."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+from urllib.parse import unquote, urlparse
+
+from rover_physics.errors import RoverFileError, TerrainError
+from rover_physics.files.user_file import OPEN_FLAGS, check_regular, wrap_descriptor
+from rover_physics.files.validation import show_file
+from rover_physics.terrain.grid import Terrain, read_terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
+from rover_planner.errors import PlanningError
+
+FOLDER_FLAGS = os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC
+"""Flags for going through a folder, which needs no permission to list it."""
+MUST = "it must be the path or file:// URL of a terrain file on this machine"
+LOCAL_HOSTS = ("", "localhost")
+"""Hosts of a file:// URL that mean this machine."""
+
+
+class MapFileError(PlanningError):
+    """A name that is no readable file below the folder; the text names file and reason."""
+
+
+@dataclass(frozen=True)
+class MapLimits:
+    """What a client may load."""
+
+    folder: str = "/"
+    """Folder that the file must be below; symbolic links that lead out of it are refused."""
+    max_bytes: int = 1_000_000_000
+    """Largest file [bytes]."""
+    max_cells: int = MAX_CELLS
+    """Largest map [cells]."""
+
+
+def open_map(url: str, limits: MapLimits) -> Terrain:
+    """Load the terrain file that a client names.
+
+    Args:
+        url: A path, or a file:// URL with %-escapes. Relative paths start at the working
+            directory.
+        limits: What may be loaded.
+
+    Raises:
+        MapFileError: The URL is none of a local file; the file does not exist, is not below the
+            folder, is not a regular file, or cannot be read.
+        TerrainError: The file is too large, or not a terrain file.
+    """
+    try:
+        with _open_below(file_of_url(url), limits.folder) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > limits.max_bytes:
+                raise TerrainError(
+                    f"{show_file(url)}: the file has {size} bytes; the limit (max_map_bytes) is "
+                    f"{limits.max_bytes}"
+                )
+            return read_terrain(file, show_file(url), limits.max_cells)
+    except RoverFileError as error:
+        raise MapFileError(f"{show_file(url)}: {error}") from error
+
+
+def file_of_url(url: str) -> Path:
+    """Return the file that a path or a file:// URL names.
+
+    Raises:
+        RoverFileError: It is another URL, or none at all.
+    """
+    try:
+        parts = urlparse(url)
+        if parts.scheme == "file" and parts.netloc in LOCAL_HOSTS:
+            return Path(unquote(parts.path))
+    except ValueError as error:  # such as "//[", an address that is not closed
+        raise RoverFileError(f"not a URL ({error}); {MUST}") from error
+    if parts.scheme == "file" or "://" in url or not url:
+        raise RoverFileError(f"not a local file; {MUST}")
+    return Path(url)
+
+
+def _open_below(file: Path, folder: str) -> BinaryIO:
+    """Open a regular file below a folder, where no symbolic link leads out of the folder.
+
+    All links are resolved first; the resolved path is then opened part by part without following
+    links, so that no one can exchange a part of it in the meantime.
+    """
+    try:
+        top = os.path.realpath(folder)
+        path = os.path.realpath(file)
+        if os.path.commonpath([top, path]) != top:
+            raise RoverFileError(f"not below {show_file(folder)}, the folder of maps (map_folder)")
+        return wrap_descriptor(_open_part_by_part(top, os.path.relpath(path, top).split(os.sep)))
+    except OSError as error:
+        raise RoverFileError(f"cannot be read: {error.strerror or error}; {MUST}") from error
+    except ValueError as error:  # a zero byte in the name
+        raise RoverFileError(f"cannot be read: the name is impossible ({error})") from error
+
+
+def _open_part_by_part(top: str, parts: list[str]) -> int:
+    """Return a descriptor of the file top/part/part/..., without following links below top."""
+    *folders, name = parts
+    here = os.open(top, FOLDER_FLAGS)
+    try:
+        for part in folders:
+            above, here = here, os.open(part, FOLDER_FLAGS | os.O_NOFOLLOW, dir_fd=here)
+            os.close(above)
+        check_regular(os.stat(name, dir_fd=here, follow_symlinks=False))
+        return os.open(name, OPEN_FLAGS | os.O_NOFOLLOW, dir_fd=here)
+    finally:
+        os.close(here)

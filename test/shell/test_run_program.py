@@ -1,0 +1,111 @@
+"""A program always ends with an exit code and at most one short line on stderr."""
+
+import os
+import subprocess
+import sys
+import warnings
+
+import pytest
+
+from rover_physics.errors import RoverError
+from rover_planner.errors import DemoError, PlanningError
+from rover_planner.shell.exit_codes import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    EXIT_OK,
+    EXIT_PIPE_CLOSED,
+)
+from rover_planner.shell.one_line import MAX_LINE, one_line
+from rover_planner.shell.run_program import run_program
+from support.command_line import REPOSITORY
+
+
+def run_raising(error):
+    def run():
+        raise error
+
+    return run_program("rover", run)
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (PlanningError("a  is\n1"), EXIT_BAD_INPUT, "rover: a is 1\n"),
+        (RoverError("\x1b[2J\u202e"), EXIT_BAD_INPUT, "rover: \\x1b[2J\\u202e\n"),
+        (DemoError("no"), EXIT_FAILED, "rover: no\n"),
+        (KeyError("x"), EXIT_FAILED, "rover: internal error: KeyError: 'x'\n"),
+        (RecursionError("deep"), EXIT_FAILED, "rover: internal error: RecursionError: deep\n"),
+        (MemoryError(), EXIT_FAILED, "rover: internal error: MemoryError:\n"),
+        (AssertionError("a\nb"), EXIT_FAILED, "rover: internal error: AssertionError: a b\n"),
+        (OSError(28, "No space left"), EXIT_FAILED, "rover: the system refused: [Errno 28] No "
+         "space left\n"),
+        (KeyboardInterrupt(), EXIT_INTERRUPTED, ""),
+        (BrokenPipeError(), EXIT_PIPE_CLOSED, ""),
+    ],
+)  # fmt: skip
+def test_every_error_is_an_exit_code_and_at_most_one_line(capfd, error, code, line):
+    assert run_raising(error) == code
+    assert capfd.readouterr().err == line
+
+
+def test_a_long_text_is_cut_to_one_line_of_300_characters(capfd):
+    run_raising(PlanningError("x" * 10_000_000))
+    line = capfd.readouterr().err
+    assert len(line) == MAX_LINE + 1 == 301
+    assert line.endswith("...\n")
+
+
+def test_one_line_keeps_short_text_and_shows_control_characters():
+    assert one_line("a é 1") == "a é 1"
+    assert one_line("a\x00\x7f\udcff") == "a\\x00\\x7f\\udcff"
+    assert one_line("x" * 400, 10) == "xxxxxxx..."
+
+
+def test_a_number_that_is_returned_is_the_exit_code():
+    assert [run_program("rover", lambda result=result: result) for result in (None, 3, "x")] == [
+        EXIT_OK,
+        3,
+        EXIT_OK,
+    ]
+
+
+def test_a_warning_of_a_library_is_not_printed_unless_a_filter_asks_for_it(capfd):
+    def warn():
+        warnings.warn("overflow", RuntimeWarning, stacklevel=1)
+
+    with warnings.catch_warnings():
+        warnings.resetwarnings()
+        assert run_program("rover", warn) == EXIT_OK
+        assert capfd.readouterr().err == ""
+        warnings.simplefilter("error")
+        assert run_program("rover", warn) == EXIT_FAILED
+    assert "RuntimeWarning: overflow" in capfd.readouterr().err
+
+
+PRINT = "import sys; from rover_planner.shell.run_program import run_program\n" + (
+    "sys.exit(run_program('rover', lambda: print('x' * 100_000)))"
+)
+HELP = "import sys; from rover_planner.cli import main; sys.exit(main(['predict', '--help']))"
+
+
+@pytest.mark.parametrize("script", [PRINT, HELP], ids=["print", "help"])
+def test_output_into_a_closed_pipe_or_a_full_disk_leaves_no_traceback(script):
+    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
+
+    def run(stdout):
+        return subprocess.run(
+            [sys.executable, "-c", script], stdout=stdout, stderr=subprocess.PIPE, text=True,
+            env=environment, timeout=60,
+        )  # fmt: skip
+
+    reading, writing = os.pipe()
+    os.close(reading)
+    ended = run(writing)
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (EXIT_PIPE_CLOSED, "")
+    with open("/dev/full", "w") as full:
+        ended = run(full)
+    assert ended.returncode == EXIT_FAILED
+    name = "rover" if script is PRINT else "rover_planner"
+    assert ended.stderr == f"{name}: the system refused: [Errno 28] No space left on device\n"
