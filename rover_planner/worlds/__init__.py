@@ -1,1 +1,1 @@
-"""Generated terrains: fractal relief, craters and rocks from a seed."""
+"""Terrains: generated from a seed with relief, craters and rocks, or from a client's file."""
