@@ -17,6 +17,7 @@ from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.guard import Guard
+from rover_planner.ros.handover import Handover
 from rover_planner.ros.refusals import refuse_error
 
 PATROL = 0.05
@@ -53,8 +54,8 @@ class QuestionDesk:
         self.health = ServerHealth()
         """Counts of answers and faults."""
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        ready = node.create_guard_condition(guard.around(self._deliver))
-        self._queue = QuestionQueue(0, ready.trigger)
+        handover = Handover(node, guard)
+        self._queue = QuestionQueue(0, lambda: handover.call(self._deliver))
         self._patrol = node.create_timer(
             PATROL, guard.around(self._refuse_overdue), clock=steady, autostart=False
         )

@@ -1,8 +1,10 @@
 """Hands functions from other threads to the executor's thread of a node."""
 
+import contextlib
 from collections import deque
 from collections.abc import Callable
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from rover_planner.ros.guard import Guard
@@ -19,7 +21,8 @@ class Handover:
     def call(self, function: Callable[[], object]) -> None:
         """Call a function soon in the executor's thread; any thread may ask for it."""
         self._waiting.append(function)
-        self._ready.trigger()
+        with contextlib.suppress(InvalidHandle):  # the node is gone, and with it who waits
+            self._ready.trigger()
 
     def _call_all(self) -> None:
         while self._waiting:
