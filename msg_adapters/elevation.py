@@ -7,7 +7,6 @@ read back unchanged.
 """
 
 import array
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +19,8 @@ from msg_adapters.gridding import (
     CELL_HEIGHTS,
     CellGrid,
     Raster,
+    check_extent,
+    check_precision,
     combine,
     detect_grid,
     detect_raster,
@@ -27,11 +28,15 @@ from msg_adapters.gridding import (
     rounding_error,
     typical_spacing,
 )
+from rover_physics.numerics.plausible import MAX_RESOLUTION, MIN_RESOLUTION
 from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 
 LAYERS = ("friction", "elevation_std")
 """Fields of a cloud besides x, y and z that become layers of the terrain."""
+
+MAX_POINT_STEP = 1_000_000
+"""Largest size of a point [bytes]."""
 
 _FLOATS = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
 _DATATYPE_NAMES = {
@@ -70,6 +75,7 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 
 
+@np.errstate(all="ignore")
 def terrain_from_point_cloud(
     cloud: PointCloud2,
     resolution: float = 0.0,
@@ -88,14 +94,18 @@ def terrain_from_point_cloud(
             to a cell. "mean" is unbiased on plain ground and lowers the edges of obstacles.
 
     Raises:
-        MessageError: The cloud cannot be read, has no valid point, is not a regular grid
-            although the resolution is 0, or needs more than MAX_CELLS cells.
+        MessageError: The cloud cannot be read, has no valid point or one beyond MAX_COORDINATE,
+            is not a regular grid although the resolution is 0, has coordinates rounded more
+            coarsely than its cells, or needs more than MAX_CELLS cells.
         TerrainError: The cells do not form a valid terrain.
     """
     if cell_height not in CELL_HEIGHTS:
         raise MessageError(f"cell_height is {cell_height!r}; it must be one of {CELL_HEIGHTS}")
-    if not (math.isfinite(resolution) and resolution >= 0.0):
-        raise MessageError(f"resolution is {resolution} m; it must be positive, or 0 to detect it")
+    if resolution != 0.0 and not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
+        raise MessageError(
+            f"resolution is {resolution} m; it must be positive, or 0 to detect it, and from "
+            f"{MIN_RESOLUTION:g} to {MAX_RESOLUTION:g}"
+        )
     points = _view_points(cloud)
     raster = detect_raster(points["x"], points["y"])
     if raster is not None and _is_wanted(raster.grid, resolution):
@@ -147,10 +157,14 @@ def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str
     if not known.any():
         raise MessageError(f"none of the cloud's {len(known)} points has finite x, y and z")
     xy = points.xyz[placed, :2]
+    check_extent(xy)
     grid = detect_grid(xy, points.precision)
     if resolution > 0.0 and (grid is None or not _is_wanted(grid, resolution)):
+        check_precision(xy, points.precision, resolution)
         grid = lay_out_cells(xy, resolution)
     if grid is None:
+        # A grid is found if its spacing is above 4 rounding errors.
+        check_precision(xy, 4.0 * points.precision, 0.5 * typical_spacing(xy))
         raise MessageError(
             "the cloud's points form no regular grid along x and y, so the cell size must be "
             f"given: set map_resolution, for these points about {typical_spacing(xy):.2g} m"
@@ -232,6 +246,9 @@ def _view_points(cloud: PointCloud2) -> NDArray[np.void]:
     row_step = _check_layout(cloud)
     names = ["x", "y", "z"]
     fields = {field.name: field for field in cloud.fields}
+    for name in (*names, *LAYERS):
+        if sum(field.name == name for field in cloud.fields) > 1:
+            raise MessageError(f"cloud has two fields {name}; it must have one")
     missing = [name for name in names if name not in fields]
     if missing:
         has = ", ".join(fields) or "none"
@@ -261,6 +278,11 @@ def _check_layout(cloud: PointCloud2) -> int:
         raise MessageError(f"cloud has no points: height {cloud.height}, width {cloud.width}")
     if cloud.point_step == 0:
         raise MessageError("cloud has point_step 0; it must be the size of a point in bytes")
+    if cloud.point_step > MAX_POINT_STEP:
+        raise MessageError(
+            f"cloud has point_step {cloud.point_step}; it must be the size of a point in bytes, "
+            f"at most {MAX_POINT_STEP}"
+        )
     row_bytes = cloud.width * cloud.point_step
     row_step = cloud.row_step
     if row_step == 0 and cloud.height == 1:

@@ -1,5 +1,12 @@
 """The error that invalid messages raise."""
 
 
+MAX_TEXT = 500
+"""Largest number of characters of an error; a message may contain names of any length."""
+
+
 class MessageError(Exception):
     """A message with a missing or invalid field or a wrong frame; the text names it."""
+
+    def __init__(self, text: str):
+        super().__init__(text if len(text) <= MAX_TEXT else f"{text[: MAX_TEXT - 3]}...")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
+from rover_physics.numerics.plausible import MAX_COORDINATE, MIN_RESOLUTION
 
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
@@ -75,6 +76,9 @@ def detect_raster(x: NDArray[Any], y: NDArray[Any]) -> Raster | None:
     if not ((inner == inner[:1]).all() and (outer == outer[:, :1]).all()):
         return None
     x_axis, y_axis = (outer[:, 0], inner[0]) if by_columns else (inner[0], outer[:, 0])
+    if not (np.isfinite(x_axis).all() and np.isfinite(y_axis).all()):
+        return None
+    check_extent(x_axis, y_axis)
     noise = 4.0 * rounding_error(x_axis, y_axis)
     x_axis, y_axis = x_axis.astype(np.float64), y_axis.astype(np.float64)
     grid = _fit_grid(x_axis, y_axis, inner.size, noise)
@@ -107,6 +111,21 @@ def detect_grid(xy: NDArray[np.float64], precision: float) -> CellGrid | None:
     return grid if single and off_centre <= _tolerance(grid.resolution, noise) else None
 
 
+def check_extent(*coordinates: NDArray[Any]) -> None:
+    """Check that coordinates [m] are plausible; ignores NaN and infinity.
+
+    Raises:
+        MessageError: A coordinate beyond MAX_COORDINATE.
+    """
+    for values in coordinates:
+        beyond = np.isfinite(values) & (np.abs(values) > MAX_COORDINATE)
+        if beyond.any():
+            raise MessageError(
+                f"cloud has a point at {float(values[beyond].flat[0]):.4g} m; x and y must be "
+                f"within {MAX_COORDINATE:g} m: remove stray points"
+            )
+
+
 def rounding_error(*coordinates: NDArray[Any]) -> float:
     """Return the rounding error [m] of coordinates in their type; ignores NaN and infinity."""
     extent = 1.0
@@ -126,11 +145,17 @@ def _fit_grid(x, y, points: int, noise: float) -> CellGrid | None:
         return None
     spans = np.ptp(x), np.ptp(y)
     fitted = steps[0] if spans[0] >= spans[1] else steps[-1]
+    if fitted < MIN_RESOLUTION:
+        raise MessageError(
+            f"cloud has points {fitted:.3g} m apart; a map has cells of {MIN_RESOLUTION:g} m or "
+            "more: set map_resolution, and check that the coordinates are in metres"
+        )
     if any(abs(step - fitted) > _MAX_OFF_CENTRE * fitted for step in steps):
         return None
     counts = [round(span / fitted) + 1 for span in spans]
     if points < _MIN_FILL * counts[0] * counts[1]:
         return None
+    _check_size(counts[0] * counts[1], spans, fitted)
     resolution = _round_within(fitted, noise / max(counts))
     origin = (_round_within(along_x[0], noise), _round_within(along_y[0], noise))
     return CellGrid(resolution, origin, counts[0], counts[1])
@@ -151,6 +176,8 @@ def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, floa
     gaps = np.diff(distinct)
     smallest = gaps.min()
     index = np.concatenate([[0.0], np.cumsum(np.rint(gaps / smallest))])
+    if index[-1] > MAX_CELLS:
+        return None
     step, first = np.polyfit(index, distinct, 1)
     residual = np.abs(distinct - (first + step * index)).max()
     if residual > max(_MAX_OFF_CENTRE * step, noise):
@@ -163,17 +190,41 @@ def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CellGrid:
     first = np.rint(xy.min(axis=0) / resolution)
     last = np.rint(xy.max(axis=0) / resolution)
     counts = last - first + 1.0
-    if counts.prod() > MAX_CELLS:
-        span = np.ptp(xy, axis=0)
-        raise MessageError(
-            f"cloud spans {span[0]:.4g} m x {span[1]:.4g} m, which at {resolution:g} m are "
-            f"{counts.prod():.3g} cells; a map may have {MAX_CELLS}: remove stray points or set "
-            "a coarser map_resolution"
-        )
+    _check_size(float(counts.prod()), np.ptp(xy, axis=0), resolution)
     origin = first * resolution
     return CellGrid(
         resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1])
     )
+
+
+def _check_size(cells: float, spans: Any, resolution: float) -> None:
+    """Refuse a map of too many cells of a resolution [m] over spans (x, y) [m]."""
+    if cells > MAX_CELLS:
+        raise MessageError(
+            f"cloud spans {spans[0]:.4g} m x {spans[1]:.4g} m, which at {resolution:g} m are "
+            f"{cells:.3g} cells; a map may have {MAX_CELLS}: remove stray points or set "
+            "a coarser map_resolution"
+        )
+
+
+def check_precision(xy: NDArray[np.float64], precision: float, cell: float) -> None:
+    """Refuse points (n, 2) [m] whose rounding error moves them to other cells.
+
+    Args:
+        xy: Points [m].
+        precision: Rounding error of the coordinates [m].
+        cell: Size of the cells [m].
+
+    Raises:
+        MessageError: The coordinates are rounded more coarsely than the cells.
+    """
+    if precision > cell:
+        farthest = float(np.abs(xy).max())
+        raise MessageError(
+            f"cloud has coordinates rounded to {precision:.2g} m, because they are as large as "
+            f"{farthest:.4g} m in FLOAT32; for cells of {cell:.2g} m shift the origin of the map "
+            "frame near the rover, or publish x and y as FLOAT64"
+        )
 
 
 def combine(cells, values, grid: CellGrid, how: str) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import Imu
 
 from msg_adapters.errors import MessageError
-from rover_physics.numerics.quaternions import rpy_from_xyzw
+from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
 
 NOT_MEASURED = -1.0
 """First element of a covariance in sensor_msgs/Imu if the quantity is not measured."""
@@ -38,7 +38,7 @@ def imu_to_attitude(imu: Imu) -> Attitude:
         )
     q = imu.orientation
     x, y, z, w = q.x, q.y, q.z, q.w
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
+    norm = length_of((x, y, z, w))
     if not 0.99 < norm < 1.01:
         raise MessageError(
             f"imu has orientation {[x, y, z, w]} of norm {norm:g}; it must be a quaternion of "

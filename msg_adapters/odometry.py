@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
-from rover_physics.numerics.quaternions import rpy_from_xyzw
+from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
 
 
 def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.float64], float]:
@@ -19,7 +19,7 @@ def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.flo
     """
     check_frame(odometry.header.frame_id, map_frame, "odometry")
     place, q = odometry.pose.pose.position, odometry.pose.pose.orientation
-    norm = math.sqrt(q.x**2 + q.y**2 + q.z**2 + q.w**2)
+    norm = length_of((q.x, q.y, q.z, q.w))
     if not 0.99 < norm < 1.01:
         raise MessageError(
             f"odometry has orientation {[q.x, q.y, q.z, q.w]} of norm {norm:g}; it must be a "

@@ -11,11 +11,23 @@ from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
-from rover_physics.numerics.quaternions import forward_from_xyzw, xyzw_from_rpy, xyzw_from_yaw
+from rover_physics.numerics.plausible import MAX_COORDINATE
+from rover_physics.numerics.quaternions import (
+    forward_from_xyzw,
+    length_of,
+    xyzw_from_rpy,
+    xyzw_from_yaw,
+)
 from rover_physics.prediction.path_prediction import PathPrediction
 
-_NORM_TOLERANCE = 0.01
-"""Largest deviation of a quaternion's squared length from 1, as in tf2."""
+_LENGTH_TOLERANCE = 0.005
+"""Largest deviation of a quaternion's length from 1, as in tf2."""
+
+MAX_POSES = 100_000
+"""Largest number of poses of a path; a longer path is refused before it is read. It is the
+largest number of waypoints of a path, one pose for each."""
+MAX_MARKS = 1_000_000
+"""Largest number of distances at which `decimate` chooses a pose."""
 
 _MIN_LEVEL = 1e-3
 """Smallest horizontal part of the forward axis (a unit vector) for which a heading is defined."""
@@ -28,19 +40,23 @@ def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> fl
         MessageError: NaN, not of unit length, or the forward axis is vertical.
     """
     x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
-    norm = x * x + y * y + z * z + w * w
-    text = f"{what} (x {x:g}, y {y:g}, z {z:g}, w {w:g})"
-    if not math.isfinite(norm):
-        raise MessageError(f"{text} is not finite; it must be a quaternion of length 1")
-    if abs(norm - 1.0) > _NORM_TOLERANCE:
+    length = length_of((x, y, z, w))
+    if not abs(length - 1.0) <= _LENGTH_TOLERANCE:
+        wrong = f"has length {length:.3g}" if math.isfinite(length) else "is not finite"
+        text = _describe(quaternion, what)
         raise MessageError(
-            f"{text} has length {math.sqrt(norm):.3g}; it must be a quaternion of length 1, "
-            "for no rotation w = 1"
+            f"{text} {wrong}; it must be a quaternion of length 1, for no rotation w = 1"
         )
     forward_x, forward_y = forward_from_xyzw((x, y, z, w))
     if math.hypot(forward_x, forward_y) < _MIN_LEVEL:
+        text = _describe(quaternion, what)
         raise MessageError(f"{text} points forward straight up or down; it has no heading")
     return math.atan2(forward_y, forward_x)
+
+
+def _describe(quaternion: Quaternion, what: str) -> str:
+    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    return f"{what} (x {x:g}, y {y:g}, z {z:g}, w {w:g})"
 
 
 def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:
@@ -50,8 +66,11 @@ def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:
         MessageError: Position or orientation is not finite, or no unit quaternion.
     """
     x, y = pose.position.x, pose.position.y
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise MessageError(f"{what} has position x {x}, y {y}; both must be finite, in metres")
+    if not (abs(x) <= MAX_COORDINATE and abs(y) <= MAX_COORDINATE):
+        raise MessageError(
+            f"{what} has position x {x}, y {y}; both must be finite, in metres, within "
+            f"{MAX_COORDINATE:g}"
+        )
     return np.array([x, y, yaw_from_quaternion(pose.orientation, f"{what} orientation")])
 
 
@@ -76,11 +95,17 @@ def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
     heading is that of each pose's orientation, not the direction of the path.
 
     Raises:
-        MessageError: No poses, another frame, or a pose that `pose_to_array` refuses.
+        MessageError: No poses, more than MAX_POSES, another frame, or a pose that
+            `pose_to_array` refuses.
     """
     check_frame(path.header.frame_id, map_frame, "path")
     if not path.poses:
         raise MessageError("path has no poses; it must have at least one")
+    if len(path.poses) > MAX_POSES:
+        raise MessageError(
+            f"path has {len(path.poses)} poses; it may have {MAX_POSES}: leave out poses that are "
+            "closer together than the rover needs, or send it in parts"
+        )
     for i, stamped in enumerate(path.poses):
         if stamped.header.frame_id:
             check_frame(stamped.header.frame_id, map_frame, f"path pose {i}")
@@ -105,6 +130,7 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
         return np.arange(len(xy))
     steps = np.hypot(*np.diff(xy, axis=0).T)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    spacing = max(spacing, travelled[-1] / MAX_MARKS)
     marks = np.arange(0.0, travelled[-1], spacing)
     chosen = np.searchsorted(travelled, marks - 1e-9 * spacing)
     ends = [0, len(xy) - 1]

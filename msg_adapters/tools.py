@@ -6,16 +6,17 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
+from rover_physics.numerics.plausible import MAX_COORDINATE, MAX_FORCE
 
 
 def target_to_point(target: PoseStamped, map_frame: str) -> NDArray[np.float64]:
     """Return the position (3,) [m] of a pose in the map frame; the orientation is ignored.
 
     Raises:
-        MessageError: Another frame, or a position that is not finite.
+        MessageError: Another frame, or a position that is not finite or beyond MAX_COORDINATE.
     """
     check_frame(target.header.frame_id, map_frame, "tool target")
-    return _finite(target.pose.position, "tool target", "a place in metres")
+    return _read(target.pose.position, MAX_COORDINATE, "tool target", "a place in metres")
 
 
 def wrench_to_force_and_moment(
@@ -24,15 +25,17 @@ def wrench_to_force_and_moment(
     """Return force (3,) [N] and moment (3,) [N m] of a wrench, axes of the map frame.
 
     Raises:
-        MessageError: Another frame, or components that are not finite.
+        MessageError: Another frame, or components that are not finite or beyond MAX_FORCE.
     """
     check_frame(wrench.header.frame_id, map_frame, "tool wrench")
-    force = _finite(wrench.wrench.force, "tool wrench force", "a force in N")
-    return force, _finite(wrench.wrench.torque, "tool wrench torque", "a moment in N m")
+    force = _read(wrench.wrench.force, MAX_FORCE, "tool wrench force", "a force in N")
+    return force, _read(wrench.wrench.torque, MAX_FORCE, "tool wrench torque", "a moment in N m")
 
 
-def _finite(vector: Vector3, what: str, right: str) -> NDArray[np.float64]:
+def _read(vector: Vector3, largest: float, what: str, right: str) -> NDArray[np.float64]:
     values = np.array([vector.x, vector.y, vector.z])
-    if not np.isfinite(values).all():
-        raise MessageError(f"{what} is {values.tolist()}; it must be {right}, all finite")
+    if not (np.abs(values) <= largest).all():  # also for NaN
+        raise MessageError(
+            f"{what} is {values.tolist()}; it must be {right}, all finite and within {largest:g}"
+        )
     return values

@@ -27,6 +27,8 @@ class PoseStatus(IntEnum):
     """No configuration was found in which all six wheels touch the ground."""
     NO_EQUILIBRIUM = 4
     """The equilibrium equations are singular."""
+    NOT_COMPUTABLE = 5
+    """A force, torque or margin is NaN or infinite."""
 
 
 class BoundStatus(IntEnum):

@@ -186,6 +186,7 @@ def evaluate_pose(model, work, result):
     """Evaluate the model at `work.pose` into a RESULT.
 
     If the rover does not settle or its forces do not balance, only status and q (NaN) are written.
+    If a result is not a number, all are NaN: a comparison with NaN would keep every limit.
     """
     linkage = model.linkage
     status = settle(model, work)
@@ -207,6 +208,39 @@ def evaluate_pose(model, work, result):
     result.tip_over_ratio = angle / model.settings.flat_angle
     result.tip_over_force_angle = measure / model.settings.flat_measure
     result.belly_clearance = belly_clearance(model.ground, linkage, work.placement)
+    if not _is_computable(result):
+        result.status = PoseStatus.NOT_COMPUTABLE
+        _forget(result)
+
+
+@kernel
+def _is_computable(result):
+    """Return whether results are numbers; a lifted wheel may have infinite utilisation."""
+    total = result.power
+    for k in range(6):
+        total += result.q[k]
+        total += abs(result.wheel_loads[k]) + abs(result.tangential[k]) + abs(result.lateral[k])
+        total += abs(result.torque[k]) + result.torque_saturation[k]
+        total += result.contact_angle[k] + result.sinkage[k] + result.motion_resistance[k]
+        if np.isnan(result.friction_utilisation[k]) or np.isnan(result.slip_ratio[k]):
+            return False
+    return not np.isnan(result.tip_over_ratio) and total - total == 0.0
+
+
+@kernel
+def _forget(result):
+    """Overwrite the numbers of a RESULT by NaN."""
+    result.q[:] = np.nan
+    result.wheel_centres[:, :] = np.nan
+    result.contact_points[:, :] = np.nan
+    for k in range(6):
+        result.contact_angle[k] = result.wheel_loads[k] = result.friction[k] = np.nan
+        result.tangential[k] = result.lateral[k] = result.torque[k] = np.nan
+        result.friction_utilisation[k] = result.slip_ratio[k] = np.nan
+        result.torque_saturation[k] = result.sinkage[k] = np.nan
+        result.motion_resistance[k] = np.nan
+    result.tip_over_ratio = result.tip_over_force_angle = np.nan
+    result.belly_clearance = result.power = np.nan
 
 
 @kernel

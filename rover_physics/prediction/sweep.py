@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.errors import PoseError
+from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, find_crossings
 from rover_physics.prediction.drops import find_falls
@@ -123,7 +124,8 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     """Return a copy of poses as a float array (n, 3).
 
     Raises:
-        PoseError: Wrong shape or type, no pose, or values that are not finite.
+        PoseError: Wrong shape or type, no pose, values that are not finite or beyond
+            MAX_COORDINATE.
     """
     try:
         array = np.array(poses, dtype=np.float64, order="C")
@@ -131,11 +133,14 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
         raise PoseError(f"poses are not numbers: {error}") from error
     if array.ndim != 2 or array.shape[1] != 3 or not len(array):
         raise PoseError(f"poses have shape {array.shape}; it must be (n, 3): x, y, yaw, n >= 1")
-    finite = np.isfinite(array)
-    if not finite.all():
-        row, column = np.argwhere(~finite)[0]
+    plausible = np.abs(array) <= MAX_COORDINATE  # False for NaN
+    if not plausible.all():
+        row, column = np.argwhere(~plausible)[0]
         name, value = ["x", "y", "yaw"][column], array[row, column]
-        raise PoseError(f"{name} of pose {row} is {value}; poses must be finite")
+        most = f"{MAX_COORDINATE:g} {'rad' if name == 'yaw' else 'm'}"
+        raise PoseError(
+            f"{name} of pose {row} is {value}; poses must be finite and within {most}"
+        )
     return array
 
 

@@ -4,10 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from rover_physics.errors import ModelError
 from rover_physics.names import EQUAL, OPTIMAL
+from rover_physics.numerics.plausible import (
+    MAX_FRICTION,
+    MAX_TORQUE,
+    MIN_FRICTION,
+    MIN_TORQUE,
+)
 from rover_physics.rover.manipulator import as_vector
 from rover_physics.status import TorquePolicy
 
@@ -54,10 +58,15 @@ class SweepOptions:
             raise ModelError(
                 f"no torque policy {self.policy!r}; policies are {', '.join(POLICIES)}"
             )
-        for name in ("friction", "max_torque"):
+        for name, least, most in (
+            ("friction", MIN_FRICTION, MAX_FRICTION),
+            ("max_torque", MIN_TORQUE, MAX_TORQUE),
+        ):
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise ModelError(f"{name} is {value}; it must be above 0")
+            if value is not None and not least <= value <= most:
+                raise ModelError(
+                    f"{name} is {value}; it must be above 0, from {least:g} to {most:g}"
+                )
         for name in ("tool_force", "tool_moment"):
             given = getattr(self, name)
             if given is not None:

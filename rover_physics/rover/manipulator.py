@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.errors import ModelError
+from rover_physics.numerics.plausible import MAX_FORCE, MAX_MASS
 from rover_physics.rover.model import Manipulator, Rover
 
 JOINT_TOLERANCE = 1e-6
@@ -111,8 +112,8 @@ def body_mass_and_com(
             raise ModelError(f"payload {payload} kg, but rover {rover.name!r} has no manipulator")
         return mass, moment / mass
     load = arm.payload if payload is None else payload
-    if not (np.isfinite(load) and load >= 0.0):
-        raise ModelError(f"payload is {load}; it must be a mass of 0 kg or more")
+    if not 0.0 <= load <= MAX_MASS:
+        raise ModelError(f"payload is {load}; it must be a mass of 0 kg or more, to {MAX_MASS:g}")
     now = link_points(arm, arm_angles(arm, joint_angles))
     stowed = link_points(arm, np.asarray(arm.stowed, dtype=float))
     for k, link_mass in enumerate(arm.link_masses):
@@ -153,7 +154,7 @@ def pack_tool(
 
 
 def as_vector(name: str, given: ArrayLike) -> np.ndarray:
-    """Return a vector (3,) of finite numbers.
+    """Return a vector (3,) of finite numbers, each of at most MAX_FORCE.
 
     Raises:
         ModelError: Anything else; the text says `name`.
@@ -164,6 +165,10 @@ def as_vector(name: str, given: ArrayLike) -> np.ndarray:
         raise ModelError(f"{name} is {given!r}; it must be three numbers x, y, z") from error
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise ModelError(f"{name} is {given!r}; it must be three finite numbers x, y, z")
+    if np.abs(vector).max() > MAX_FORCE:
+        raise ModelError(
+            f"{name} is {vector.tolist()}; each must be within {-MAX_FORCE:g} to {MAX_FORCE:g}"
+        )
     return vector
 
 

@@ -5,8 +5,6 @@ from typing import Annotated
 
 from rover_physics.files.rules import (
     Keys,
-    Metres,
-    Point,
     Radians,
     Rule,
     Text,
@@ -15,16 +13,41 @@ from rover_physics.files.rules import (
     number,
 )
 from rover_physics.names import WHEEL_POSITIONS
+from rover_physics.numerics.plausible import (
+    MAX_COORDINATE,
+    MAX_FRICTION,
+    MAX_GRAVITY,
+    MAX_LENGTH,
+    MAX_MASS,
+    MAX_SPEED,
+    MAX_TORQUE,
+    MIN_FRICTION,
+    MIN_GRAVITY,
+    MIN_LENGTH,
+    MIN_SPEED,
+    MIN_TORQUE,
+)
 
+Metres = Annotated[float, number("m", least=-MAX_LENGTH, most=MAX_LENGTH)]
+Point = Annotated[
+    tuple[Metres, Metres, Metres],
+    Rule(
+        "a list of 3 numbers in m, [x, y, z] in the body frame, each from "
+        f"{-MAX_LENGTH:g} to {MAX_LENGTH:g}"
+    ),
+]
+"""A position on the rover in [m]."""
+Size = Annotated[float, number("m", least=MIN_LENGTH, most=MAX_LENGTH)]
+Speed = Annotated[float, number("m/s", least=MIN_SPEED, most=MAX_SPEED)]
 Angles = Annotated[tuple[Radians, Radians], interval("rad")]
 Edges = Annotated[tuple[Metres, Metres], interval("m")]
-Mass = Annotated[float, number("kg", least=0.0)]
+Mass = Annotated[float, number("kg", least=0.0, most=MAX_MASS)]
 Share = Annotated[float, number("", above=0.0, most=1.0)]
 
 
 def _is_arm(lengths: tuple[float, float, float]) -> bool:
     """Return whether three lengths are valid for column, upper arm and forearm."""
-    return min(lengths) >= 0.0 and lengths[1] + lengths[2] > 0.0
+    return min(lengths) >= 0.0 and lengths[1] + lengths[2] >= MIN_LENGTH
 
 
 def _are_names(texts: tuple[str, ...]) -> bool:
@@ -36,15 +59,15 @@ def _are_names(texts: tuple[str, ...]) -> bool:
 class Wheel:
     """One wheel with its drive; all six are the same."""
 
-    radius: Annotated[float, number("m", above=0.0)]
+    radius: Size
     """Radius in [m]."""
-    width: Annotated[float, number("m", above=0.0)]
+    width: Size
     """Width of the tread in [m]."""
     mass: Mass
     """Mass with drive in [kg]."""
-    max_torque: Annotated[float, number("N m", above=0.0)]
+    max_torque: Annotated[float, number("N m", least=MIN_TORQUE, most=MAX_TORQUE)]
     """Largest torque of the drive in [N m]."""
-    max_speed: Annotated[float, number("rad/s", above=0.0)]
+    max_speed: Annotated[float, number("rad/s", least=MIN_SPEED, most=MAX_SPEED)]
     """Largest speed of the drive in [rad/s]."""
 
 
@@ -117,9 +140,9 @@ class Limits:
     """Largest friction utilisation of a wheel."""
     torque_saturation: Share
     """Largest torque saturation of a wheel: |torque| over the drive's largest torque."""
-    belly_clearance: Annotated[float, number("m", least=0.0)]
+    belly_clearance: Annotated[float, number("m", least=0.0, most=MAX_COORDINATE)]
     """Smallest height of the belly over the ground in [m]."""
-    wheel_drop: Annotated[float, number("m", least=0.0)]
+    wheel_drop: Annotated[float, number("m", least=0.0, most=MAX_COORDINATE)]
     """Largest height that a wheel may drop when it rolls off an edge in [m]."""
 
 
@@ -164,7 +187,7 @@ class Rover:
 
     name: Text
     """Name of the rover."""
-    gravity: Annotated[float, number("m/s^2", above=0.0)]
+    gravity: Annotated[float, number("m/s^2", least=MIN_GRAVITY, most=MAX_GRAVITY)]
     """Acceleration of gravity in [m/s^2]."""
     wheel: Wheel
     """Each of the six wheels."""
@@ -174,9 +197,9 @@ class Rover:
     """Body, rockers and bogies."""
     belly: Belly
     """Underside of the body, for its clearance."""
-    friction: Annotated[float, number("", above=0.0)]
+    friction: Annotated[float, number("", least=MIN_FRICTION, most=MAX_FRICTION)]
     """Coulomb friction coefficient where the terrain has none."""
-    nominal_speed: Annotated[float, number("m/s", above=0.0)]
+    nominal_speed: Speed
     """Driving speed in [m/s]."""
     limits: Limits
     """Safety limits."""

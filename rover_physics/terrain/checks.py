@@ -10,12 +10,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.errors import TerrainError
 from rover_physics.files.validation import describe
+from rover_physics.numerics.plausible import (
+    MAX_COORDINATE,
+    MAX_FRICTION,
+    MAX_RESOLUTION,
+    MIN_FRICTION,
+    MIN_RESOLUTION,
+)
 
 
 def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
     """Return heights (ny, nx) [m]; at least one must be known."""
-    elevation = _as_grid("elevation", values)
-    if not np.isfinite(elevation).any():
+    elevation = _as_grid("elevation", values, MAX_COORDINATE)
+    if np.isnan(elevation).all():
         ny, nx = elevation.shape
         raise TerrainError(
             f"elevation has no known cell: all {ny} x {nx} are NaN; at least one must be known"
@@ -25,9 +32,10 @@ def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
 
 def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return friction coefficients (ny, nx), each above 0 or NaN."""
-    friction = _as_grid("friction", values)
+    friction = _as_grid("friction", values, MAX_FRICTION)
     _check_shape("friction", friction, elevation)
-    _refuse_first(friction, friction <= 0.0, "friction", "above 0, or NaN for the default")
+    must = f"above 0, at least {MIN_FRICTION:g}, or NaN for the default"
+    _refuse_first(friction, friction < MIN_FRICTION, "friction", must)
     return friction
 
 
@@ -64,7 +72,7 @@ def as_soil_names(values: Any) -> tuple[str, ...]:
 
 def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return standard deviations (ny, nx) [m], at least 0 and known where the height is known."""
-    std = _as_grid("elevation_std", values)
+    std = _as_grid("elevation_std", values, MAX_COORDINATE)
     _check_shape("elevation_std", std, elevation)
     _refuse_first(std, std < 0.0, "elevation_std", "at least 0")
     missing = np.isnan(std) & np.isfinite(elevation)
@@ -73,31 +81,36 @@ def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArr
 
 
 def as_resolution(value: Any) -> float:
-    """Return the cell size [m] as a float above 0."""
+    """Return the cell size [m] as a float from MIN_RESOLUTION to MAX_RESOLUTION."""
     number = np.asarray(value)
     if number.dtype.kind in "fiu" and number.size == 1:
         resolution = float(number.reshape(()))
-        if np.isfinite(resolution) and resolution > 0.0:
+        if MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
             return resolution
-    raise TerrainError(f"resolution is {value!s:.60}; it must be one number above 0 in m")
+    raise TerrainError(
+        f"resolution is {value!s:.60}; it must be one number above 0 in m, from "
+        f"{MIN_RESOLUTION:g} to {MAX_RESOLUTION:g}"
+    )
 
 
 def as_origin(value: Any) -> tuple[float, float]:
-    """Return the origin (x, y) [m] as two finite floats."""
+    """Return the origin (x, y) [m] as two floats within MAX_COORDINATE."""
     try:
         point = np.asarray(value)
     except ValueError:
         point = np.empty(0)
-    if point.dtype.kind in "fiu" and point.shape == (2,) and np.isfinite(point).all():
-        return (float(point[0]), float(point[1]))
+    if point.dtype.kind in "fiu" and point.shape == (2,):
+        x, y = float(point[0]), float(point[1])
+        if abs(x) <= MAX_COORDINATE and abs(y) <= MAX_COORDINATE:
+            return (x, y)
     raise TerrainError(
         f"origin is {value!s:.60}; it must be two numbers in m, x and y of the centre of cell "
-        "[0, 0]"
+        f"[0, 0], within {MAX_COORDINATE:g}"
     )
 
 
-def _as_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return a grid as C-contiguous float64 after checking type, shape and infinities."""
+def _as_grid(name: str, values: ArrayLike, largest: float) -> NDArray[np.float64]:
+    """Return a grid as C-contiguous float64 after checking type, shape and largest value."""
     grid = np.asarray(values)
     if grid.dtype.kind not in "fiu":
         raise TerrainError(f"{name} has type {grid.dtype}; it must be an array of numbers")
@@ -106,7 +119,8 @@ def _as_grid(name: str, values: ArrayLike) -> NDArray[np.float64]:
             f"{name} has shape {grid.shape}; it must be (ny, nx), at least 2 rows and 2 columns"
         )
     grid = np.ascontiguousarray(grid, dtype=np.float64)
-    _refuse_first(grid, np.isinf(grid), name, "finite, or NaN where unknown")
+    must = f"finite and within {largest:g}, or NaN where unknown"
+    _refuse_first(grid, np.abs(grid) > largest, name, must)
     return grid
 
 

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus
+from rover_physics.traversability.limit_checks import NOT_COMPUTABLE
 from rover_physics.traversability.verdict import Verdict, find_reasons
 
 _UNBOUNDED = {
@@ -43,9 +45,15 @@ def judge_bounds(
         if not codes[i] and status in _UNBOUNDED:
             codes[i], what = _UNBOUNDED[status]
             reasons[i] = f"{what} {within}"
-    first: int = next((k for k, code in enumerate(codes) if code), -1)
     falls = np.asarray(prediction.falling.any(axis=1))
     needed = bounds.bounded & ~falls
+    for name in BOUNDED_VALUES:
+        values = getattr(bounds, name).reshape(len(needed), -1)
+        for i in np.flatnonzero(needed & np.isnan(values).any(axis=1)).tolist():
+            if not codes[i]:
+                codes[i] = NOT_COMPUTABLE
+                reasons[i] = f"{name} cannot be computed {within}: a bound is not a number"
+    first: int = next((k for k, code in enumerate(codes) if code), -1)
     return replace(
         verdict,
         traversable=first < 0,

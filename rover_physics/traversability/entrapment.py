@@ -36,6 +36,8 @@ DROP = 0.1
 """Drop of a wheel [wheel radii] above which the way back is checked."""
 RUN_UP = 1.0
 """Distance [wheelbases] before the first place that needs a check where the way back ends."""
+MAX_WAY_POSES = 5000
+"""Largest number of poses of a way on; poses of a path may be arbitrarily close together."""
 UNKNOWN_CODES = ("off_map", "unknown_ground")
 """Codes that close a way on only within LOOK_AHEAD wheelbases; farther ground may be open."""
 
@@ -104,8 +106,9 @@ def _resists_way_back(
     most = options.max_torque or rover.wheel.max_torque
     saturation = rover.wheel.radius * np.abs(T + R) / most
     limits = rover.limits
-    broken[wheels] = (use > limits.friction_utilisation + TOLERANCE) | (
-        saturation > limits.torque_saturation + TOLERANCE
+    broken[wheels] = ~(
+        (use <= limits.friction_utilisation + TOLERANCE)
+        & (saturation <= limits.torque_saturation + TOLERANCE)
     )
     return np.asarray(broken.any(axis=1))
 
@@ -145,7 +148,7 @@ def _find_way_on(
     if inside > wheelbase:
         behind = prediction.distance[stop] + 0.5 * wheelbase
         starts.append(int(np.searchsorted(prediction.distance, behind)))
-    spacing = _spacing(prediction)
+    spacing = max(_spacing(prediction), length / MAX_WAY_POSES)
     closed = ""
     for start in starts:
         for poses in _ways_ahead(prediction.poses[start], wheelbase, length, spacing, options):

@@ -10,12 +10,17 @@ from rover_physics.names import SIDES, WHEELS
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 
+NOT_COMPUTABLE = "not_computable"
+"""Code of a value that is not a number; it counts as a broken limit."""
 TOLERANCE = 1e-9
 """Excess over a limit, in its unit, that counts as rounding."""
 
 
 class Check(NamedTuple):
-    """Comparison of one limit with all waypoints of a prediction."""
+    """Comparison of one limit with all waypoints of a prediction.
+
+    A value that is NaN breaks its limit.
+    """
 
     code: str
     """Code of the limit in a verdict."""
@@ -32,6 +37,16 @@ class Check(NamedTuple):
     """Returns the index of the wheel concerned, (n,), -1 for none."""
     describe: Callable[[int], str]
     """Returns the reason of a waypoint, with value and limit."""
+    values: np.ndarray
+    """(n, ...) the values that are compared."""
+    if_nan: tuple[str, str]
+    """Code and reason of a waypoint where a value is NaN."""
+
+    def explain(self, row: int) -> tuple[str, str]:
+        """Return code and reason of a waypoint where the limit is broken."""
+        if np.isnan(self.values[row]).any():
+            return self.if_nan
+        return self.code, self.describe(row)
 
 
 def tilt_of(prediction: PathPrediction) -> np.ndarray:
@@ -66,6 +81,26 @@ def smallest_of(values: np.ndarray) -> float:
     return float(np.fmin.reduce(values, axis=None)) if values.size else np.nan
 
 
+def _no_number(quantity: str) -> tuple[str, str]:
+    return NOT_COMPUTABLE, f"{quantity} cannot be computed: it is not a number"
+
+
+def _largest_and_sure(values: np.ndarray) -> tuple[float, bool]:
+    """Return `largest_of` the values, and whether none of them is NaN."""
+    if not values.size:
+        return np.nan, True
+    largest = float(np.maximum.reduce(values, axis=None))
+    return (largest, True) if largest == largest else (largest_of(values), False)
+
+
+def _smallest_and_sure(values: np.ndarray) -> tuple[float, bool]:
+    """Return `smallest_of` the values, and whether none of them is NaN."""
+    if not values.size:
+        return np.nan, True
+    smallest = float(np.minimum.reduce(values, axis=None))
+    return (smallest, True) if smallest == smallest else (smallest_of(values), False)
+
+
 def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
     """Return the checks of a prediction, in the order in which they become reasons."""
     return [
@@ -84,8 +119,9 @@ def check_limits(rover: Rover, prediction: PathPrediction) -> list[Check]:
 def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
     rocker, bogie = prediction.rocker_angle, prediction.bogie_angle
     limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
-    breaks = any(
-        smallest_of(angle) < least - TOLERANCE or largest_of(angle) > most + TOLERANCE
+    breaks = bool(rocker.size) and not all(
+        np.minimum.reduce(angle, axis=None) >= least - TOLERANCE
+        and np.maximum.reduce(angle, axis=None) <= most + TOLERANCE
         for angle, (least, most) in zip((rocker, bogie), limits, strict=True)
     )
 
@@ -95,7 +131,7 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
 
     def beyond() -> np.ndarray:
         joints, low, high = joints_and_limits()
-        return (joints < low - TOLERANCE) | (joints > high + TOLERANCE)
+        return ~((joints >= low - TOLERANCE) & (joints <= high + TOLERANCE))
 
     def margins() -> np.ndarray:
         joints, low, high = joints_and_limits()
@@ -117,12 +153,14 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
         margins,
         _no_wheel(rocker),
         describe,
+        np.hstack([rocker, bogie]) if breaks else rocker,
+        _no_number("suspension angle"),
     )
 
 
 def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
     tilt, limit = tilt_of(prediction), np.degrees(rover.limits.tilt)
-    extreme = largest_of(tilt)
+    extreme, sure = _largest_and_sure(tilt)
 
     def describe(i: int) -> str:
         return f"tilt {compare(np.degrees(tilt[i]), limit, 1, ' deg')}"
@@ -130,11 +168,13 @@ def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
     return Check(
         "tilt",
         extreme,
-        bool(np.degrees(extreme) > limit + TOLERANCE),
-        lambda: np.degrees(tilt) > limit + TOLERANCE,
+        not sure or bool(np.degrees(extreme) > limit + TOLERANCE),
+        lambda: ~(np.degrees(tilt) <= limit + TOLERANCE),
         lambda: _share_left(np.degrees(tilt), limit),
         _no_wheel(tilt),
         describe,
+        tilt,
+        _no_number("tilt"),
     )
 
 
@@ -144,7 +184,7 @@ def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"tip-over ratio {compare(ratio[i], limit, 2)}"
 
-    return _check_lower("tip_over", ratio, limit, describe)
+    return _check_lower("tip_over", ratio, limit, describe, _no_number("tip-over ratio"))
 
 
 def _check_wheel_lift(prediction: PathPrediction) -> Check:
@@ -161,15 +201,17 @@ def _check_wheel_lift(prediction: PathPrediction) -> Check:
         share = loads.min(axis=1) / np.maximum(loads.sum(axis=1) / 6.0, TOLERANCE)
         return np.asarray(share)
 
-    least = smallest_of(loads)
+    least, sure = _smallest_and_sure(loads)
     return Check(
         "wheel_lift",
         least,
-        least < 0.0,
-        lambda: np.any(loads < 0.0, axis=1),
+        not sure or least < 0.0,
+        lambda: ~np.all(loads >= 0.0, axis=1),
         margins,
         lambda: np.argmin(loads, axis=1),
         describe,
+        loads,
+        _no_number("wheel load"),
     )
 
 
@@ -204,15 +246,17 @@ def _check_wheels(
         wheel = int(np.argmax(values[i]))
         return f"{WHEELS[wheel]} {words} {compare(values[i, wheel], limit, digits, unit)}"
 
-    extreme = largest_of(values)
+    extreme, sure = _largest_and_sure(values)
     return Check(
         code,
         extreme,
-        extreme > limit + TOLERANCE,
-        lambda: np.any(values > limit + TOLERANCE, axis=1),
+        not sure or extreme > limit + TOLERANCE,
+        lambda: ~np.all(values <= limit + TOLERANCE, axis=1),
         lambda: _share_left(np.max(values, axis=1), limit),
         lambda: np.argmax(values, axis=1),
         describe,
+        values,
+        _no_number(f"{code.replace('_', ' ')} of a wheel"),
     )
 
 
@@ -222,19 +266,26 @@ def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"belly clearance {compare(clearance[i], limit, 3, ' m')}"
 
-    return _check_lower("belly", clearance, limit, describe)
+    unknown = "unknown_ground", "unknown ground under the whole belly"
+    return _check_lower("belly", clearance, limit, describe, unknown)
 
 
 def _check_lower(
-    code: str, values: np.ndarray, limit: float, describe: Callable[[int], str]
+    code: str,
+    values: np.ndarray,
+    limit: float,
+    describe: Callable[[int], str],
+    if_nan: tuple[str, str],
 ) -> Check:
-    extreme = smallest_of(values)
+    extreme, sure = _smallest_and_sure(values)
     return Check(
         code,
         extreme,
-        extreme < limit - TOLERANCE,
-        lambda: values < limit - TOLERANCE,
+        not sure or extreme < limit - TOLERANCE,
+        lambda: ~(values >= limit - TOLERANCE),
         lambda: -_share_left(values, limit),
         _no_wheel(values),
         describe,
+        values,
+        if_nan,
     )

@@ -9,13 +9,14 @@ from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.limit_checks import check_limits, largest_of
+from rover_physics.traversability.limit_checks import NOT_COMPUTABLE, check_limits, largest_of
 
 CODES = (
     "off_map",
     "unknown_ground",
     "not_settled",
     "no_equilibrium",
+    "not_computable",
     "suspension",
     "tilt",
     "tip_over",
@@ -42,6 +43,10 @@ _PLACELESS = {
     PoseStatus.NO_EQUILIBRIUM: (
         "no_equilibrium",
         "the wheel loads are not determined in this configuration",
+    ),
+    PoseStatus.NOT_COMPUTABLE: (
+        NOT_COMPUTABLE,
+        "a wheel load, torque or margin cannot be computed: it is not a finite number",
     ),
 }
 
@@ -155,15 +160,16 @@ def _hold_against_limits(
         row: _PLACELESS[PoseStatus(prediction.status[row])]
         for row in np.flatnonzero(prediction.status != PoseStatus.SETTLED).tolist()
     }
+    settled = prediction.settled
     checks = check_limits(rover, prediction)
     extremes = {check.code: check.extreme for check in checks}
     needed = _where_forces_count(prediction)
     for check in checks:
         if check.breaks:
             counts = needed if check.code in UNNEEDED_IN_A_FALL else True
-            for row in np.flatnonzero(check.broken() & counts).tolist():
+            for row in np.flatnonzero(check.broken() & settled & counts).tolist():
                 if row not in found:
-                    found[row] = check.code, check.describe(row)
+                    found[row] = check.explain(row)
     if needed is not True:
         extremes["friction"] = largest_of(prediction.friction_utilisation[needed])
         extremes["torque"] = largest_of(prediction.torque_saturation[needed])

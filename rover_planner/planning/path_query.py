@@ -1,5 +1,6 @@
 """Judges candidate paths between two poses, compares risk and energy, and explains the choice."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -202,11 +203,15 @@ def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
 
 
 def path_cost(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> tuple[float, float]:
-    """Return the cost of a path: its risk in steps of RISK_STEP, and its energy [J]."""
+    """Return the cost of a path: its risk in steps of RISK_STEP, and its energy [J].
+
+    Both are infinite if the path is not traversable or one of them is not a number.
+    """
     if not verdict.traversable:
         return (np.inf, np.inf)
     risk = np.floor(path_risk(rover, verdict) / RISK_STEP + 0.5) * RISK_STEP
-    return (float(risk), float(prediction.energy[-1]))
+    cost = (float(risk), float(prediction.energy[-1]))
+    return (np.inf, np.inf) if math.isnan(sum(cost)) else cost
 
 
 def path_risk(rover: Rover, verdict: Verdict) -> float:
