@@ -29,6 +29,7 @@ from msg_adapters.gridding import (
     typical_spacing,
 )
 from rover_physics.numerics.plausible import MAX_RESOLUTION, MIN_RESOLUTION
+from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 
@@ -75,7 +76,7 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 
 
-@np.errstate(all="ignore")
+@quiet
 def terrain_from_point_cloud(
     cloud: PointCloud2,
     resolution: float = 0.0,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.arrays import SingleFloats
 from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.evaluation import effort, evaluate_pose, new_works, set_pose
@@ -52,6 +53,7 @@ class PoseScores:
     def __post_init__(self) -> None:
         freeze_fields(self)
 
+    @quiet
     def within_limits(self, rover: Rover) -> NDArray[np.bool_]:
         """Return True where the rover keeps its limits, sinkage and suspension not checked."""
         limits = rover.limits
@@ -60,6 +62,7 @@ class PoseScores:
             & (self.friction_utilisation <= limits.friction_utilisation)
             & (self.torque_saturation <= limits.torque_saturation)
             & (self.least_load >= 0.0)
+            & (self.least_load < np.inf)
             & (self.tip_over_ratio >= limits.tip_over_ratio)
             & (self.tilt <= limits.tilt)
             & (self.belly_clearance >= limits.belly_clearance)

@@ -9,12 +9,14 @@ import numpy as np
 from rover_physics.contact.wheel_samples import sample_wheel
 from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
+from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.records import new_record, shared_array_of
 from rover_physics.prediction.evaluation import MODEL, SETTINGS, find_tip_over, new_work
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com, pack_tool
 from rover_physics.rover.model import Rover
+from rover_physics.rover.plausible import check_plausible
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import Ground, pack_ground, with_soils
 
@@ -45,13 +47,15 @@ class PackedModel:
         return self.record.settings
 
 
+@quiet
 def pack_model(
     rover: Rover, terrain: Terrain, options: SweepOptions = DEFAULT_OPTIONS
 ) -> PackedModel:
     """Check rover, terrain and options and pack them for the kernels; the last 8 are cached.
 
     Raises:
-        ModelError: An option that this rover cannot have, such as a payload without an arm.
+        ModelError: An option that this rover cannot have, such as a payload without an arm, or a
+            rover with an implausible number.
         SoilError: A soil of the terrain, or `options.soil`, that is not a preset.
     """
     return _pack_model(_SameRover(rover), terrain, options)
@@ -88,6 +92,7 @@ def _pack_request(
 ) -> tuple[Any, Any, Any]:
     """Return LINKAGE, WHEEL_SAMPLES and SETTINGS, cached."""
     rover, angles = same.rover, options.arm_angles
+    check_plausible(rover)
     mu = rover.friction if options.friction is None else options.friction
     torque = rover.wheel.max_torque if options.max_torque is None else options.max_torque
     mass, com = body_mass_and_com(rover, angles, options.payload)

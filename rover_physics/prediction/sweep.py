@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.errors import PoseError
 from rover_physics.numerics.plausible import MAX_COORDINATE
+from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, find_crossings
 from rover_physics.prediction.drops import find_falls
@@ -48,6 +49,7 @@ def sweep_path(
     return sweep_paths(rover, terrain, [poses], options)[0]
 
 
+@quiet
 def sweep_paths(
     rover: Rover,
     terrain: Terrain,

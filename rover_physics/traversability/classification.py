@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, OPTIMAL, TORQUE_POLICIES, WHEELS
+from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
@@ -73,6 +74,7 @@ def classify_path(
     return classify_judged(rover, terrain, *judged, equal, sigmas=sigmas)
 
 
+@quiet
 def classify_judged(
     rover: Rover,
     terrain: Terrain,

@@ -6,6 +6,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
+from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -49,6 +50,7 @@ def judge_path(
     return judge_paths(rover, terrain, [poses], options, sigmas=sigmas)[0]
 
 
+@quiet
 def judge_paths(
     rover: Rover,
     terrain: Terrain,

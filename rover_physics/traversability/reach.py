@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.numerics.plain_values import to_plain
+from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import check_poses, sweep_path
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -70,6 +71,7 @@ class ReachAnswer:
         return to_plain(answer)
 
 
+@quiet
 def judge_reach(
     rover: Rover,
     terrain: Terrain,

@@ -1,0 +1,1 @@
+"""Throws malformed and hostile inputs at adapters, services and running nodes: `make fuzz`."""

@@ -1,0 +1,266 @@
+"""Nothing passes on NaN: a path is traversable only if all that decides it is a number."""
+
+import math
+from dataclasses import fields, is_dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rover_physics.errors import ModelError, RoverError
+from rover_physics.names import EQUAL, OPTIMAL
+from rover_physics.prediction.evaluation import evaluate, new_works
+from rover_physics.prediction.map_sweep import NUMBERS as NUMBERS_OF_SCORE
+from rover_physics.prediction.map_sweep import PoseScores, score_all, score_poses
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_file import load_rover, rover_from_dict
+from rover_physics.status import PoseStatus
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.bounded_verdict import judge_bounds
+from rover_physics.traversability.classification import classify_path
+from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.reach import judge_reach
+from rover_physics.traversability.torque_ranges import find_torque_ranges
+from rover_physics.traversability.verdict import judge
+from rover_planner.planning.path_query import path_cost
+from rover_planner.studies.rover_values import rover_to_dict
+from support.rough_grounds import plane
+
+LSR1 = load_rover("lsr1")
+POSES = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
+LEVEL = plane(0.0, 0.0)
+DECISIVE = (
+    "roll", "pitch", "rocker_angle", "bogie_angle", "wheel_loads", "friction_utilisation",
+    "torque_saturation", "tip_over_ratio", "belly_clearance",
+)  # fmt: skip
+EXTREMES = (
+    0.0, 5e-324, 1e-310, 1e-300, 1e-155, 1e-20, 1e-9, 1e-6, 1e-3, 0.1, 10.0, 1e3, 1e6, 1e9, 1e20,
+    1e154, 1e155, 1e300, 1.7e308, math.inf, math.nan,
+)  # fmt: skip
+
+
+def numbers_of(value, place=()):
+    """Yield the places of the numbers in nested dataclasses, dicts and tuples."""
+    if is_dataclass(value):
+        for field in fields(value):
+            yield from numbers_of(getattr(value, field.name), (*place, field.name))
+    elif isinstance(value, dict):
+        for name, inner in value.items():
+            yield from numbers_of(inner, (*place, name))
+    elif isinstance(value, tuple):
+        for k, inner in enumerate(value):
+            yield from numbers_of(inner, (*place, k))
+    elif isinstance(value, float):
+        yield place
+
+
+def with_number(value, place, number):
+    """Return a copy with another number at a place; no check of a rover file is made."""
+    if not place:
+        return number
+    inner = place[0]
+    if is_dataclass(value):
+        changed = with_number(getattr(value, inner), place[1:], number)
+        return replace(value, **{inner: changed})
+    items = dict(value) if isinstance(value, dict) else list(value)
+    items[inner] = with_number(items[inner], place[1:], number)
+    return items if isinstance(value, dict) else tuple(items)
+
+
+NUMBERS = sorted(numbers_of(LSR1), key=str)
+
+
+def assert_computed(prediction, verdict):
+    """Check that a traversable path has numbers only."""
+    assert not verdict.traversable or all(
+        not np.isnan(getattr(prediction, name)).any() and np.isfinite(prediction.wheel_loads).all()
+        for name in DECISIVE
+    )
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    places=st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=3),
+    number=st.sampled_from(EXTREMES),
+    sign=st.sampled_from((1.0, 1.0, -1.0)),
+    policy=st.sampled_from((EQUAL, OPTIMAL)),
+)
+def test_no_rover_of_extreme_numbers_passes_without_numbers(places, number, sign, policy):
+    rover = LSR1
+    for place in places:
+        rover = with_number(rover, place, sign * number)
+    try:
+        prediction, verdict = judge_path(rover, LEVEL, POSES, SweepOptions(policy=policy))
+    except RoverError:
+        return
+    assert_computed(prediction, verdict)
+    scores = score_poses(rover, LEVEL, POSES, SweepOptions(policy=policy))
+    assert not (scores.within_limits(rover) & ~np.isfinite(scores.least_load)).any()
+
+
+@pytest.mark.parametrize(
+    ("place", "number", "right"),
+    [
+        (("masses", "body", "mass"), 1.7e308, r"masses.body.mass is 1.7e\+308; .* to 1e\+09"),
+        (("gravity",), 1e-310, "gravity is 1e-310; it must be from 1e-06 to 1000"),
+        (("gravity",), 1e308, "gravity is 1e.308; it must be from 1e-06 to 1000"),
+        (("wheel", "radius"), -1e200, "wheel.radius is -1e.200; it must be from 0.001"),
+        (("wheel", "width"), math.nan, "wheel.width is nan"),
+        (("wheel", "max_torque"), 5e-324, "wheel.max_torque is 5e-324"),
+        (("friction",), 5e-324, "friction is 5e-324; it must be from 1e-06"),
+    ],
+)
+@pytest.mark.parametrize("policy", [EQUAL, OPTIMAL])
+def test_an_impossible_rover_is_refused_by_name_even_without_a_file(place, number, right, policy):
+    rover, options = with_number(LSR1, place, number), SweepOptions(policy=policy)
+    for ask in (judge_path, score_poses, classify_path, find_torque_ranges):
+        with pytest.raises(ModelError, match=right):
+            ask(rover, LEVEL, POSES, options)
+
+
+def model_of_infinite_weight():
+    """Return a model that no check has seen."""
+    model = pack_model(LSR1, LEVEL)
+    records = model.records.copy()
+    records["linkage"]["gravity"] = math.inf
+    return replace(model, records=records)
+
+
+def test_a_pose_without_numbers_says_so_and_has_none():
+    results = evaluate(model_of_infinite_weight().records, POSES)
+    assert (results["status"] == PoseStatus.NOT_COMPUTABLE).all()
+    for name in set(results.dtype.names) - {"status"}:
+        assert np.isnan(results[name]).all(), name
+
+
+def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
+    model = model_of_infinite_weight()
+    status, numbers = np.empty(5, np.int8), np.zeros((NUMBERS_OF_SCORE, 5), np.float32)
+    score_all(model.records, POSES, new_works(1, 5), status, numbers)
+    assert not PoseScores(status, *numbers).within_limits(LSR1).any()
+    fine = sweep_path(LSR1, LEVEL, POSES)
+    unsettled = replace(fine, status=status, settled=status == PoseStatus.SETTLED)
+    verdict = judge(LSR1, unsettled)
+    assert verdict.code == "not_computable" and "not a finite number" in verdict.reason
+
+
+@pytest.mark.parametrize("payload", [1e308, 1e200, 1.1e9, math.inf, math.nan])
+def test_an_impossible_payload_is_refused_with_what_would_be_right(payload):
+    with pytest.raises(RoverError, match=r"payload is .*0 kg or more, to 1e\+09"):
+        judge_path(LSR1, LEVEL, POSES, SweepOptions(payload=payload))
+
+
+@pytest.mark.parametrize("name", DECISIVE)
+def test_a_nan_breaks_each_limit_and_names_the_quantity(name):
+    prediction = sweep_path(LSR1, LEVEL, POSES)
+    values = getattr(prediction, name).copy()
+    values.reshape(len(POSES), -1)[3, -1] = math.nan
+    verdict = judge(LSR1, replace(prediction, **{name: values}))
+    assert not verdict.traversable and verdict.first_failure == 3
+    if name == "belly_clearance":
+        assert verdict.code == "unknown_ground"
+        assert verdict.reason == "unknown ground under the whole belly"
+    else:
+        assert verdict.code == "not_computable" and "cannot be computed" in verdict.reason
+
+
+def test_a_bound_that_is_no_number_is_a_refusal():
+    ground = replace(LEVEL, elevation_std=np.full(LEVEL.elevation.shape, 1e-4))
+    prediction, verdict = judge_path(LSR1, ground, POSES)
+    assert verdict.traversable and prediction.bounds is not None
+    loads = prediction.bounds.wheel_loads.copy()
+    loads[2, 4, 0] = math.nan
+    bounds = replace(prediction.bounds, wheel_loads=loads)
+    worst = judge_bounds(LSR1, prediction, bounds, verdict)
+    assert (worst.first_failure, worst.code) == (2, "not_computable")
+    assert "wheel_loads" in worst.reason and "3 sigma" in worst.reason
+
+
+def test_ground_unknown_under_the_whole_belly_is_refused():
+    elevation = np.zeros((121, 121))
+    elevation[:, 60] = elevation[60, :] = 0.0
+    elevation[57:64] = math.nan  # the wheels' tracks at y = -0.31 and 0.31 m stay known
+    ground = Terrain(elevation, 0.05, (-3.0, -3.0))
+    narrow = replace(LSR1, belly=replace(LSR1.belly, y=(-0.1, 0.1)))
+    verdict = judge_path(narrow, ground, POSES)[1]
+    assert verdict.code == "unknown_ground" and "belly" in verdict.reason
+
+
+def test_a_path_of_unknown_energy_costs_more_than_any_other():
+    prediction, verdict = judge_path(LSR1, LEVEL, POSES)
+    unknown = replace(prediction, energy=np.full(len(POSES), math.nan))
+    assert path_cost(LSR1, unknown, verdict) == (math.inf, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "right"),
+    [
+        ("gravity", 1e-300, "at least 1e-06 and at most 1000 in m/s^2"),
+        ("gravity", 1e5, "at most 1000 in m/s^2"),
+        ("masses.body.mass", 1.7e308, "at most 1e+09 in kg"),
+        ("wheel.radius", 1e-9, "at least 0.001 and at most 1000 in m"),
+        ("wheel.width", 1e9, "at most 1000 in m"),
+        ("wheel.max_torque", 1e-300, "at least 1e-09"),
+        ("wheel.max_speed", 1e300, "at most 1e+06"),
+        ("nominal_speed", 1e-300, "at least 1e-09"),
+        ("friction", 1e-300, "at least 1e-06"),
+        ("suspension.bogie_pivot", [1e200, 0.3, 0.0], "each from -1000 to 1000"),
+        ("manipulator.payload", 1e308, "at most 1e+09 in kg"),
+    ],
+)
+def test_an_implausible_number_of_a_rover_file_is_named(key, value, right):
+    data = rover_to_dict(LSR1)
+    *inner, last = key.split(".")
+    part = data
+    for name in inner:
+        part = part[name]
+    part[last] = value
+    with pytest.raises(RoverError) as raised:
+        rover_from_dict(data, "test")
+    assert str(raised.value).startswith(f"test: {key} is ") and right in str(raised.value)
+
+
+@pytest.mark.parametrize("gravity", [5.8e-5, 3.5e-4, 1.62, 3.71, 9.81, 24.8])
+def test_bodies_from_bennu_to_jupiter_keep_their_gravity(gravity):
+    data = rover_to_dict(LSR1)
+    data["gravity"] = gravity
+    verdict = judge_path(rover_from_dict(data, "test"), LEVEL, POSES)[1]
+    assert verdict.code == ("" if gravity < 20.0 else verdict.code)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    values=st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=6, max_size=6),
+)
+def test_no_target_or_load_of_the_arm_passes_without_numbers(values):
+    try:
+        answer = judge_reach(LSR1, LEVEL, POSES[0], values[:3], force=values[3:])
+    except RoverError:
+        return
+    if answer.possible:
+        assert answer.prediction is not None
+        assert np.isfinite(answer.prediction.wheel_loads).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    x=st.floats(),
+    y=st.floats(),
+    yaw=st.floats(),
+    height=st.floats(),
+    friction=st.floats(),
+    resolution=st.floats(),
+)
+def test_no_ground_or_pose_passes_without_numbers(x, y, yaw, height, friction, resolution):
+    shape = (41, 41)
+    try:
+        ground = Terrain(
+            np.full(shape, height), resolution, (x, y), friction=np.full(shape, friction)
+        )
+        prediction, verdict = judge_path(LSR1, ground, [[x + 1.0, y + 1.0, yaw]])
+    except RoverError:
+        return
+    assert_computed(prediction, verdict)
