@@ -4,6 +4,7 @@ import argparse
 import sys
 
 from benchmarks.fuzz.inside import fuzz_inside
+from benchmarks.fuzz.over_dds import fuzz_over_dds
 
 
 def main() -> int:
@@ -18,6 +19,10 @@ def main() -> int:
     if words.where != "dds":
         tally = fuzz_inside(words.seed, words.count // shares)
         tally.show("adapters and services in this process")
+        defects += len(tally.defects)
+    if words.where != "inside":
+        tally = fuzz_over_dds(words.seed, words.count - words.count // 2 * (shares - 1))
+        tally.show("running nodes over DDS")
         defects += len(tally.defects)
     return 1 if defects else 0
 

@@ -37,6 +37,8 @@ SERVER_PARAMETERS = (
     "cell_height", "unknown_cells", "max_gap", "map_sigmas", "terrain_file",
     "suspension_tolerance", "use_sim_time", "no_such_parameter", "",
 )  # fmt: skip
+EDGE = 1.5
+"""Place x of the edge of the ground that hostile paths lead over [m]."""
 ARM_JOINTS = ("arm_yaw", "arm_shoulder", "arm_elbow")
 
 
@@ -92,6 +94,9 @@ class HostileMaker:
         step = float(self.rng.choice((0.0, 1e-300, 1e-9, 1e-6, 1e-3, 0.02, 0.1, 1.0, 1e5)))
         start = self.rng.uniform(-2.0, 2.0, 3)
         poses = start + np.outer(np.arange(n), [step, 0.0, 0.0])
+        if n and self.rng.random() < 0.2:
+            poses[:, 1:] = 0.0
+            poses = np.vstack([poses, [EDGE + 0.3, 0.0, 0.0]])
         path = poses_path(poses, self._frame())
         for _ in range(self.rng.integers(0, 3)):
             if path.poses:

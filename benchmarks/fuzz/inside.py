@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.fuzz.hostile import ARM_JOINTS, HostileMaker
+from benchmarks.fuzz.hostile import ARM_JOINTS, EDGE, HostileMaker
 from benchmarks.fuzz.tally import REFUSED, TAKEN, Tally, memory_of
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
@@ -18,14 +18,14 @@ from msg_adapters.joints import joint_positions, joint_velocities
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, stamped_pose_to_array
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-from msg_adapters.verdicts import report_to_json
+from msg_adapters.results.verdicts import report_to_json
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.reach_query import ReachQuery
-from rover_planner.planning.service_settings import load_service_settings
-from rover_planner.planning.traverse_service import TraverseService
+from rover_planner.planning.answering.reach_query import ReachQuery
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.traction.prepared_map import prepare_map
 from rover_planner.traction.traction_service import TractionService, load_traction_settings
@@ -40,6 +40,13 @@ RESOLUTIONS = (0.0, 0.0, 0.05)
 START, GOAL = (-1.0, 0.0, 0.0), (1.0, 0.1, 0.0)
 
 
+def good_ground() -> Terrain:
+    """Return gentle waves that end at an edge, over which a rover cannot drive back."""
+    along = 0.05 * np.arange(121) - 3.0
+    heights = 0.02 * np.sin(2.0 * along)[:, None] - np.where(along < EDGE, 0.0, 0.09)
+    return Terrain(heights, 0.05, (-3.0, -3.0), friction=np.where(along < EDGE, 0.8, 0.4) + 0.0 * heights)
+
+
 STOWED = dict(zip(ARM_JOINTS, (3.14159, -0.2, 0.2), strict=True))
 """Angles of the stowed arm of LSR-1 [rad]."""
 
@@ -50,8 +57,7 @@ class PlannerTarget:
     def __init__(self) -> None:
         self.service = TraverseService(load_service_settings(TraverseServerParameters()))
         self.reach = ReachQuery()
-        heights = 0.02 * np.sin(np.arange(121.0))[:, None] * np.ones(121)
-        self._ground = Terrain(heights, 0.05, (-3.0, -3.0))
+        self._ground = good_ground()
         self.reset()
         self._answer = self._ask()
 
@@ -106,7 +112,7 @@ class PlannerTarget:
     def _take_target(self, target: Any) -> None:
         self.service.take_path(np.zeros((1, 3)))
         self.reach.take_target(target_to_point(target, "map"))
-        report_to_json(self.reach.ask(self.service))
+        report_to_json(self.reach.ask(self.service.situation()))
 
     def _ask(self) -> str:
         self.service.take_joints(dict.fromkeys(SUSPENSION_JOINTS, 0.0) | STOWED)

@@ -14,7 +14,7 @@ from rover_physics.bounds.forces import MAX_SOILS
 from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
 from rover_physics.errors import ModelError
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.packed_model import forget_models, pack_model
 from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import check_poses, sweep_lock
@@ -107,6 +107,12 @@ def _pack_uncertain(terrain: Terrain, sigmas: float) -> UncertainGround:
     return UncertainGround(
         *(pack_ground(replace(terrain, elevation=elevation)) for elevation in heights)
     )
+
+
+def forget_terrains() -> None:
+    """Forget the terrains of earlier predictions and bounds, which may take much memory."""
+    _pack_uncertain.cache_clear()
+    forget_models()
 
 
 def _pack_nominal(prediction: PathPrediction) -> Any:

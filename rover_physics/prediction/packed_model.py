@@ -73,6 +73,12 @@ def _pack_model(same: "_SameRover", terrain: Terrain, options: SweepOptions) -> 
     return PackedModel(shared_array_of(record), ground)
 
 
+def forget_models() -> None:
+    """Forget the packed models of earlier calls, which keep their terrains in memory."""
+    _pack_model.cache_clear()
+    pack_ground.cache_clear()
+
+
 class _SameRover:
     """A cache key that compares rovers by identity."""
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rover_physics.bounds.path import forget_terrains
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
@@ -158,6 +159,7 @@ class TraverseService:
         with self._map_lock:
             gap = self._settings.largest_gap
             terrain = received.fill_gaps(gap) if gap > 0.0 else received
+            forget_terrains()
             pack_ground(terrain)  # now, so that the first query is fast
             before = self._map
             content = fingerprint(received)
