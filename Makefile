@@ -56,6 +56,10 @@ kernels: $(READY) ## compile the numba kernels into their cache
 bench: $(BENCH_READY) kernels ## measure times and memory, as a table and bench_output/results.json
 	@$(BIN)/python -m benchmarks.run
 
+.PHONY: fuzz
+fuzz: $(READY) kernels ## throw 12,000 malformed and hostile inputs at services and running nodes
+	@$(BIN)/python -m benchmarks.fuzz
+
 .PHONY: clean
 clean: ## remove the environment and everything that was made
 	rm -rf "$(VENV)" build dist install log demo_output bench_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -192,6 +192,9 @@ def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CellGrid:
     counts = last - first + 1.0
     _check_size(float(counts.prod()), np.ptp(xy, axis=0), resolution)
     origin = first * resolution
+    # `CellGrid.cells` rounds halves of a cell otherwise than the lines above.
+    origin += np.minimum(np.rint((xy.min(axis=0) - origin) / resolution), 0.0) * resolution
+    counts = np.maximum(counts, np.rint((xy.max(axis=0) - origin) / resolution) + 1.0)
     return CellGrid(
         resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1])
     )

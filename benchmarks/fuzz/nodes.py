@@ -13,7 +13,6 @@ from nav_msgs.srv import GetPlan, LoadMap
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
@@ -24,6 +23,7 @@ from rover_physics.terrain.grid import save_terrain
 from rover_planner.demo.child_process import ChildProcess
 from rover_planner.parameters.table import specs_of
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.ros.qos import map_qos, topic_qos
 
 SERVER, CONTROLLER = "traverse_server", "traction_controller"
 START_TIME = 180.0
@@ -91,7 +91,7 @@ class FuzzClient:
     def __init__(self, node: Node):
         self._node = node
         self._publishers = {
-            kind: node.create_publisher(*topic, QoSProfile(depth=10))
+            kind: node.create_publisher(*topic, map_qos() if kind == "cloud" else topic_qos())
             for kind, topic in TOPICS.items()
         }
         self._clients = {
@@ -102,7 +102,7 @@ class FuzzClient:
         self.worst_torque = 0.0
         """Largest commanded torque [N m]; NaN if one was no number."""
         node.create_subscription(
-            Float64MultiArray, f"{CONTROLLER}/commands", self._take_command, QoSProfile(depth=10)
+            Float64MultiArray, f"{CONTROLLER}/commands", self._take_command, topic_qos()
         )
 
     def publish(self, kind: str, message: Any) -> None:

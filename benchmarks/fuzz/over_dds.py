@@ -28,7 +28,7 @@ from benchmarks.fuzz.nodes import (
     NodeProcesses,
     serialise,
 )
-from benchmarks.fuzz.tally import REFUSED, TAKEN, Tally, memory_of
+from benchmarks.fuzz.tally import DAMAGED, WHOLE, Tally, memory_of
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
 from rover_planner.demo.child_process import stopping_children
@@ -41,7 +41,7 @@ ANSWER_TIME = 8.0
 """Longest wait for the answer to a hostile request [s]."""
 PAUSE = 0.002
 """Time between two inputs [s]."""
-DAMAGED = 0.25
+DAMAGED_SHARE = 0.25
 """Share of messages whose bytes are damaged."""
 MAX_GROWTH = 600.0
 """Largest growth of a node's memory in use [MB]."""
@@ -81,11 +81,11 @@ class DdsFuzzer:
         """Throw one input and return its kind."""
         rng = self._maker.rng
         kind = KINDS[rng.integers(len(KINDS))]
-        began, outcome = time.perf_counter(), TAKEN
+        began, outcome = time.perf_counter(), WHOLE
         if kind in TOPICS:
             message = self._maker.make(kind)
-            if rng.random() < DAMAGED:
-                message, outcome = self._maker.damaged(serialise(message)), REFUSED
+            if rng.random() < DAMAGED_SHARE:
+                message, outcome = self._maker.damaged(serialise(message)), DAMAGED
             self._client.publish(kind, message)
         else:
             response = self._client.call(kind, self._request(kind), ANSWER_TIME)
@@ -116,7 +116,7 @@ class DdsFuzzer:
         wrong = self._wait_for_answer()
         if wrong:
             self.tally.defects.append(f"{where}: {SERVER}: {wrong}")
-        self.tally.take("probe", TAKEN, time.perf_counter() - began)
+        self.tally.take("probe", WHOLE, time.perf_counter() - began)
         if not self._client.feed_controller(0.3):
             self.tally.defects.append(f"{where}: {CONTROLLER} sends no commands")
 

@@ -9,6 +9,9 @@ from rich.console import Console
 from rich.table import Table
 
 TAKEN, REFUSED = "taken", "refused"
+"""Outcomes of inputs in this process."""
+WHOLE, DAMAGED = "whole", "damaged"
+"""Kinds of messages over DDS, whose outcome is known to the nodes only."""
 MAX_DEFECTS = 50
 """Largest number of defects that are listed."""
 
@@ -18,7 +21,7 @@ class Tally:
     """What became of the inputs of one run."""
 
     counts: dict[str, Counter] = field(default_factory=lambda: defaultdict(Counter))
-    """Number of inputs that were taken and refused, by kind."""
+    """Number of inputs of each outcome, by kind."""
     slowest: dict[str, float] = field(default_factory=dict)
     """Longest time for one input [s], by kind."""
     defects: list[str] = field(default_factory=list)
@@ -39,14 +42,17 @@ class Tally:
     def show(self, title: str) -> None:
         """Print the counts, then the defects."""
         table = Table(title=f"{title}: {self.total:,} inputs")
-        for name in ("kind", "inputs", TAKEN, REFUSED, "slowest [ms]"):
+        outcomes = sorted({name for counter in self.counts.values() for name in counter})
+        for name in ("kind", "inputs", *outcomes, "slowest [ms]"):
             table.add_column(name, justify="left" if name == "kind" else "right")
         for kind in sorted(self.counts):
             counter = self.counts[kind]
             table.add_row(
-                kind, f"{sum(counter.values()):,}", f"{counter[TAKEN]:,}",
-                f"{counter[REFUSED]:,}", f"{1e3 * self.slowest[kind]:.1f}",
-            )  # fmt: skip
+                kind,
+                f"{sum(counter.values()):,}",
+                *(f"{counter[outcome]:,}" for outcome in outcomes),
+                f"{1e3 * self.slowest[kind]:.1f}",
+            )
         console = Console()
         console.print(table)
         for note in self.notes:

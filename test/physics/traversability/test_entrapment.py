@@ -1,5 +1,7 @@
 """Trapped: holes that a rover can drive into but neither on nor back out of."""
 
+import resource
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -202,3 +204,19 @@ def test_forces_at_rest_are_the_same_both_ways_on_coulomb_ground():
     np.testing.assert_allclose(back.wheel_loads[::-1], there.wheel_loads, atol=1e-9)
     np.testing.assert_allclose(back.tangential[::-1], there.tangential, atol=1e-9)
     np.testing.assert_allclose(back.torque[::-1], there.torque, atol=1e-9)
+
+
+@pytest.mark.parametrize("close", [1e-5, 1e-6, 1e-7, 1e-12])
+def test_poses_close_together_before_an_edge_do_not_take_the_time_and_the_memory(close):
+    x = 0.05 * np.arange(120) - 3.0
+    heights = np.where(x < 0.5, 0.0, -0.09) + np.where(x > 1.6, 0.5, 0.0)
+    edge = Terrain(np.tile(heights, (120, 1)), 0.05, (-3.0, -3.0))
+    way = np.concatenate([-1.0 + close * np.arange(100), np.arange(-0.98, 0.7, 0.02)])
+    poses = np.column_stack([way, 0.0 * way, 0.0 * way])
+    slippery = SweepOptions(friction=0.4)
+    judge_path(LSR1, edge, poses, slippery)
+    before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
+    verdict = judge_path(LSR1, edge, poses, slippery)[1]
+    assert verdict.code == "trapped"
+    assert time.perf_counter() - began < 5.0
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
