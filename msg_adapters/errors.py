@@ -1,6 +1,5 @@
 """The error that invalid messages raise."""
 
-
 MAX_TEXT = 500
 """Largest number of characters of an error; a message may contain names of any length."""
 

@@ -17,8 +17,8 @@ from msg_adapters.imu import imu_to_attitude
 from msg_adapters.joints import joint_positions, joint_velocities
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, stamped_pose_to_array
-from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from msg_adapters.results.verdicts import report_to_json
+from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -44,7 +44,8 @@ def good_ground() -> Terrain:
     """Return gentle waves that end at an edge, over which a rover cannot drive back."""
     along = 0.05 * np.arange(121) - 3.0
     heights = 0.02 * np.sin(2.0 * along)[:, None] - np.where(along < EDGE, 0.0, 0.09)
-    return Terrain(heights, 0.05, (-3.0, -3.0), friction=np.where(along < EDGE, 0.8, 0.4) + 0.0 * heights)
+    friction = np.tile(np.where(along < EDGE, 0.8, 0.4), (len(along), 1))
+    return Terrain(heights, 0.05, (-3.0, -3.0), friction=friction)
 
 
 STOWED = dict(zip(ARM_JOINTS, (3.14159, -0.2, 0.2), strict=True))

@@ -94,9 +94,7 @@ class FuzzClient:
             kind: node.create_publisher(*topic, map_qos() if kind == "cloud" else topic_qos())
             for kind, topic in TOPICS.items()
         }
-        self._clients = {
-            kind: node.create_client(*service) for kind, service in SERVICES.items()
-        }
+        self._clients = {kind: node.create_client(*service) for kind, service in SERVICES.items()}
         self.commands = 0
         """Number of commands that came."""
         self.worst_torque = 0.0

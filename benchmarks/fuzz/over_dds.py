@@ -137,7 +137,9 @@ class DdsFuzzer:
         response = self._client.call("plan", request, timeout)
         if response is None:
             return None
-        return [(stamped.pose.position.x, stamped.pose.position.y) for stamped in response.plan.poses]
+        return [
+            (stamped.pose.position.x, stamped.pose.position.y) for stamped in response.plan.poses
+        ]
 
     def _memory(self) -> dict[str, float]:
         return {name: memory_of(process.pid) for name, process in self._nodes.running.items()}
@@ -157,7 +159,9 @@ def fuzz_over_dds(seed: int, count: int) -> Tally:
         for name in (SERVER, CONTROLLER):
             lines = [_STAMP.sub("", line) for line in nodes.log(name).splitlines()]
             told = Counter(line for line in lines if "internal error" in line)
-            fuzzer.tally.notes += [f"{name}: {count} x {text[:160]}" for text, count in told.items()]
+            fuzzer.tally.notes += [
+                f"{name}: {count} x {text[:160]}" for text, count in told.items()
+            ]
             fuzzer.tally.defects += [f"{name}: {text}" for text in lines if "Warning:" in text]
         return fuzzer.tally
 

@@ -140,9 +140,7 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
         row, column = np.argwhere(~plausible)[0]
         name, value = ["x", "y", "yaw"][column], array[row, column]
         most = f"{MAX_COORDINATE:g} {'rad' if name == 'yaw' else 'm'}"
-        raise PoseError(
-            f"{name} of pose {row} is {value}; poses must be finite and within {most}"
-        )
+        raise PoseError(f"{name} of pose {row} is {value}; poses must be finite and within {most}")
     return array
 
 

@@ -1,6 +1,6 @@
 """Checks the numbers of a rover before kernels use them; a rover need not come from a file."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -51,15 +51,14 @@ def check_plausible(rover: Rover) -> None:
 
 def _numbers_of(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
     """Yield dotted keys and numbers of nested dataclasses, dicts and tuples."""
+    parts: Sequence[tuple[str | int, Any]] = ()
     if is_dataclass(value):
         parts = [(field.name, getattr(value, field.name)) for field in fields(value)]
     elif isinstance(value, dict):
         parts = list(value.items())
     elif isinstance(value, tuple):
         parts = list(enumerate(value))
-    else:
-        parts = []
-        if isinstance(value, int | float):
-            yield key, value
+    elif isinstance(value, int | float):
+        yield key, value
     for name, inner in parts:
         yield from _numbers_of(inner, f"{key}.{name}" if key else str(name))

@@ -48,8 +48,11 @@ def judge_bounds(
     falls = np.asarray(prediction.falling.any(axis=1))
     needed = bounds.bounded & ~falls
     for name in BOUNDED_VALUES:
-        values = getattr(bounds, name).reshape(len(needed), -1)
-        for i in np.flatnonzero(needed & np.isnan(values).any(axis=1)).tolist():
+        # Where the value itself is not known, as the clearance over unknown ground, no bound is.
+        missing = np.isnan(getattr(bounds, name)).any(axis=-1) & ~np.isnan(
+            getattr(prediction, name)
+        )
+        for i in np.flatnonzero(needed & missing.reshape(len(needed), -1).any(axis=1)).tolist():
             if not codes[i]:
                 codes[i] = NOT_COMPUTABLE
                 reasons[i] = f"{name} cannot be computed {within}: a bound is not a number"

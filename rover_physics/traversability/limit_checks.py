@@ -19,7 +19,7 @@ TOLERANCE = 1e-9
 class Check(NamedTuple):
     """Comparison of one limit with all waypoints of a prediction.
 
-    A value that is NaN breaks its limit.
+    A value that is NaN breaks its limit, apart from the belly clearance over unknown ground.
     """
 
     code: str
@@ -39,13 +39,13 @@ class Check(NamedTuple):
     """Returns the reason of a waypoint, with value and limit."""
     values: np.ndarray
     """(n, ...) the values that are compared."""
-    if_nan: tuple[str, str]
-    """Code and reason of a waypoint where a value is NaN."""
+    quantity: str
+    """Name of the values."""
 
     def explain(self, row: int) -> tuple[str, str]:
         """Return code and reason of a waypoint where the limit is broken."""
         if np.isnan(self.values[row]).any():
-            return self.if_nan
+            return NOT_COMPUTABLE, f"{self.quantity} cannot be computed: it is not a number"
         return self.code, self.describe(row)
 
 
@@ -79,10 +79,6 @@ def largest_of(values: np.ndarray) -> float:
 def smallest_of(values: np.ndarray) -> float:
     """Return the smallest value that is not NaN, or NaN if there is none."""
     return float(np.fmin.reduce(values, axis=None)) if values.size else np.nan
-
-
-def _no_number(quantity: str) -> tuple[str, str]:
-    return NOT_COMPUTABLE, f"{quantity} cannot be computed: it is not a number"
 
 
 def _largest_and_sure(values: np.ndarray) -> tuple[float, bool]:
@@ -154,7 +150,7 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
         _no_wheel(rocker),
         describe,
         np.hstack([rocker, bogie]) if breaks else rocker,
-        _no_number("suspension angle"),
+        "suspension angle",
     )
 
 
@@ -174,7 +170,7 @@ def _check_tilt(rover: Rover, prediction: PathPrediction) -> Check:
         _no_wheel(tilt),
         describe,
         tilt,
-        _no_number("tilt"),
+        "tilt",
     )
 
 
@@ -184,7 +180,18 @@ def _check_tip_over(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"tip-over ratio {compare(ratio[i], limit, 2)}"
 
-    return _check_lower("tip_over", ratio, limit, describe, _no_number("tip-over ratio"))
+    extreme, sure = _smallest_and_sure(ratio)
+    return Check(
+        "tip_over",
+        extreme,
+        not sure or extreme < limit - TOLERANCE,
+        lambda: ~(ratio >= limit - TOLERANCE),
+        lambda: -_share_left(ratio, limit),
+        _no_wheel(ratio),
+        describe,
+        ratio,
+        "tip-over ratio",
+    )
 
 
 def _check_wheel_lift(prediction: PathPrediction) -> Check:
@@ -211,7 +218,7 @@ def _check_wheel_lift(prediction: PathPrediction) -> Check:
         lambda: np.argmin(loads, axis=1),
         describe,
         loads,
-        _no_number("wheel load"),
+        "wheel load",
     )
 
 
@@ -256,7 +263,7 @@ def _check_wheels(
         lambda: np.argmax(values, axis=1),
         describe,
         values,
-        _no_number(f"{code.replace('_', ' ')} of a wheel"),
+        f"{code.replace('_', ' ')} of a wheel",
     )
 
 
@@ -266,26 +273,16 @@ def _check_belly(rover: Rover, prediction: PathPrediction) -> Check:
     def describe(i: int) -> str:
         return f"belly clearance {compare(clearance[i], limit, 3, ' m')}"
 
-    unknown = "unknown_ground", "unknown ground under the whole belly"
-    return _check_lower("belly", clearance, limit, describe, unknown)
-
-
-def _check_lower(
-    code: str,
-    values: np.ndarray,
-    limit: float,
-    describe: Callable[[int], str],
-    if_nan: tuple[str, str],
-) -> Check:
-    extreme, sure = _smallest_and_sure(values)
+    # NaN over unknown ground breaks no limit: few rovers see the ground below themselves.
+    extreme = smallest_of(clearance)
     return Check(
-        code,
+        "belly",
         extreme,
-        not sure or extreme < limit - TOLERANCE,
-        lambda: ~(values >= limit - TOLERANCE),
-        lambda: -_share_left(values, limit),
-        _no_wheel(values),
+        extreme < limit - TOLERANCE,
+        lambda: clearance < limit - TOLERANCE,
+        lambda: -_share_left(clearance, limit),
+        _no_wheel(clearance),
         describe,
-        values,
-        if_nan,
+        clearance,
+        "belly clearance",
     )

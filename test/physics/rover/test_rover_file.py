@@ -199,7 +199,9 @@ def test_a_number_must_be_finite_and_not_negative(key, value):
     ],
 )
 def test_some_numbers_must_be_above_zero(key):
-    with pytest.raises(RoverFileError, match=f"{key} is 0.0; it must be a number (above 0|at least)"):
+    with pytest.raises(
+        RoverFileError, match=f"{key} is 0.0; it must be a number (above|at least)"
+    ):
         rover_from_dict(changed(key, 0.0), "test")
 
 

@@ -34,7 +34,7 @@ POSES = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
 LEVEL = plane(0.0, 0.0)
 DECISIVE = (
     "roll", "pitch", "rocker_angle", "bogie_angle", "wheel_loads", "friction_utilisation",
-    "torque_saturation", "tip_over_ratio", "belly_clearance",
+    "torque_saturation", "tip_over_ratio",
 )  # fmt: skip
 EXTREMES = (
     0.0, 5e-324, 1e-310, 1e-300, 1e-155, 1e-20, 1e-9, 1e-6, 1e-3, 0.1, 10.0, 1e3, 1e6, 1e9, 1e20,
@@ -160,11 +160,7 @@ def test_a_nan_breaks_each_limit_and_names_the_quantity(name):
     values.reshape(len(POSES), -1)[3, -1] = math.nan
     verdict = judge(LSR1, replace(prediction, **{name: values}))
     assert not verdict.traversable and verdict.first_failure == 3
-    if name == "belly_clearance":
-        assert verdict.code == "unknown_ground"
-        assert verdict.reason == "unknown ground under the whole belly"
-    else:
-        assert verdict.code == "not_computable" and "cannot be computed" in verdict.reason
+    assert verdict.code == "not_computable" and "cannot be computed" in verdict.reason
 
 
 def test_a_bound_that_is_no_number_is_a_refusal():
@@ -179,14 +175,17 @@ def test_a_bound_that_is_no_number_is_a_refusal():
     assert "wheel_loads" in worst.reason and "3 sigma" in worst.reason
 
 
-def test_ground_unknown_under_the_whole_belly_is_refused():
+def test_only_the_clearance_over_unknown_ground_may_be_unknown():
     elevation = np.zeros((121, 121))
-    elevation[:, 60] = elevation[60, :] = 0.0
     elevation[57:64] = math.nan  # the wheels' tracks at y = -0.31 and 0.31 m stay known
-    ground = Terrain(elevation, 0.05, (-3.0, -3.0))
-    narrow = replace(LSR1, belly=replace(LSR1.belly, y=(-0.1, 0.1)))
-    verdict = judge_path(narrow, ground, POSES)[1]
-    assert verdict.code == "unknown_ground" and "belly" in verdict.reason
+    std = np.full(elevation.shape, 1e-4)
+    for ground in (
+        Terrain(elevation, 0.05, (-3.0, -3.0)),
+        Terrain(elevation, 0.05, (-3.0, -3.0), elevation_std=std),
+    ):
+        narrow = replace(LSR1, belly=replace(LSR1.belly, y=(-0.1, 0.1)))
+        prediction, verdict = judge_path(narrow, ground, POSES)
+        assert np.isnan(prediction.belly_clearance).all() and verdict.traversable
 
 
 def test_a_path_of_unknown_energy_costs_more_than_any_other():
