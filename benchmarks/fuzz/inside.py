@@ -130,6 +130,7 @@ class ControllerTarget:
         self._most = self.service.settings.rover.wheel.max_torque
         self._now = 0.0
         self._feed()
+        self.service.update(self._now)  # now, so that the time of compilation is none of an input
 
     def probe(self) -> str:
         """Return the fault that good inputs leave; empty if there is none."""
