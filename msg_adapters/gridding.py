@@ -187,14 +187,14 @@ def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, floa
 
 def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CellGrid:
     """Return cells for points (n, 2) [m], centred on multiples of the resolution [m]."""
-    first = np.rint(xy.min(axis=0) / resolution)
-    last = np.rint(xy.max(axis=0) / resolution)
-    counts = last - first + 1.0
-    _check_size(float(counts.prod()), np.ptp(xy, axis=0), resolution)
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    first = np.rint(low / resolution)
+    counts = np.rint(high / resolution) - first + 1.0
+    _check_size(float(counts.prod()), high - low, resolution)
     origin = first * resolution
     # `CellGrid.cells` rounds halves of a cell otherwise than the lines above.
-    origin += np.minimum(np.rint((xy.min(axis=0) - origin) / resolution), 0.0) * resolution
-    counts = np.maximum(counts, np.rint((xy.max(axis=0) - origin) / resolution) + 1.0)
+    origin += np.minimum(np.rint((low - origin) / resolution), 0.0) * resolution
+    counts = np.maximum(counts, np.rint((high - origin) / resolution) + 1.0)
     return CellGrid(
         resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1])
     )
