@@ -1,0 +1,66 @@
+"""Warns of publishers that a node cannot hear: of another type, or best effort only."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
+
+PERIOD = 1.0
+"""Time between two looks at the publishers [s]."""
+
+
+@dataclass(frozen=True)
+class Subscription:
+    """What a node hears on a topic, and the parameters that change it."""
+
+    type_name: str
+    """Type of the messages, such as geometry_msgs/msg/Twist."""
+    other_types: Mapping[str, str]
+    """What to do about publishers of other types, by type."""
+    best_effort_advice: str
+    """What to do about best-effort publishers; empty if they are heard."""
+
+
+class PublisherCheck:
+    """Looks at the publishers of topics once a second; each problem is logged once."""
+
+    def __init__(self, node: Node, topics: Mapping[str, Subscription]):
+        """Check topics of a node by name."""
+        self._node, self._topics = node, dict(topics)
+        self._told: set[str] = set()
+        self.problems: tuple[str, ...] = ()
+        """The problems found last."""
+        node.create_timer(PERIOD, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _check(self) -> None:
+        self.problems = tuple(
+            problem for topic in self._topics for problem in self._find_problems(topic)
+        )
+        for problem in self.problems:
+            if problem not in self._told:
+                self._node.get_logger().warning(problem)
+        self._told = set(self.problems)
+
+    def _find_problems(self, topic: str) -> list[str]:
+        """Return the problems of a topic's publishers, each once."""
+        wanted, found = self._topics[topic], []
+        for publisher in self._node.get_publishers_info_by_topic(topic):
+            name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+            if publisher.topic_type != wanted.type_name:
+                advice = wanted.other_types.get(
+                    publisher.topic_type, f"it must be {wanted.type_name}"
+                )
+                found.append(
+                    f"{topic} of {name} is not heard: its type is {publisher.topic_type}; {advice}"
+                )
+            elif (
+                wanted.best_effort_advice
+                and publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+            ):
+                found.append(
+                    f"{topic} of {name} is not heard: it is best effort; "
+                    f"{wanted.best_effort_advice}"
+                )
+        return list(dict.fromkeys(found))
