@@ -42,7 +42,7 @@ class StampCheck:
                 is ahead of the clock.
         """
         last = self._last.get(name, 0)
-        if stamp <= 0:
+        if stamp == 0:
             if last and not merged:
                 raise StampError("stamps are zero, earlier ones were not")
             return now
