@@ -1,35 +1,49 @@
 """Logs when a condition begins and when it ends, never each time that it is looked at."""
 
+import math
+from dataclasses import dataclass
+
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 QUIET_TIME = 1.0
 """Shortest time between two lines about the same condition [s]."""
 
 
-class TransitionLog:
-    """Keeps what was logged last about each condition.
+@dataclass
+class _Condition:
+    """What is known about a condition."""
 
-    A change within QUIET_TIME of the last line is logged after it, if it still holds then.
-    """
+    holds: bool = False
+    """Whether it held when it was looked at last."""
+    changed: bool = False
+    """Whether it has changed since the last line."""
+    told_at: float = -math.inf
+    """Time of the last line [s]."""
+
+
+class TransitionLog:
+    """Logs changes of conditions; those within QUIET_TIME of a line are told by one line after."""
 
     def __init__(self, logger: RcutilsLogger):
         """Log to a node's logger."""
         self._logger = logger
-        self._told: dict[str, tuple[bool, float]] = {}
+        self._conditions: dict[str, _Condition] = {}
 
-    def update(self, condition: str, reason: str, end: str, now: float) -> None:
+    def update(self, name: str, reason: str, end: str, now: float) -> None:
         """Log a change of a condition.
 
         Args:
-            condition: Name of the condition.
+            name: Name of the condition.
             reason: Text of the warning while the condition holds; empty if it does not.
             end: Text that says that it has ended.
             now: Monotonic time [s].
         """
-        was, told_at = self._told.get(condition, (False, -QUIET_TIME))
-        if bool(reason) == was or now - told_at < QUIET_TIME:
+        condition = self._conditions.setdefault(name, _Condition())
+        if bool(reason) != condition.holds:
+            condition.holds, condition.changed = bool(reason), True
+        if not condition.changed or now - condition.told_at < QUIET_TIME:
             return
-        self._told[condition] = bool(reason), now
+        condition.changed, condition.told_at = False, now
         if reason:
             self._logger.warning(reason)
         else:
