@@ -118,11 +118,11 @@ def _descriptor(spec: ParameterSpec) -> ParameterDescriptor:
     )
     if spec.choices:
         descriptor.additional_constraints = "one of " + ", ".join(spec.choices)
-    if spec.bounds is not None and isinstance(spec.default, float):
+    if spec.bounds is not None and not isinstance(spec.default, int):
         descriptor.floating_point_range = [
             FloatingPointRange(from_value=spec.bounds[0], to_value=spec.bounds[1])
         ]
-    elif spec.bounds is not None and isinstance(spec.default, int):
+    elif spec.bounds is not None:
         descriptor.integer_range = [
             IntegerRange(from_value=int(spec.bounds[0]), to_value=int(spec.bounds[1]))
         ]

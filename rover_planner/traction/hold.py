@@ -15,9 +15,9 @@ from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.traction.settings import TractionSettings
 
-RATE_GAIN = 8.0
+RATE_GAIN = 10.0
 """Angular deceleration per wheel rate of the hold servo [1/s]."""
-ANGLE_GAIN = 40.0
+ANGLE_GAIN = 25.0
 """Angular deceleration per angle turned of the hold servo [1/s^2]."""
 MAX_STEP = 0.1
 """Upper bound of the time step of the servo [s]."""

@@ -18,7 +18,7 @@ class Reading(NamedTuple):
     time: float
     """Time of the measurement [s]."""
     stamp: int
-    """Header stamp [ns]; 0 if the message had none."""
+    """Last header stamp [ns]; 0 if no message had one."""
 
 
 NOT_READ = Reading(0.0, NEVER, 0)
@@ -107,8 +107,8 @@ def _keep(kept: dict[str, Reading], values: Mapping[str, float], time: float, st
     taken = False
     for name, value in values.items():
         last = kept.get(name)
-        if last is None or (last.stamp and stamp <= last.stamp):
+        if last is None or (stamp and stamp <= last.stamp):
             continue
-        kept[name] = Reading(value, time, stamp)
+        kept[name] = Reading(value, time, max(stamp, last.stamp))
         taken = True
     return taken

@@ -40,10 +40,11 @@ def test_a_wheel_that_is_missing_from_messages_gets_old_by_itself():
 def test_values_with_a_stamp_that_does_not_advance_are_not_taken():
     memory = JointMemory()
     assert memory.take(ANGLES, RATES, 1.0, stamp=5)
-    for stamp in (5, 4, 0):
+    for stamp in (5, 4):
         assert not memory.take(ANGLES, RATES, 2.0, stamp=stamp)
     assert memory.time == 1.0
     assert memory.take(ANGLES, {}, 2.0, stamp=6) and memory.wheel_time == 1.0
+    assert memory.take(ANGLES, RATES, 2.1) and not memory.take(ANGLES, RATES, 2.2, stamp=5)
     memory.forget()
     assert memory.time == NEVER
     assert memory.take(ANGLES, RATES, 3.0, stamp=2)
