@@ -36,7 +36,9 @@ def no_stamp() -> int:
 class DrivenRover(Node):
     """A rover whose wheels turn at a constant rate, whatever the torques are."""
 
-    def __init__(self, context: Context, namespace: str = "", rate: float = RATE, **arguments: Any):
+    def __init__(
+        self, context: Context, namespace: str = "", rate: float = RATE, **arguments: Any
+    ):
         """Send at `rate` [Hz] from now on; stamps are zero until `stamp` is replaced."""
         super().__init__("rover", context=context, namespace=namespace, **arguments)
         self.joints = JointState(name=list(JOINTS))
@@ -64,7 +66,7 @@ class DrivenRover(Node):
         }
         self.listen()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0 / rate, self._send, clock=steady)
+        self.create_timer(1.0 / RATE, self._send, clock=steady)
 
     def send_twists(self, kind: type = TwistStamped) -> None:
         """Send cmd_vel of a type from now on."""

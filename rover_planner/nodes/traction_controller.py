@@ -4,7 +4,6 @@ import gc
 import signal
 import sys
 import time
-import traceback
 from collections.abc import Sequence
 from types import FrameType
 from typing import Any
@@ -15,7 +14,7 @@ import rclpy.logging
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
@@ -34,6 +33,7 @@ from rover_planner.nodes.traction_topics import TractionTopics, latched_qos
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
+from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
@@ -83,11 +83,13 @@ class TractionController(Node):
         self._command: TractionCommand | None = None
         self._log = TransitionLog(self.get_logger())
         self._warning = ""
-        self._trips, self._errors = 0, 0
+        self._trips = 0
+        self.guard = Guard(self.get_logger())
+        """Counts unexpected errors."""
         self._clock_watch = ClockWatch(self._values.clock_timeout)
         self._topics = TractionTopics(self, joint_order(self._values.joints))
-        self._maps = MapIntake(self._prepare_map, self._refuse_map)
-        self._inputs = TractionInputs(self, self._values, self.service, self._maps)
+        self._maps: MapIntake[PreparedMap] = MapIntake(self._prepare_map, self._refuse_map)
+        self._inputs = TractionInputs(self, self._values, self.service, self._maps, self.guard)
         self._create_switches()
         self._watchdog = Watchdog(self._send_watchdog_command)
         follow_changes(self, lambda: self._values, self._load, self._apply_parameters)
@@ -176,7 +178,12 @@ class TractionController(Node):
         self._supervisor.configure(self._load(parameters))
         self._clock_watch.timeout = parameters.clock_timeout
         self._inputs.stamps.tolerance = parameters.stamp_tolerance
-        self._values = parameters
+        last, self._values = self._values, parameters
+        if (last.map_resolution, last.cell_height) != (
+            parameters.map_resolution,
+            parameters.cell_height,
+        ):
+            self._maps.repeat()
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         before = self._supervisor.permission.enabled
@@ -215,8 +222,9 @@ class TractionController(Node):
             command = self._find_command(now)
         except Exception as error:
             # After an internal error the wheels must not keep their last torque.
-            self._count_error()
-            command = self._supervisor.fail(f"internal error: {type(error).__name__}: {error}")
+            command = self._supervisor.fail(
+                f"internal error: {self.guard.report('update', error)}"
+            )
         sent = self._watchdog.send(
             lambda: self._topics.writer.write(command.torques, command.brake, command.state),
             now,
@@ -252,11 +260,6 @@ class TractionController(Node):
         """Send zero torques and the brake; called in the thread of the watchdog."""
         self._topics.watchdog_writer.write(np.zeros(WHEEL_COUNT), True, FAULT)
 
-    def _count_error(self) -> None:
-        self._errors += 1
-        if self._errors == 1:
-            self.get_logger().error(traceback.format_exc())
-
     def _tell(self, command: TractionCommand, now: float) -> None:
         """Log the begin and the end of faults and stalls; show a new state in the diagnostics."""
         last, self._command = self._command, command
@@ -277,7 +280,7 @@ class TractionController(Node):
             return
         values = self._statistics.describe() | {
             "watchdog_trips": self._watchdog.trips,
-            "internal_errors": self._errors + self._inputs.internal_errors,
+            "internal_errors": self.guard.total,
             "brake": command.brake,
         }
         name, stamp = self.service.settings.rover.name, self.get_clock().now().to_msg()
@@ -317,7 +320,7 @@ def main(words: Sequence[str] | None = None) -> int:
         )
         node = TractionController()
         node.take_priority()
-        executor = SingleThreadedExecutor()
+        executor = GuardedExecutor(node.guard)
         executor.add_node(node)
         gc.collect()
         gc.freeze()

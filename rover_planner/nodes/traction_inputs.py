@@ -1,15 +1,12 @@
 """The subscriptions of the traction controller: checks messages and passes them to its service."""
 
 import time
-import traceback
 from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.commands import twist_to_speeds
@@ -17,10 +14,12 @@ from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import joint_positions, joint_velocities
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.parameters.traction_controller import BEST_EFFORT, TractionControllerParameters
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.ros.publisher_check import PublisherCheck, Subscription
-from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos
+from rover_planner.ros.publisher_check import ExpectedType, PublisherCheck
+from rover_planner.ros.qos import map_subscriptions, sensor_qos
+from rover_planner.ros.qos_warnings import warn_of_mismatch
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.ros.transition_log import TransitionLog
 from rover_planner.traction.stamps import NANOSECONDS, StampCheck, StampError
@@ -46,19 +45,18 @@ class TractionInputs:
         parameters: TractionControllerParameters,
         service: TractionService,
         maps: MapIntake,
+        guard: Guard,
     ):
-        """Subscribe to all inputs of a node."""
+        """Subscribe to all inputs of a node; `guard` counts unexpected errors."""
         self._node, self._service, self._maps = node, service, maps
+        self._errors = guard
         self._map_frame, self._base_frame = parameters.map_frame, parameters.base_frame
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
         self._log = TransitionLog(node.get_logger())
-        self._traced: set[str] = set()
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
-        self.internal_errors = 0
-        """Messages that failed in an unforeseen way."""
         self._subscribe(parameters)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
@@ -72,11 +70,10 @@ class TractionInputs:
             (Odometry, ODOMETRY, self._take_odometry),
         ):
             self._node.create_subscription(kind, name, self._guard(name, take), sensor_qos())
-        profiles = map_subscriptions_qos(parameters.map_durability)
-        for qos in profiles:
-            if parameters.map_reliability == BEST_EFFORT:
-                qos.reliability = ReliabilityPolicy.BEST_EFFORT
-            events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
+        for qos, mends in map_subscriptions(
+            parameters.map_durability, parameters.input_reliability
+        ):
+            events = warn_of_mismatch(self._node, CLOUD, mends)
             self._node.create_subscription(
                 PointCloud2, CLOUD, self._maps.offer, qos, event_callbacks=events, raw=True
             )
@@ -84,22 +81,17 @@ class TractionInputs:
     def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
         stamped = parameters.cmd_vel_stamped
         other = (TWIST, "false") if stamped else (TWIST_STAMPED, "true")
-        reliable = parameters.map_reliability != BEST_EFFORT
-        advice = f"set parameter map_reliability to {BEST_EFFORT}" if reliable else ""
-        return PublisherCheck(
-            self._node,
-            {
-                JOINT_STATES: Subscription("sensor_msgs/msg/JointState", {}, ""),
-                IMU: Subscription("sensor_msgs/msg/Imu", {}, ""),
-                CMD_VEL: Subscription(
-                    TWIST_STAMPED if stamped else TWIST,
-                    {other[0]: f"set parameter cmd_vel_stamped to {other[1]}"},
-                    "",
-                ),
-                ODOMETRY: Subscription("nav_msgs/msg/Odometry", {}, ""),
-                CLOUD: Subscription("sensor_msgs/msg/PointCloud2", {}, advice),
-            },
-        )
+        types = {
+            JOINT_STATES: ExpectedType("sensor_msgs/msg/JointState", {}),
+            IMU: ExpectedType("sensor_msgs/msg/Imu", {}),
+            CMD_VEL: ExpectedType(
+                TWIST_STAMPED if stamped else TWIST,
+                {other[0]: f"set parameter cmd_vel_stamped to {other[1]}"},
+            ),
+            ODOMETRY: ExpectedType("nav_msgs/msg/Odometry", {}),
+            CLOUD: ExpectedType("sensor_msgs/msg/PointCloud2", {}),
+        }
+        return PublisherCheck(self._node, types)
 
     def _guard(self, name: str, take: Callable[[Any, float], None]) -> Callable[[Any], None]:
         """Return a callback that passes a message and the time of its arrival on.
@@ -116,11 +108,7 @@ class TractionInputs:
             except INPUT_ERRORS as error:
                 self._refuse(name, str(error), now)
             except Exception as error:
-                self.internal_errors += 1
-                if name not in self._traced:
-                    self._traced.add(name)
-                    self._node.get_logger().error(f"{name}: {traceback.format_exc()}")
-                self._refuse(name, f"internal error: {type(error).__name__}: {error}", now)
+                self._refuse(name, f"internal error: {self._errors.report(name, error)}", now)
 
         return receive
 

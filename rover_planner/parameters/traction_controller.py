@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from rover_physics.names import OPTIMAL, TORQUE_POLICIES, WHEEL_JOINTS
 from rover_planner.parameters.shared import (
     cell_height_parameter,
+    input_reliability_parameter,
     map_durability_parameter,
     map_resolution_parameter,
     max_torque_parameter,
@@ -15,9 +16,6 @@ from rover_planner.parameters.table import ParameterTable, parameter
 HOLD, BRAKE, COAST = "hold", "brake", "coast"
 REST_POLICIES = (HOLD, BRAKE, COAST)
 """Values of the parameter rest_policy; `rover_planner.traction.hold` explains them."""
-RELIABLE, BEST_EFFORT = "reliable", "best_effort"
-MAP_RELIABILITIES = (RELIABLE, BEST_EFFORT)
-"""Values of the parameter map_reliability."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class TractionControllerParameters(ParameterTable):
         0.5, "Age above which odometry is not used.", unit="s", bounds=(0.01, 10.0)
     )
     clock_timeout: float = parameter(
-        0.07,
+        0.06,
         "With use_sim_time: time for which /clock may stand still before that is a fault.",
         unit="s",
         bounds=(0.01, 10.0),
@@ -152,10 +150,4 @@ class TractionControllerParameters(ParameterTable):
     map_resolution: float = map_resolution_parameter()
     cell_height: str = cell_height_parameter()
     map_durability: str = map_durability_parameter()
-    map_reliability: str = parameter(
-        RELIABLE,
-        "Reliability of the subscriptions to the map; best_effort hears every publisher, but may "
-        "lose parts of a large map.",
-        choices=MAP_RELIABILITIES,
-        read_only=True,
-    )
+    input_reliability: str = input_reliability_parameter()

@@ -1,32 +1,29 @@
-"""Warns of publishers that a node cannot hear: of another type, or best effort only."""
+"""Warns of publishers of another type than a node's subscription, which cannot be heard."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import ReliabilityPolicy
 
 PERIOD = 1.0
 """Time between two looks at the publishers [s]."""
 
 
 @dataclass(frozen=True)
-class Subscription:
-    """What a node hears on a topic, and the parameters that change it."""
+class ExpectedType:
+    """What a node hears on a topic, and how to hear something else."""
 
-    type_name: str
+    name: str
     """Type of the messages, such as geometry_msgs/msg/Twist."""
-    other_types: Mapping[str, str]
+    advice: Mapping[str, str]
     """What to do about publishers of other types, by type."""
-    best_effort_advice: str
-    """What to do about best-effort publishers; empty if they are heard."""
 
 
 class PublisherCheck:
     """Looks at the publishers of topics once a second; each problem is logged once."""
 
-    def __init__(self, node: Node, topics: Mapping[str, Subscription]):
+    def __init__(self, node: Node, topics: Mapping[str, ExpectedType]):
         """Check topics of a node by name."""
         self._node, self._topics = node, dict(topics)
         self._told: set[str] = set()
@@ -47,20 +44,10 @@ class PublisherCheck:
         """Return the problems of a topic's publishers, each once."""
         wanted, found = self._topics[topic], []
         for publisher in self._node.get_publishers_info_by_topic(topic):
+            kind = publisher.topic_type
+            if kind == wanted.name:
+                continue
             name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
-            if publisher.topic_type != wanted.type_name:
-                advice = wanted.other_types.get(
-                    publisher.topic_type, f"it must be {wanted.type_name}"
-                )
-                found.append(
-                    f"{topic} of {name} is not heard: its type is {publisher.topic_type}; {advice}"
-                )
-            elif (
-                wanted.best_effort_advice
-                and publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
-            ):
-                found.append(
-                    f"{topic} of {name} is not heard: it is best effort; "
-                    f"{wanted.best_effort_advice}"
-                )
+            advice = wanted.advice.get(kind, f"it must be {wanted.name}")
+            found.append(f"{topic} of {name} is not heard: its type is {kind}; {advice}")
         return list(dict.fromkeys(found))

@@ -87,9 +87,7 @@ def test_frozen_delayed_and_future_stamps_are_faults_in_time(rover, drive, shift
     rover.stamp = time.time_ns
     drive()
     began, frozen = time.monotonic(), time.time_ns()
-    rover.stamp = lambda: (
-        frozen if shift is None else time.time_ns() + round(shift * NANOSECONDS)
-    )
+    rover.stamp = lambda: frozen if shift is None else time.time_ns() + round(shift * NANOSECONDS)
     assert wait_for_rest(rover, began) < BOUND
     wait_until(lambda: text in rover.status.message, "the reason", 2.0)
     rover.stamp = time.time_ns

@@ -1,4 +1,4 @@
-"""Publishers that cannot be heard are named with the parameter that mends it; so are two rovers."""
+"""Publishers that cannot be heard are named; two rovers in two namespaces do not meet."""
 
 import pytest
 from geometry_msgs.msg import Twist, TwistStamped
@@ -64,16 +64,16 @@ def test_a_best_effort_map_is_named_and_the_parameter_mends_it(rover, start_cont
     qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     rover.create_publisher(PointCloud2, "elevation_cloud", qos)
     node = start_controller()
-    text = "elevation_cloud of /rover is not heard: it is best effort; set parameter "
-    text += "map_reliability to best_effort"
+    text = "a publisher of elevation_cloud is not heard: its reliability does not match; "
+    text += "set input_reliability to best_effort"
     wait_until(lambda: rover.count_lines(text), "the warning", NAMED_WITHIN + 1.0)
-    assert node.get_parameter("map_reliability").value == "reliable"
+    assert node.get_parameter("input_reliability").value == "reliable"
 
 
 def test_a_best_effort_map_is_heard_with_the_parameter(rover, start_controller):
     qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     sender = rover.create_publisher(PointCloud2, "elevation_cloud", qos)
-    start_controller(map_reliability="best_effort")
+    start_controller(input_reliability="best_effort")
     cloud = PointCloud2()
     cloud.header.frame_id = "elsewhere"
 
@@ -93,9 +93,7 @@ def test_two_rovers_in_two_namespaces_do_not_meet(ros):
         rovers[name] = ros.spin(rover)
     enabled = [Parameter("enabled_at_start", value=True)]
     for name in rovers:
-        node = TractionController(
-            context=ros.context, namespace=name, parameter_overrides=enabled
-        )
+        node = TractionController(context=ros.context, namespace=name, parameter_overrides=enabled)
         assert {topic for topic, _ in ros.spin(node).get_topic_names_and_types()}.isdisjoint(
             {"/diagnostics", "/cmd_vel", "/joint_states", "/imu"}
         )
