@@ -1,7 +1,6 @@
 """Decides whether the rover drives or rests, and what its wheels do at rest."""
 
 from dataclasses import dataclass
-from statistics import median
 
 import numpy as np
 
@@ -113,10 +112,11 @@ class TractionSupervisor:
         return STANDSTILL if self._is_standing(duration) else DRIVING
 
     def _is_stalled(self, duration: float) -> bool:
-        settings, (speed, _) = self.service.settings, self.service.wanted
-        wanted = speed / settings.rover.wheel.radius
-        rate = median(self.service.wheel_rates.tolist())
-        return self._stall.update(rate, wanted, duration, settings.stall_time)
+        settings, (speed, yaw_rate) = self.service.settings, self.service.wanted
+        wheel, middle = settings.rover.wheel, settings.rover.suspension.wheels["middle"]
+        turning = yaw_rate * abs(middle[1])
+        wanted = (speed + turning) / wheel.radius, (speed - turning) / wheel.radius
+        return self._stall.update(self.service.wheel_rates, wanted, duration, settings.stall_time)
 
     def _is_standing(self, duration: float) -> bool:
         """Return whether the commanded speeds have been zero for STANDSTILL_DELAY."""

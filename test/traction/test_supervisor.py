@@ -183,7 +183,19 @@ def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_othe
 def test_progress_now_and_then_is_no_stall():
     watch = StallWatch()
     for k in range(1000):
-        assert not watch.update(0.3 if k % 2 else 0.0, 0.3, 0.02, 2.0)
+        rates = np.full(6, 0.3 if k % 2 else 0.0)
+        assert not watch.update(rates, (0.3, 0.3), 0.02, 2.0)
+
+
+@pytest.mark.parametrize("wanted", [(0.3, -0.3), (-0.3, 0.3), (0.3, 0.0)])
+def test_a_rover_that_does_not_turn_is_stalled_one_that_turns_is_not(wanted):
+    turns = np.repeat(wanted, 3)
+    for rates, stalled in ((turns, False), (np.zeros(6), True), (-turns, True)):
+        watch = StallWatch()
+        found = [watch.update(rates, wanted, 0.02, 2.0) for _ in range(110)]
+        assert found[-1] == stalled
+    assert watch.update(turns, wanted, 0.02, 2.0)
+    assert not watch.update(turns, (-wanted[0], -wanted[1]), 0.02, 2.0)
 
 
 def test_new_settings_change_the_policy_at_rest():
