@@ -1,9 +1,9 @@
 """What a rover on a slope does when it stops to be driven, by rest policy, in MuJoCo.
 
 Run from the repository: python -m benchmarks.hold [--slope DEG] [--seconds S]
-It needs the extra `bench`. Its results are in docs/reliability.md. The rover climbs or descends at
-its nominal speed, then an input is lost or the command becomes zero. Torques reach the wheels two
-periods (40 ms) after the measurement.
+It needs the extra `bench`. Its results are in docs/reliability.md. The rover rests, is enabled and
+climbs or descends at its nominal speed; then an input is lost or the command becomes zero. Torques
+reach the wheels two periods (40 ms) after the measurement.
 """
 
 import argparse
@@ -30,8 +30,10 @@ PERIOD = 0.02
 DELAY = 2
 """Periods from a measurement to its torques at the wheels."""
 FRICTION = 0.8
-DRIVE_TIME = 3.0
-"""Time for which the rover is driven before the event [s]."""
+SETTLING_TIME = 1.0
+"""Time at rest before the rover is enabled [s]."""
+EVENT_TIME = SETTLING_TIME + 3.0
+"""Time of the event [s]."""
 EVENTS = ("cmd_vel lost", "imu lost", "wheel rates lost", "commanded to stop", "emergency stop")
 ROVERS = {"lsr1": 6.0, "m2020": 12.0}
 """Rovers, and half the length of their slope [m]."""
@@ -66,11 +68,13 @@ def rest_on_slope(rover_name: str, policy: str, event: str, slope: float, second
     parameters = TractionControllerParameters(
         rover=rover_name, rest_policy=policy, friction=FRICTION
     )
-    supervisor = TractionSupervisor(load_traction_settings(parameters), True)
+    supervisor = TractionSupervisor(load_traction_settings(parameters), False)
     delayed = deque([supervisor.update(plant.time)] * DELAY)
     places = []
-    while plant.time < DRIVE_TIME + seconds:
-        over = plant.time > DRIVE_TIME
+    while plant.time < EVENT_TIME + seconds:
+        over = plant.time > EVENT_TIME
+        if plant.time > SETTLING_TIME and not over:
+            supervisor.permission.set_enabled(True)
         _measure(supervisor, plant, event if over else "", rover.nominal_speed)
         delayed.append(supervisor.update(plant.time))
         command = delayed.popleft()

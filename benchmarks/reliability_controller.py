@@ -1,15 +1,18 @@
 """Measures how fast the traction controller fails safe, and that it drives through what is normal.
 
 Run from the repository: python -m benchmarks.reliability_controller [--repeats N] [--seconds S]
-The controller runs in a process of its own under libfaketime (Debian's package faketime), which
-steps the system clock of that process; without it those steps are left out. The rover in this
-process steps its stamps at the same time. Times are from the cause to the arrival of the first
-command that does not push. The results are in docs/reliability.md.
+The controller runs in a process of its own. Both processes run under libfaketime (Debian's package
+faketime), which steps their system clock; without it those steps are left out. Times are from the
+cause to the arrival of the first command that does not push. The results are in
+docs/reliability.md.
 """
 
 import argparse
 import contextlib
 import os
+import select
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -24,10 +27,11 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from benchmarks.driven_rover import CONTROLLER, NANOSECONDS, DrivenRover
-from benchmarks.measure import Figure, show
+from benchmarks.measure import Figure, show, write
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import sensor_qos
+from rover_planner.ros.realtime import take_priority
 from support.ros_fixtures import RosRun, call, domain_id, wait_until
 
 TOPIC = "controller"
@@ -35,8 +39,13 @@ LIMIT = 100.0
 """Longest allowed time from a cause to zero or hold [ms]."""
 SHOWN_LIMIT = 2000.0
 """Longest allowed time from a cause to an error in diagnostics [ms]."""
-HOUR = 3600 * NANOSECONDS
+HOUR = 3600
+"""Step of the system clock [s]."""
+CLOCK_FILE = "FAKETIME_TIMESTAMP_FILE"
+"""Environment variable of libfaketime that names the file with the offset of the clock."""
 LIBRARIES = sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))
+PRIORITY = 50
+"""Real-time priority of both processes, where it is granted: other programs run beside them."""
 ROOT = Path(__file__).resolve().parents[1]
 PERIOD = 0.02
 """Period of the controller [s]."""
@@ -47,47 +56,33 @@ class Bench:
 
     def __init__(self, run: RosRun, folder: Path, children: list[ChildProcess]):
         self._run, self._folder, self._children = run, folder, children
-        self._file = folder / "clock"
         self._offset = 0
         self.rover = DrivenRover(run.context)
         self.rover.send_twists()
-        self.rover.stamp = self.now
+        self.rover.stamp = time.time_ns
         run.spin(self.rover)
+        take_priority(PRIORITY)
         self._stop = self.rover.create_publisher(Bool, f"{CONTROLLER}/emergency_stop", 1)
         self._clock = self.rover.create_publisher(Clock, "/clock", 10)
         self.clock_runs = False
         self.rover.create_timer(0.01, self._tick)
 
-    def now(self) -> int:
-        """Return the time of the clock of rover and controller [ns]."""
-        return time.time_ns() + self._offset
-
-    def step_clock(self, nanoseconds: int) -> None:
-        """Step the clock of rover and controller."""
-        self._offset += nanoseconds
-        seconds = self._offset / NANOSECONDS
+    def step_clock(self, seconds: int) -> None:
+        """Step the system clock of both processes."""
+        self._offset += seconds
         new = self._folder / "new"
-        new.write_text(f"{seconds:+.0f}\n")
-        new.replace(self._file)
+        new.write_text(f"{self._offset:+d}\n")
+        new.replace(os.environ[CLOCK_FILE])
 
     def start_controller(self, **parameters: object) -> None:
         """Start an enabled controller and wait until it drives."""
-        values = {"enabled_at_start": "true"} | parameters
+        values = {"enabled_at_start": "true", "realtime_priority": PRIORITY} | parameters
         words = [w for name, value in values.items() for w in ("-p", f"{name}:={value}")]
-        self._file.write_text("+0\n")
         environment = os.environ | {
             "ROS_DOMAIN_ID": str(domain_id()),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "PYTHONPATH": str(ROOT),
         }
-        if LIBRARIES:
-            environment |= {
-                "LD_PRELOAD": str(LIBRARIES[0]),
-                "FAKETIME_TIMESTAMP_FILE": str(self._file),
-                "FAKETIME_NO_CACHE": "1",
-                "FAKETIME_DONT_FAKE_MONOTONIC": "1",
-                "DONT_FAKE_MONOTONIC": "1",
-            }
         log = self._folder / f"{len(self._children)}.log"
         module = "rover_planner.nodes.traction_controller"
         child = ChildProcess(module, ["--ros-args", *words], environment, log)
@@ -153,7 +148,7 @@ class Bench:
 
     def _tick(self) -> None:
         if self.clock_runs:
-            now = self.now()
+            now = time.time_ns()
             message = Clock()
             message.clock.sec, message.clock.nanosec = divmod(now, NANOSECONDS)
             self._clock.publish(message)
@@ -194,15 +189,17 @@ def measure_faults(bench: Bench, repeats: int) -> list[Figure]:
     rover, figures = bench.rover, []
 
     def shift_stamps(shift: float | None) -> None:
-        frozen = bench.now()
-        rover.stamp = lambda: frozen if shift is None else bench.now() + round(shift * NANOSECONDS)
+        frozen = time.time_ns()
+        rover.stamp = lambda: (
+            frozen if shift is None else time.time_ns() + round(shift * NANOSECONDS)
+        )
 
     def mend() -> None:
-        rover.stamp = bench.now
+        rover.stamp = time.time_ns
         rover.silent.clear()
 
     bench.start_controller()
-    if LIBRARIES:
+    if CLOCK_FILE in os.environ:
         for name, step, text in (
             ("system clock stepped back by an hour", -HOUR, "stepped back"),
             ("system clock stepped ahead by an hour", HOUR, "stepped ahead"),
@@ -239,12 +236,12 @@ def measure_stopped_clock(bench: Bench, repeats: int) -> list[Figure]:
 
         def stop(stamp=stamp) -> None:
             bench.clock_runs = False
-            value = bench.now() if stamp is None else stamp
+            value = time.time_ns() if stamp is None else stamp
             bench.rover.stamp = lambda: value
 
         def start() -> None:
             bench.clock_runs = True
-            bench.rover.stamp = bench.now
+            bench.rover.stamp = time.time_ns
 
         figures += measure_case(
             bench, f"/clock stopped, {name}", "/clock stands still", stop, start, repeats
@@ -260,6 +257,7 @@ def measure_hang(bench: Bench, repeats: int) -> list[Figure]:
     node = TractionController(context=run.context, parameter_overrides=enabled)
     hang = node.create_guard_condition(lambda: time.sleep(0.5))
     run.spin(node)
+    take_priority(PRIORITY)
 
     def cause() -> None:
         hang.trigger()
@@ -335,13 +333,38 @@ def measure(repeats: int, seconds: float) -> list[Figure]:
     return figures
 
 
+def run_with_stepped_clock(words: list[str]) -> None:
+    """Run this module with arguments in a process whose system clock a file steps."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "clock"
+        file.write_text("+0\n")
+        environment = os.environ | {
+            "LD_PRELOAD": str(LIBRARIES[0]),
+            CLOCK_FILE: str(file),
+            "FAKETIME_NO_CACHE": "1",
+            "FAKETIME_DONT_FAKE_MONOTONIC": "1",
+            "DONT_FAKE_MONOTONIC": "1",
+        }
+        command = [sys.executable, "-m", "benchmarks.reliability_controller", *words]
+        subprocess.run(command, check=True, cwd=ROOT, env=environment)
+
+
 def main() -> None:
     """Measure and print a table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--repeats", type=int, default=10, help="repeats of each fault")
     parser.add_argument("--seconds", type=float, default=60.0, help="time of normal driving")
+    parser.add_argument("--out", type=Path, help="file for the figures as JSON")
     arguments = parser.parse_args()
-    show(measure(arguments.repeats, arguments.seconds))
+    if LIBRARIES and CLOCK_FILE not in os.environ:
+        run_with_stepped_clock(sys.argv[1:])
+        return
+    if CLOCK_FILE in os.environ:  # libfaketime breaks the system call of time.sleep
+        time.sleep = lambda seconds: select.select((), (), (), seconds)  # type: ignore[assignment]
+    figures = measure(arguments.repeats, arguments.seconds)
+    show(figures)
+    if arguments.out:
+        write(figures, arguments.out)
 
 
 if __name__ == "__main__":

@@ -52,13 +52,13 @@ class TractionControllerParameters(ParameterTable):
         bounds=(0.5, 3600.0),
     )
     joint_states_timeout: float = parameter(
-        0.07,
+        0.06,
         "Age above which the value of a wheel or suspension joint is stale, a fault.",
         unit="s",
         bounds=(0.01, 1.0),
     )
     imu_timeout: float = parameter(
-        0.07,
+        0.06,
         "Age above which the attitude is stale, a fault.",
         unit="s",
         bounds=(0.01, 1.0),
@@ -70,7 +70,7 @@ class TractionControllerParameters(ParameterTable):
         0.5, "Age above which odometry is not used.", unit="s", bounds=(0.01, 10.0)
     )
     clock_timeout: float = parameter(
-        0.06,
+        0.05,
         "With use_sim_time: time for which /clock may stand still before that is a fault.",
         unit="s",
         bounds=(0.01, 10.0),

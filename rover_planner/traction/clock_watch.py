@@ -7,6 +7,8 @@ MAX_STEP = 0.1
 is only slewed gains 0.5 ms a second at most."""
 MAX_SIMULATED_STEP = 1.0
 """Advance of a simulated clock between two updates that counts as a step [s]."""
+USUAL_PERIOD = 0.02
+"""Longest time between two checks that counts towards standing still [s]."""
 STOPPED = "/clock stands still"
 
 
@@ -37,9 +39,10 @@ class ClockWatch:
             self.stepped = not 0.0 <= advance <= MAX_SIMULATED_STEP
         else:
             self.stepped = abs(advance - (now - self._last[0])) > MAX_STEP
-        self._last = now, clock
         if advance or not simulated:
-            self._advanced_at = now
+            # It may have advanced for the last time soon after the last check.
+            self._advanced_at = max(self._last[0], now - USUAL_PERIOD)
+        self._last = now, clock
         if self.stepped:
             return "the clock was stepped back" if advance < 0.0 else "the clock was stepped ahead"
         return STOPPED if now - self._advanced_at > self.timeout else ""

@@ -5,6 +5,7 @@ delay it. It cannot act while another thread holds Python's interpreter lock, or
 hangs: a rover needs a hardware watchdog as well.
 """
 
+import select
 import threading
 import time
 import traceback
@@ -65,7 +66,7 @@ class Watchdog:
             now = time.monotonic()
             if now < self._deadline:
                 tripped = False
-                time.sleep(min(max(self._deadline - now, SHORTEST), POLL))
+                _sleep(min(max(self._deadline - now, SHORTEST), POLL))
                 continue
             # A thread that hangs while it sends must not keep the watchdog from acting.
             locked = self._lock.acquire(timeout=POLL)
@@ -81,4 +82,9 @@ class Watchdog:
             finally:
                 if locked:
                     self._lock.release()
-            time.sleep(POLL)
+            _sleep(POLL)
+
+
+def _sleep(seconds: float) -> None:
+    """Sleep by `select`, whose time is relative on every system and version of Python."""
+    select.select((), (), (), seconds)

@@ -61,8 +61,8 @@ def test_a_simulated_clock_may_run_fast_or_slow_but_not_stop_or_go_back():
     watch = ClockWatch(0.07)
     for k, ticks in enumerate([0, 200, 400, 401, 402]):
         assert watch.check(k * 0.02, CLOCK + ticks * MILLISECOND, True) == ""
-    for now in (0.1, 0.12, 0.14):
+    for now in (0.1, 0.12):
         assert watch.check(now, CLOCK + 402 * MILLISECOND, True) == ""
-    assert watch.check(0.16, CLOCK + 402 * MILLISECOND, True) == "/clock stands still"
+    assert watch.check(0.14, CLOCK + 402 * MILLISECOND, True) == "/clock stands still"
     assert watch.check(0.18, CLOCK + 403 * MILLISECOND, True) == ""
     assert "back" in watch.check(0.20, CLOCK, True)

@@ -83,7 +83,7 @@ def test_a_missing_joint_stops_the_wheels_within_a_tenth_of_a_second(lost, text)
     assert rig.run(1).fault == ""
     update = rig.run(4)
     assert not update.torques.any()
-    assert update.fault == f"joint_states stale: none for 70 ms ({text})"
+    assert update.fault == f"joint_states stale: none for 60 ms ({text})"
     rig.positions, rig.velocities = whole
     assert rig.run(2).fault == ""
 
@@ -201,8 +201,8 @@ def test_frozen_stamps_of_joints_stop_the_wheels_within_a_tenth_of_a_second():
         rig.send("imu", "cmd_vel")
         rig.service.take_joints(rig.positions, rig.velocities, rig.now, stamp=min(k, 35))
         update = rig.service.update(rig.now)
-        assert bool(update.fault) == (k > 38)
-    assert update.fault == "joint_states stale: none for 70 ms (stamps do not advance)"
+        assert bool(update.fault) == (k > 37)
+    assert update.fault == "joint_states stale: none for 60 ms (stamps do not advance)"
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,7 @@ def test_a_step_of_the_clock_and_the_stamps_is_a_fault_that_passes(rover, drive,
     ("shift", "text"),
     [
         (None, "stamps do not advance"),
-        (-1.0, "joint_states stale: none for 70 ms"),
+        (-1.0, "joint_states stale: none for 60 ms"),
         (1.0, "stamps are more than 50 ms ahead of this node's clock"),
     ],
 )
