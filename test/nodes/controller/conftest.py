@@ -21,10 +21,10 @@ def rover(ros):
 
 @pytest.fixture
 def start_controller(ros):
-    """Return a function that starts an enabled controller with parameters."""
+    """Return a function that starts an enabled, patient controller with other parameters."""
 
     def start(**values):
-        values = {"rate": RATE, "enabled_at_start": True} | values
+        values = {"rate": RATE, "enabled_at_start": True, **PATIENT} | values
         parameters = [Parameter(name, value=value) for name, value in values.items()]
         return ros.spin(TractionController(context=ros.context, parameter_overrides=parameters))
 
@@ -34,6 +34,6 @@ def start_controller(ros):
 @pytest.fixture
 def controller(rover, start_controller):
     """Return a patient controller that drives the rover."""
-    node = start_controller(**PATIENT)
+    node = start_controller()
     wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
     return node

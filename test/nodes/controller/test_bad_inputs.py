@@ -7,6 +7,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, PointCloud2
 
 from benchmarks.driven_rover import JOINTS
@@ -165,7 +166,7 @@ def test_an_unforeseen_error_in_a_callback_is_a_fault_and_not_the_end(
 
 def test_a_command_of_ten_per_second_is_no_drop_out(rover, start_controller):
     rover.cmd_vel_divider = 5
-    start_controller(joint_states_timeout=1.0, imu_timeout=1.0, watchdog_timeout=1.0)
+    start_controller()
     wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
     heard = len(rover.commands)
     wait_until(lambda: len(rover.commands) > heard + 100, "two seconds of commands")
@@ -191,6 +192,17 @@ def test_a_map_is_used_though_it_comes_twice_and_a_bad_one_leaves_it(rover, cont
     sender.publish(cloud)
     wait_until(lambda: rover.count_lines("elevation_cloud refused"), "the refusal in the log")
     wait_until(source_is_map, "the last map")
+
+
+def test_a_change_of_the_cell_height_acts_on_the_map_that_is_there(rover, controller):
+    sender = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    points = terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time())
+    sender.publish(points)
+    first = wait_until(lambda: controller.service._terrain, "the map")
+    changes = [Parameter("map_resolution", value=0.2), Parameter("cell_height", value="mean")]
+    assert controller.set_parameters_atomically(changes).successful
+    wait_until(lambda: controller.service._terrain is not first, "the map in other cells")
+    assert controller.service._terrain.resolution == 0.2
 
 
 def test_a_mounted_imu_is_turned_into_the_body_frame(rover, start_controller):

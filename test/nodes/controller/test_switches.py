@@ -87,7 +87,7 @@ def test_a_late_subscriber_gets_the_state(ros, rover, controller):
 
 def test_a_stall_ends_the_push_and_is_reported(rover, start_controller):
     rover.joints.velocity = [0.0] * len(rover.joints.velocity)
-    start_controller(stall_time=1.0, joint_states_timeout=1.0, imu_timeout=1.0)
+    start_controller(stall_time=1.0)
     wait_until(lambda: rover.push > 0.1, "the push")
     wait_until(lambda: rover.state == "stalled", "the stall")
     wait_until(lambda: rover.torque < 0.01, "the end of the push")
