@@ -9,6 +9,7 @@ docs/reliability.md.
 
 import argparse
 import contextlib
+import json
 import os
 import select
 import subprocess
@@ -327,16 +328,15 @@ def measure(repeats: int, seconds: float) -> list[Figure]:
     with make_bench() as bench:
         figures += measure_faults(bench, repeats)
         figures += measure_stopped_clock(bench, repeats)
-        figures += measure_hang(bench, repeats)
         figures += measure_changes(bench, repeats)
         figures += measure_normal(bench, seconds)
     return figures
 
 
-def run_with_stepped_clock(words: list[str]) -> None:
-    """Run this module with arguments in a process whose system clock a file steps."""
+def measure_with_stepped_clock(repeats: int, seconds: float) -> list[Figure]:
+    """Measure everything in a process whose system clock a file steps."""
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "clock"
+        file, out = Path(folder) / "clock", Path(folder) / "figures.json"
         file.write_text("+0\n")
         environment = os.environ | {
             "LD_PRELOAD": str(LIBRARIES[0]),
@@ -345,23 +345,29 @@ def run_with_stepped_clock(words: list[str]) -> None:
             "FAKETIME_DONT_FAKE_MONOTONIC": "1",
             "DONT_FAKE_MONOTONIC": "1",
         }
+        words = ["--repeats", str(repeats), "--seconds", str(seconds), "--out", str(out)]
         command = [sys.executable, "-m", "benchmarks.reliability_controller", *words]
         subprocess.run(command, check=True, cwd=ROOT, env=environment)
+        rows = json.loads(out.read_text())
+    return [Figure(**{k: v for k, v in row.items() if k != "met"}) for row in rows]
 
 
 def main() -> None:
-    """Measure and print a table."""
+    """Measure, print a table and write the figures."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--repeats", type=int, default=10, help="repeats of each fault")
     parser.add_argument("--seconds", type=float, default=60.0, help="time of normal driving")
     parser.add_argument("--out", type=Path, help="file for the figures as JSON")
     arguments = parser.parse_args()
-    if LIBRARIES and CLOCK_FILE not in os.environ:
-        run_with_stepped_clock(sys.argv[1:])
-        return
+    repeats, seconds = arguments.repeats, arguments.seconds
     if CLOCK_FILE in os.environ:  # libfaketime breaks the system call of time.sleep
         time.sleep = lambda seconds: select.select((), (), (), seconds)  # type: ignore[assignment]
-    figures = measure(arguments.repeats, arguments.seconds)
+        write(measure(repeats, seconds), arguments.out)
+        return
+    stepped = measure_with_stepped_clock if LIBRARIES else measure
+    with make_bench() as bench:
+        figures = measure_hang(bench, repeats)
+    figures += stepped(repeats, seconds)
     show(figures)
     if arguments.out:
         write(figures, arguments.out)
