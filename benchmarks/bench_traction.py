@@ -14,6 +14,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from benchmarks.measure import Figure
 from benchmarks.planner_process import DOMAIN, SERVER, Planner, planner_and_processes
@@ -79,7 +80,8 @@ def measure_alone() -> list[Figure]:
     assert prediction.settled.all(), "the rover must settle everywhere on the way"
     context = Context()
     rclpy.init(context=context, domain_id=DOMAIN)
-    node, times = TractionController(context=context), []
+    enabled = [Parameter("enabled_at_start", value=True)]
+    node, times = TractionController(context=context, parameter_overrides=enabled), []
     began = time.monotonic()
     for k in range(int(RATE * ALONE_TIME)):
         time.sleep(max(began + k / RATE - time.monotonic(), 0.0))

@@ -108,7 +108,7 @@ class Processes:
         for module, parameters in (
             (
                 "rover_planner.nodes.traction_controller",
-                {"rate": rate, "realtime_priority": priority},
+                {"rate": rate, "realtime_priority": priority, "enabled_at_start": True},
             ),
             (
                 "rover_planner.nodes.rover_simulator",

@@ -36,7 +36,7 @@ def generate_launch_description() -> LaunchDescription:
     nodes = {
         "rover_simulator": given | {"follow_commands": True},
         "traverse_server": rover,
-        "traction_controller": rover,
+        "traction_controller": rover | {"enabled_at_start": True},
     }
     return LaunchDescription(
         [

@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped
 from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
@@ -13,13 +13,14 @@ from msg_adapters.errors import MessageError
 from rover_physics.names import WHEEL_JOINTS, WHEELS
 
 
-def twist_to_speeds(twist: TwistStamped) -> tuple[float, float]:
+def twist_to_speeds(twist: TwistStamped | Twist) -> tuple[float, float]:
     """Return forward speed [m/s] and yaw rate [rad/s]; other components are ignored.
 
     Raises:
         MessageError: One of them is not finite.
     """
-    forward, yaw = twist.twist.linear.x, twist.twist.angular.z
+    speeds = twist.twist if isinstance(twist, TwistStamped) else twist
+    forward, yaw = speeds.linear.x, speeds.angular.z
     if not (math.isfinite(forward) and math.isfinite(yaw)):
         raise MessageError(
             f"cmd_vel has linear.x {forward} and angular.z {yaw}; both must be finite"

@@ -10,14 +10,31 @@ from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
 from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
 
+MAX_COORDINATE = 1e8
+"""Largest coordinate of a pose [m]; UTM has 1e7."""
+MAX_DEVIATION = 1e8
+"""Largest standard deviation of a pose [m]."""
 
-def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.float64], float]:
+
+def odometry_to_pose(
+    odometry: Odometry, map_frame: str, base_frame: str = ""
+) -> tuple[NDArray[np.float64], float]:
     """Return x, y, z [m], yaw [rad] (4,) of the body, and the standard deviation of x, y [m].
 
+    Args:
+        odometry: The message.
+        map_frame: Frame that its pose must be in.
+        base_frame: Frame of the body; the message must have it or none as child_frame_id. Empty
+            takes every child frame.
+
     Raises:
-        MessageError: Another frame, values that are not finite, or no unit quaternion.
+        MessageError: Another frame, values that are not finite or impossible, or no unit
+            quaternion.
     """
     check_frame(odometry.header.frame_id, map_frame, "odometry")
+    child = odometry.child_frame_id
+    if base_frame and child not in ("", base_frame):
+        raise MessageError(f"odometry is of frame {child!r}; it must be of {base_frame!r}")
     place, q = odometry.pose.pose.position, odometry.pose.pose.orientation
     norm = length_of((q.x, q.y, q.z, q.w))
     if not 0.99 < norm < 1.01:
@@ -27,10 +44,11 @@ def odometry_to_pose(odometry: Odometry, map_frame: str) -> tuple[NDArray[np.flo
         )
     _, _, yaw = rpy_from_xyzw((q.x, q.y, q.z, q.w), squared_norm=norm**2)
     pose = np.array([place.x, place.y, place.z, yaw])
-    covariance = odometry.pose.covariance
-    variance = max(float(covariance[0]), float(covariance[7]), 0.0)
-    if not (np.isfinite(pose).all() and math.isfinite(variance)):
+    variances = [float(odometry.pose.covariance[index]) for index in (0, 7)]
+    possible = (abs(pose[:3]) <= MAX_COORDINATE).all()
+    if not possible or not all(variance <= MAX_DEVIATION**2 for variance in variances):
         raise MessageError(
-            f"odometry has pose {pose.tolist()} and variance {variance}; all must be finite"
+            f"odometry has pose {pose.tolist()} and variances {variances}; coordinates must be "
+            f"within {MAX_COORDINATE:g} m, variances within {MAX_DEVIATION**2:g} m^2"
         )
-    return pose, math.sqrt(variance)
+    return pose, math.sqrt(max(*variances, 0.0))

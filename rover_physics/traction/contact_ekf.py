@@ -129,6 +129,7 @@ class MotionContactEstimator:
             )
         )
         self._motions = array_of(new_record(MOTION))
+        self._started = False
         # Views are kept because looking up a field of a record is as slow as writing it.
         state, motion = self._filters[0], self._motions[0]
         self._angles, self._covariance = state.angles, state.covariance
@@ -152,16 +153,35 @@ class MotionContactEstimator:
         self._joints[0], self._joints[1:] = motion.rocker_angle, motion.bogie_angles
         self._joint_rates[0], self._joint_rates[1:] = motion.rocker_rate, motion.bogie_rates
         self._wheel_rates[:], self._body_rates[:] = motion.wheel_rates, motion.body_rates
+        if not self._started:
+            _start(self._linkages, self._motions, self._filters)
+            self._started = True
         _update(self._linkages, self._motions, duration, self._filters)
         return self.estimate
+
+
+@kernel
+def _start(linkages, motions, filters):
+    """Start from the slopes between neighbouring wheels, which a rover at rest can measure."""
+    motion, state = motions[0], filters[0]
+    _place(linkages[0], motion, state)
+    level = _find_level(motion)
+    for wheel in range(WHEEL_COUNT):
+        state.angles[wheel] = state.slopes[wheel] - level
+
+
+@kernel
+def _find_level(motion):
+    """Return the direction of the horizontal in the body's x-z plane [rad]."""
+    roll, pitch = motion.attitude[0], motion.attitude[1]
+    return np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(roll))
 
 
 @kernel
 def _update(linkages, motions, duration, filters):
     """Place the wheels; if the rover moves, let the angles drift and correct them."""
     linkage, motion, state = linkages[0], motions[0], filters[0]
-    roll, pitch = motion.attitude[0], motion.attitude[1]
-    level = np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(roll))
+    level = _find_level(motion)
     _place(linkage, motion, state)
     max_speed = 0.0
     for wheel in range(WHEEL_COUNT):

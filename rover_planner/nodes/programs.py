@@ -67,8 +67,9 @@ PROGRAMS = {
     ),
     "traction_controller": Program(
         "Share the wheel torques by a quadratic program at its rate.",
-        "subscribes joint_states, imu, cmd_vel, odometry, elevation_cloud; publishes ~/commands, "
-        "~/wheel_loads, ~/friction_utilisation, ~/contact_angles, /diagnostics",
+        "subscribes joint_states, imu, cmd_vel, odometry, elevation_cloud, ~/emergency_stop; "
+        "serves ~/enable; publishes ~/commands, ~/brake, ~/state, ~/wheel_loads, "
+        "~/friction_utilisation, ~/contact_angles, diagnostics",
         read_nothing,
         specs_of(TractionControllerParameters),
     ),

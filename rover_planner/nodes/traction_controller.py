@@ -11,90 +11,109 @@ from typing import Any
 import numpy as np
 import rclpy
 import rclpy.logging
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TwistStamped
-from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from sensor_msgs.msg import Imu, JointState, PointCloud2
-from std_msgs.msg import Float64MultiArray
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
 
-from msg_adapters.commands import (
-    effort_commands,
-    joint_order,
-    set_values,
-    twist_to_speeds,
-    wheel_values,
-)
+from msg_adapters.commands import joint_order
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
-from msg_adapters.imu import imu_to_attitude
-from msg_adapters.joints import joint_positions, joint_velocities
-from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.results.traction_status import traction_diagnostics
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.nodes.programs import read_words
+from rover_planner.nodes.traction_inputs import TractionInputs
+from rover_planner.nodes.traction_topics import TractionTopics, latched_qos
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
+from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
 from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.transition_log import TransitionLog
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.traction.clock_watch import ClockWatch
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
+from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.statistics import TractionStatistics
-from rover_planner.traction.traction_service import (
-    TractionService,
-    TractionUpdate,
-    load_traction_settings,
+from rover_planner.traction.supervisor import (
+    DISABLED,
+    FAULT,
+    STALLED,
+    TractionCommand,
+    TractionSupervisor,
 )
+from rover_planner.traction.traction_service import TractionService
+from rover_planner.traction.watchdog import Watchdog
 
 NODE_NAME = "traction_controller"
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
+MIN_WATCHDOG_PERIODS = 2.0
+"""Shortest time without an update after which the watchdog acts, in periods."""
+STALE_PERIODS = 1.5
+"""Time after an input became stale at which the watchdog acts, in periods; updates act first."""
 SWITCH_INTERVAL = 2e-4
 """Longest time for which the thread that prepares maps may delay an update [s]; Python's
 thread switch interval."""
 ARRIVAL_TIME = Duration(seconds=0.2)
 """Longest wait for the final zero torques to reach their subscribers."""
+LOOP_FAULT = "updates came too late; the watchdog sent zero torques"
 
 
 class TractionController(Node):
-    """Connects a TractionService to ROS; any fault sets the wheel torques to zero in time."""
+    """Connects a TractionSupervisor to ROS; any fault takes the driving torques away in time."""
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
         self._values = declare_parameters(self, TractionControllerParameters)
-        self._order = joint_order(self._values.joints)
-        self._service = TractionService(load_traction_settings(self._values))
+        self._accepted = self._values, load_traction_settings(self._values)
         self._warm_up()
+        self._supervisor = TractionSupervisor(self._accepted[1], self._values.enabled_at_start)
         self._statistics = TractionStatistics(1.0 / self._values.rate)
-        self._fault, self._warning = "", ""
-        self._create_publishers()
-        self._maps = MapIntake(self._prepare_map, self._refuse_map)
-        self._create_subscriptions()
-        follow_changes(self, lambda: self._values, load_traction_settings, self._apply_parameters)
-        self._timer = self.create_timer(1.0 / self._values.rate, self.update)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        self._command: TractionCommand | None = None
+        self._log = TransitionLog(self.get_logger())
+        self._warning = ""
+        self._trips = 0
+        self.guard = Guard(self.get_logger())
+        """Counts unexpected errors."""
+        self._clock_watch = ClockWatch(self._values.clock_timeout)
+        self._topics = TractionTopics(self, joint_order(self._values.joints))
+        self._maps: MapIntake[PreparedMap] = MapIntake(self._prepare_map, self._refuse_map)
+        self._inputs = TractionInputs(self, self._values, self.service, self._maps, self.guard)
+        self._create_switches()
+        self._watchdog = Watchdog(self._send_watchdog_command)
+        follow_changes(self, lambda: self._values, self._load, self._apply_parameters)
+        self._create_timers()
         warn_of_unknown_parameters(self, TractionControllerParameters)
-        self.get_logger().info(f"ready for rover {self._service.settings.rover.name}")
+        self.get_logger().info(
+            f"ready for rover {self.service.settings.rover.name}, "
+            f"{'enabled' if self._values.enabled_at_start else 'disabled: call ~/enable to drive'}"
+        )
 
     @property
     def service(self) -> TractionService:
         """The service that takes measurements and returns torques."""
-        return self._service
+        return self._supervisor.service
 
     @property
     def statistics(self) -> TractionStatistics:
         """Update times, counts and the last update."""
         return self._statistics
+
+    @property
+    def state(self) -> str:
+        """What the controller does, as on ~/state; empty before the first update."""
+        return "" if self._command is None else self._command.state
 
     def take_priority(self) -> None:
         """Set the real-time priority of the parameter; log a warning if it is not granted."""
@@ -103,21 +122,23 @@ class TractionController(Node):
             self.get_logger().warning(refusal)
 
     def stop(self) -> None:
-        """Send zero torques, wait until they have arrived, and stop updating."""
+        """Send zero torques and the brake, wait until they have arrived, and stop updating."""
         self._timer.cancel()
-        self._send(self._commands, self._efforts, np.zeros(len(WHEEL_JOINTS)))
-        self._commands.wait_for_all_acked(ARRIVAL_TIME)
+        self._watchdog.close()
+        self._topics.writer.write(np.zeros(WHEEL_COUNT), True, DISABLED)
+        self._topics.commands.wait_for_all_acked(ARRIVAL_TIME)
 
     def destroy_node(self) -> None:
         """Send zero torques and destroy the node."""
         if self.context.ok():
             self.stop()
+        self._watchdog.close()
         self._maps.close()
         super().destroy_node()
 
     def _warm_up(self) -> None:
         """Compile and run everything once, so that the first update is as fast as others."""
-        service = TractionService(load_traction_settings(self._values))
+        service = TractionService(self._accepted[1])
         joints = dict.fromkeys(JOINTS, 0.0)
         service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
         for now in (0.0, 0.01):
@@ -127,64 +148,61 @@ class TractionController(Node):
             service.take_odometry(np.zeros(4), 0.0, now)
             service.update(now)
 
-    def _create_publishers(self) -> None:
-        qos = topic_qos()
-        self._commands = self.create_publisher(Float64MultiArray, "~/commands", qos)
-        self._loads = self.create_publisher(Float64MultiArray, "~/wheel_loads", qos)
-        self._used = self.create_publisher(Float64MultiArray, "~/friction_utilisation", qos)
-        self._angles = self.create_publisher(Float64MultiArray, "~/contact_angles", qos)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos)
-        # Messages are reused, which is safe because publishing copies them.
-        zeros = np.zeros(len(WHEEL_JOINTS))
-        self._contacts = np.zeros((2, len(WHEEL_JOINTS)))
-        self._efforts, self._of_wheels = effort_commands(zeros, self._order), wheel_values(zeros)
-        self._of_contacts = wheel_values(self._contacts, "angle, deviation")
+    def _create_switches(self) -> None:
+        """Create the service that enables and the subscriptions to the emergency stop.
 
-    def _create_subscriptions(self) -> None:
-        qos = sensor_qos()
-        self.create_subscription(JointState, "joint_states", self._take_joints, qos)
-        self.create_subscription(Imu, "imu", self._take_imu, qos)
-        self.create_subscription(TwistStamped, "cmd_vel", self._take_command, qos)
-        self.create_subscription(Odometry, "odometry", self._take_odometry, qos)
-        profiles = map_subscriptions_qos(self._values.map_durability)
-        for qos in profiles:
-            events = SubscriptionEventCallbacks(use_default_callbacks=len(profiles) == 1)
+        No single profile hears every publisher and also gets a stop that was sent before the node
+        started, so there are three subscriptions; a stop may arrive three times.
+        """
+        self.create_service(SetBool, "~/enable", self._enable)
+        silent = SubscriptionEventCallbacks(use_default_callbacks=False)
+        for qos in (topic_qos(), latched_qos(), sensor_qos()):
             self.create_subscription(
-                PointCloud2, "elevation_cloud", self._maps.offer, qos, event_callbacks=events,
-                raw=True,
-            )  # fmt: skip
+                Bool, "~/emergency_stop", self._take_emergency_stop, qos, event_callbacks=silent
+            )
+
+    def _create_timers(self) -> None:
+        # Neither a step of the system clock nor a stopped /clock delays a steady clock.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(1.0 / self._values.rate, self.update, clock=steady)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
+
+    def _load(self, parameters: TractionControllerParameters) -> TractionSettings:
+        """Return the settings of parameters; keep them for `_apply_parameters`."""
+        if self._accepted[0] != parameters:
+            settings = load_traction_settings(parameters, self.service.settings)
+            self._accepted = parameters, settings
+        return self._accepted[1]
 
     def _apply_parameters(self, parameters: TractionControllerParameters) -> None:
-        self._values = parameters
-        self._service.settings = load_traction_settings(parameters)
+        self._supervisor.configure(self._load(parameters))
+        self._clock_watch.timeout = parameters.clock_timeout
+        self._inputs.stamps.tolerance = parameters.stamp_tolerance
+        last, self._values = self._values, parameters
+        if (last.map_resolution, last.cell_height) != (
+            parameters.map_resolution,
+            parameters.cell_height,
+        ):
+            self._maps.repeat()
 
-    def _take_joints(self, state: JointState) -> None:
-        try:
-            positions = joint_positions(state, SUSPENSION_JOINTS)
-            self._service.take_joints(positions, joint_velocities(state, JOINTS), _now())
-        except MessageError as error:
-            self._service.refuse("joint_states", str(error))
+    def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        before = self._supervisor.permission.enabled
+        done, message = self._supervisor.permission.set_enabled(request.data)
+        response.success, response.message = done, message
+        if self._supervisor.permission.enabled != before or not done:
+            self.get_logger().info(message)
+            self.update()
+        return response
 
-    def _take_imu(self, imu: Imu) -> None:
-        try:
-            attitude = imu_to_attitude(imu)
-            self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, _now())
-        except MessageError as error:
-            self._service.refuse("imu", str(error))
-
-    def _take_command(self, twist: TwistStamped) -> None:
-        try:
-            self._service.take_command(*twist_to_speeds(twist), _now())
-        except MessageError as error:
-            self._service.refuse("cmd_vel", str(error))
-
-    def _take_odometry(self, odometry: Odometry) -> None:
-        try:
-            pose, deviation = odometry_to_pose(odometry, self._values.map_frame)
-            self._service.take_odometry(pose, deviation, _now())
-        except MessageError as error:
-            self._service.refuse("odometry", str(error))
-            self.get_logger().warning(f"odometry not used: {error}", throttle_duration_sec=5.0)
+    def _take_emergency_stop(self, message: Bool) -> None:
+        permission = self._supervisor.permission
+        if message.data == permission.emergency_stop:
+            return
+        permission.take_emergency_stop(message.data)
+        self.get_logger().warning(
+            "emergency stop" if message.data else "emergency stop released; ~/enable drives again"
+        )
+        self.update()
 
     def _prepare_map(self, cloud: PointCloud2) -> PreparedMap:
         """Prepare a map from a cloud; called in the intake's thread."""
@@ -192,60 +210,86 @@ class TractionController(Node):
         terrain = terrain_from_point_cloud(
             cloud, self._values.map_resolution, self._values.cell_height
         )
-        return prepare_map(self._service.settings.rover, terrain)
+        return prepare_map(self.service.settings.rover, terrain)
 
     def _refuse_map(self, error: str) -> None:
         self.get_logger().error(f"elevation_cloud refused, the last map stays: {error}")
 
     def update(self) -> None:
         """Estimate, build, solve and publish; called by the timer."""
-        start = time.perf_counter()
+        now, start = time.monotonic(), time.perf_counter()
         try:
-            prepared = self._maps.take()
-            if prepared is not None:
-                self._service.take_map(prepared)
-            update = self._service.update(_now())
+            command = self._find_command(now)
         except Exception as error:
             # After an internal error the wheels must not keep their last torque.
-            update = self._service.rest(f"internal error: {type(error).__name__}: {error}")
-        self._send(self._commands, self._efforts, update.torques[self._order])
-        if update.answer is not None and update.estimate is not None:
-            estimate, answer = update.estimate, update.answer
-            self._send(self._loads, self._of_wheels, answer.loads)
-            self._send(self._used, self._of_wheels, answer.utilisation)
-            self._contacts[0] = estimate.angles
-            np.sqrt(estimate.covariance.diagonal(), out=self._contacts[1])
-            self._send(self._angles, self._of_contacts, self._contacts)
-        self._statistics.take(update, start, time.perf_counter())
-        self._tell(update)
+            command = self._supervisor.fail(
+                f"internal error: {self.guard.report('update', error)}"
+            )
+        sent = self._watchdog.send(
+            lambda: self._topics.writer.write(command.torques, command.brake, command.state),
+            now,
+            self._find_deadline(now, command),
+        )
+        if not sent:
+            command = self._supervisor.fail(LOOP_FAULT)
+        self._topics.publish_forces(command.update)
+        self._statistics.take(command.update, start, time.perf_counter())
+        self._tell(command, now)
 
-    def _send(self, publisher, message: Float64MultiArray, values: np.ndarray) -> None:
-        set_values(message, values)
-        publisher.publish(message)
+    def _find_command(self, now: float) -> TractionCommand:
+        prepared = self._maps.take()
+        if prepared is not None:
+            self.service.take_map(prepared)
+        if self._watchdog.trips != self._trips:
+            self._trips = self._watchdog.trips
+            self._supervisor.trip(LOOP_FAULT)
+        clock = self.get_clock()
+        fault = self._clock_watch.check(now, clock.now().nanoseconds, clock.ros_time_is_active)
+        if self._clock_watch.stepped:
+            self._inputs.stamps.forget()
+            self.service.forget_times()
+        return self._supervisor.update(now, fault)
 
-    def _tell(self, update: TractionUpdate) -> None:
-        """Log changes of fault and warning, once each."""
-        if update.fault != self._fault:
-            if update.fault and not self._fault:
-                self.get_logger().warning(f"zero torque: {update.fault}")
-            elif not update.fault:
-                self.get_logger().info("driving: all inputs are there")
-            self._fault = update.fault
+    def _find_deadline(self, now: float, command: TractionCommand) -> float:
+        """Return the time at which the watchdog acts unless another command comes [s]."""
+        period = 1.0 / self._values.rate
+        next_update = now + max(self._values.watchdog_timeout, MIN_WATCHDOG_PERIODS * period)
+        return min(next_update, max(command.expiry, now) + STALE_PERIODS * period)
+
+    def _send_watchdog_command(self) -> None:
+        """Send zero torques and the brake; called in the thread of the watchdog."""
+        self._topics.watchdog_writer.write(np.zeros(WHEEL_COUNT), True, FAULT)
+
+    def _tell(self, command: TractionCommand, now: float) -> None:
+        """Log the begin and the end of faults and stalls; show a new state in the diagnostics."""
+        last, self._command = self._command, command
+        update, policy = command.update, self._values.rest_policy
+        fault = f"fault, rest by {policy}: {update.fault}" if update.fault else ""
+        self._log.update(FAULT, fault, "all inputs are right", now)
+        stalled = "stalled: no progress, stopped pushing" if command.state == STALLED else ""
+        self._log.update(STALLED, stalled, "no longer stalled", now)
+        if last is None or (last.state, last.update.fault) != (command.state, update.fault):
             self._publish_diagnostics()
         if update.warning and update.warning != self._warning:
             self.get_logger().warning(update.warning)
             self._warning = update.warning
 
     def _publish_diagnostics(self) -> None:
-        name, stamp = self._service.settings.rover.name, self.get_clock().now().to_msg()
-        self._diagnostics.publish(
-            traction_diagnostics(self._statistics.describe(), self._fault, name, stamp)
-        )
-
-
-def _now() -> float:
-    """Return the monotonic time that ages are measured with [s]."""
-    return time.monotonic()
+        command = self._command
+        if command is None:
+            return
+        values = self._statistics.describe() | {
+            "watchdog_trips": self._watchdog.trips,
+            "internal_errors": self.guard.total,
+            "brake": command.brake,
+        }
+        name, stamp = self.service.settings.rover.name, self.get_clock().now().to_msg()
+        self._topics.diagnostics.publish(
+            traction_diagnostics(
+                values, command.state, command.update.fault,
+                self._inputs.publishers.problems, name, stamp,
+            )
+        )  # fmt: skip
 
 
 class _Stop:
@@ -276,8 +320,8 @@ def main(words: Sequence[str] | None = None) -> int:
         )
         node = TractionController()
         node.take_priority()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
+        executor = GuardedExecutor()
+        executor.add_guarded(node, node.guard)
         gc.collect()
         gc.freeze()
         sys.setswitchinterval(SWITCH_INTERVAL)

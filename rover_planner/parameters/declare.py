@@ -1,6 +1,7 @@
 """Declares a node's parameters from their table, checks changes and passes them to the node."""
 
 import traceback
+from array import array
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -100,7 +101,9 @@ def _changes(table: type[ParameterTable], parameters: Iterable[Parameter]) -> di
     names = {spec.name for spec in specs_of(table)}
     return {
         parameter.name: (
-            tuple(parameter.value) if isinstance(parameter.value, list) else parameter.value
+            tuple(parameter.value)
+            if isinstance(parameter.value, list | array)
+            else parameter.value
         )
         for parameter in parameters
         if parameter.name in names
@@ -115,7 +118,7 @@ def _descriptor(spec: ParameterSpec) -> ParameterDescriptor:
     )
     if spec.choices:
         descriptor.additional_constraints = "one of " + ", ".join(spec.choices)
-    if spec.bounds is not None and isinstance(spec.default, float):
+    if spec.bounds is not None and not isinstance(spec.default, int):
         descriptor.floating_point_range = [
             FloatingPointRange(from_value=spec.bounds[0], to_value=spec.bounds[1])
         ]

@@ -67,7 +67,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     follow_commands: bool = parameter(
         False,
-        "Whether torques from /traction_controller/commands drive the rover; the simulator then "
+        "Whether torques from traction_controller/commands drive the rover; the simulator then "
         "publishes cmd_vel unless another node publishes it.",
         read_only=True,
     )

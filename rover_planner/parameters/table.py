@@ -14,6 +14,7 @@ _ROS_TYPES: dict[Any, str] = {
     int: "integer",
     bool: "bool",
     tuple[str, ...]: "string array",
+    tuple[float, ...]: "double array",
 }
 
 
@@ -82,10 +83,9 @@ class ParameterSpec:
                 f"parameter {self.name} is {value!r}; it must be of "
                 f"type {self.type_name}, such as {self.ros_default!r}"
             )
-        if isinstance(value, tuple) and not all(isinstance(text, str) and text for text in value):
-            raise ParameterError(
-                f"parameter {self.name} is {list(value)!r}; it must hold texts, none of them empty"
-            )
+        if isinstance(value, tuple):
+            self._check_items(value)
+            return
         if value == "" != self.default:
             raise ParameterError(
                 f"parameter {self.name} is empty; it must be a text such as {self.default!r}"
@@ -100,6 +100,27 @@ class ParameterSpec:
         if self.choices and value not in self.choices:
             raise ParameterError(
                 f"parameter {self.name} is {value!r}; it must be one of {', '.join(self.choices)}"
+            )
+
+    def _check_items(self, values: tuple[Any, ...]) -> None:
+        """Check the items of an array; one of numbers keeps the length of the default."""
+        if self.type_name == "string array":
+            if not all(isinstance(text, str) and text for text in values):
+                raise ParameterError(
+                    f"parameter {self.name} is {list(values)!r}; it must hold texts, none of them "
+                    "empty"
+                )
+            return
+        low, high = self.bounds or (-math.inf, math.inf)
+        right = len(values) == len(self.default) and all(
+            isinstance(number, float) and math.isfinite(number) and low <= number <= high
+            for number in values
+        )
+        if not right:
+            allowed = f" in {low:g} to {high:g} {self.unit}".rstrip() if self.bounds else ""
+            raise ParameterError(
+                f"parameter {self.name} is {list(values)!r}; it must hold {len(self.default)} "
+                f"finite numbers{allowed}"
             )
 
 

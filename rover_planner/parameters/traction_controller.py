@@ -5,12 +5,17 @@ from dataclasses import dataclass
 from rover_physics.names import OPTIMAL, TORQUE_POLICIES, WHEEL_JOINTS
 from rover_planner.parameters.shared import (
     cell_height_parameter,
+    input_reliability_parameter,
     map_durability_parameter,
     map_resolution_parameter,
     max_torque_parameter,
     payload_parameter,
 )
 from rover_planner.parameters.table import ParameterTable, parameter
+
+HOLD, BRAKE, COAST = "hold", "brake", "coast"
+REST_POLICIES = (HOLD, BRAKE, COAST)
+"""Values of the parameter rest_policy; `rover_planner.traction.hold` explains them."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +35,59 @@ class TractionControllerParameters(ParameterTable):
         bounds=(0, 99),
         read_only=True,
     )
-    timeout: float = parameter(
-        0.08,
-        "Age above which joint states, attitude and cmd_vel are stale; torques are then zero.",
+    enabled_at_start: bool = parameter(
+        False,
+        "Whether the node drives without a call of ~/enable; for simulations.",
+        read_only=True,
+    )
+    rest_policy: str = parameter(
+        HOLD,
+        "What the wheels do when the node does not drive: hold, brake or coast.",
+        choices=REST_POLICIES,
+    )
+    stall_time: float = parameter(
+        10.0,
+        "Time without progress after which the node stops pushing and is stalled.",
+        unit="s",
+        bounds=(0.5, 3600.0),
+    )
+    joint_states_timeout: float = parameter(
+        0.06,
+        "Age above which the value of a wheel or suspension joint is stale, a fault.",
         unit="s",
         bounds=(0.01, 1.0),
     )
+    imu_timeout: float = parameter(
+        0.06,
+        "Age above which the attitude is stale, a fault.",
+        unit="s",
+        bounds=(0.01, 1.0),
+    )
+    cmd_vel_timeout: float = parameter(
+        0.5, "Age above which cmd_vel is stale, a fault.", unit="s", bounds=(0.01, 10.0)
+    )
     odometry_timeout: float = parameter(
         0.5, "Age above which odometry is not used.", unit="s", bounds=(0.01, 10.0)
+    )
+    clock_timeout: float = parameter(
+        0.05,
+        "With use_sim_time: time for which /clock may stand still before that is a fault.",
+        unit="s",
+        bounds=(0.01, 10.0),
+    )
+    stamp_tolerance: float = parameter(
+        0.05,
+        "Time that a header stamp may be ahead of the node's clock; a message further ahead is "
+        "not used.",
+        unit="s",
+        bounds=(0.0, 1.0),
+    )
+    watchdog_timeout: float = parameter(
+        0.08,
+        "Time without an update after which the watchdog's thread sends zero torques; at least "
+        "two periods of rate are allowed.",
+        unit="s",
+        bounds=(0.01, 1.0),
     )
     friction: float = parameter(
         0.0, "Assumed Coulomb friction; 0 uses that of the rover file.", bounds=(0.0, 10.0)
@@ -50,7 +100,11 @@ class TractionControllerParameters(ParameterTable):
         choices=TORQUE_POLICIES,
     )
     torque_rate: float = parameter(
-        20.0, "Largest rate of change of a torque.", unit="N m/s", bounds=(0.1, 1e6)
+        0.0,
+        "Largest rate of change of a torque while driving; 0 is ten times the largest torque of "
+        "the rover file per second.",
+        unit="N m/s",
+        bounds=(0.0, 1e6),
     )
     speed_gain: float = parameter(
         6.0, "Acceleration per error of speed.", unit="1/s", bounds=(0.0, 1e3)
@@ -70,6 +124,30 @@ class TractionControllerParameters(ParameterTable):
     map_frame: str = parameter(
         "map", "Frame of map and odometry; messages in another frame are refused.", read_only=True
     )
+    base_frame: str = parameter(
+        "base_link",
+        "Frame of the body; odometry of another child frame is refused, an empty one is the body.",
+        read_only=True,
+    )
+    imu_frame: str = parameter(
+        "",
+        "Frame of the IMU; empty is that of the body. An IMU with another frame_id is refused, an "
+        "empty one is this.",
+        read_only=True,
+    )
+    imu_mounting: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0),
+        "Roll, pitch and yaw of the IMU's axes in the body frame.",
+        unit="rad",
+        bounds=(-6.3, 6.3),
+        read_only=True,
+    )
+    cmd_vel_stamped: bool = parameter(
+        True,
+        "Whether cmd_vel is a geometry_msgs/TwistStamped; false for a geometry_msgs/Twist.",
+        read_only=True,
+    )
     map_resolution: float = map_resolution_parameter()
     cell_height: str = cell_height_parameter()
     map_durability: str = map_durability_parameter()
+    input_reliability: str = input_reliability_parameter()

@@ -56,6 +56,15 @@ class PIController:
         """Set the integral to zero."""
         self._integral = 0.0
 
+    @property
+    def integral(self) -> float:
+        """The integral part of the output; one from another controller makes a smooth change."""
+        return self._integral
+
+    @integral.setter
+    def integral(self, integral: float) -> None:
+        self._integral = self._clip(integral)
+
     def update(self, error: float, duration: float, limited: bool) -> float:
         """Return the output.
 

@@ -1,5 +1,6 @@
 """The traction controller without ROS: keeps measurements and computes wheel torques."""
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,10 +9,8 @@ from statistics import median
 import numpy as np
 
 from rover_physics.errors import ModelError
-from rover_physics.names import OPTIMAL, SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
+from rover_physics.names import OPTIMAL, SUSPENSION_JOINTS, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import (
@@ -28,20 +27,21 @@ from rover_physics.traction.solver import (
     TractionWorkspace,
     solve_traction,
 )
-from rover_planner.parameters.shared import payload_or_none
-from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.traction.input_monitor import InputMonitor
+from rover_planner.traction.input_monitor import NEVER, InputMonitor
+from rover_planner.traction.joint_memory import JointMemory
+from rover_planner.traction.limits import MeasurementLimits
 from rover_planner.traction.loops import (
-    LoopGains,
     PIController,
     StallDetector,
     estimate_rolling_rates,
     limit_rate,
 )
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
+from rover_planner.traction.settings import TractionSettings, load_traction_settings
 
-INPUTS = ("joint_states", "imu", "cmd_vel")
-ODOMETRY = "odometry"
+__all__ = ["TractionService", "TractionSettings", "TractionUpdate", "load_traction_settings"]
+
+JOINT_STATES, IMU, CMD_VEL, ODOMETRY = "joint_states", "imu", "cmd_vel", "odometry"
 MAX_PUSH = 0.6
 """Largest push of the speed loop, as a share of the rover's weight."""
 HEADING_INTEGRAL_GAIN = 0.5
@@ -52,28 +52,6 @@ MAX_STEP = 0.1
 """Upper bound of the time step of loops and filter [s]."""
 TURN_LEFT = np.repeat([1.0, -1.0], 3)
 """Signs (6,) of wheel torques that turn the rover left: the right wheels drive forward."""
-
-
-@dataclass(frozen=True)
-class TractionSettings:
-    """The parameters of a traction controller, loaded and ready to use."""
-
-    rover: Rover
-    """The rover that is driven."""
-    friction: float
-    """Assumed friction coefficient."""
-    max_torque: float
-    """Largest torque of a wheel [N m]."""
-    payload: float | None
-    """Mass at the arm's tip [kg]; None takes that of the rover."""
-    policy: str
-    """One of TORQUE_POLICIES."""
-    timeout: float
-    """Age above which an input is stale [s]."""
-    odometry_timeout: float
-    """Age above which odometry is not used [s]."""
-    gains: LoopGains
-    """Gains of the loops."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,42 +72,15 @@ class TractionUpdate:
     """Computation time of the update [s]."""
 
 
-def load_traction_settings(parameters: TractionControllerParameters) -> TractionSettings:
-    """Load the rover named in the parameters, and check the payload.
-
-    Raises:
-        RoverError: The rover cannot be loaded, or cannot carry the payload.
-        ParameterError: The payload is below 0 and not OWN_PAYLOAD.
-    """
-    rover = load_rover(parameters.rover)
-    settings = TractionSettings(
-        rover=rover,
-        friction=parameters.friction or rover.friction,
-        max_torque=parameters.max_torque or rover.wheel.max_torque,
-        payload=payload_or_none(parameters.payload),
-        policy=parameters.policy,
-        timeout=parameters.timeout,
-        odometry_timeout=parameters.odometry_timeout,
-        gains=LoopGains(
-            speed=parameters.speed_gain,
-            travel=parameters.travel_gain,
-            heading=parameters.heading_gain,
-            slip=parameters.slip_gain * rover.weight * rover.wheel.radius**2,
-            torque_rate=parameters.torque_rate,
-        ),
-    )
-    BalanceWriter(rover, settings.payload)
-    return settings
-
-
 class TractionService:
     """Keeps the last measurements, the estimate of the contact angles, and the loops."""
 
     def __init__(self, settings: TractionSettings):
         """Start without measurements."""
         self._workspace = TractionWorkspace()
-        self._monitor = InputMonitor(INPUTS, settings.timeout)
-        self._odometry_monitor = InputMonitor((ODOMETRY,), settings.odometry_timeout)
+        self._monitor = InputMonitor({})
+        self._odometry_monitor = InputMonitor({})
+        self._joints = JointMemory()
         self._suspension_angles = np.zeros(len(SUSPENSION_JOINTS))
         self._suspension_rates: Floats | None = None
         self._wheel_rates = np.zeros(WHEEL_COUNT)
@@ -139,30 +90,48 @@ class TractionService:
         self._wanted_speed, self._wanted_yaw_rate = 0.0, 0.0
         self._pose, self._deviation = np.zeros(4), 0.0
         self._terrain: Terrain | None = None
-        self._last_time: float | None = None
         self._finder: MapContactFinder | None = None
-        self.settings = settings
+        self._last_time: float | None = None
+        self._last: Floats | None = None
+        self._apply(settings)
+        self._estimator = MotionContactEstimator(settings.rover)
+        self._create_loops()
+        self._reset()
 
     @property
     def settings(self) -> TractionSettings:
-        """The current settings."""
+        """The current settings; new ones keep the torques and what the loops have added up."""
         return self._settings
 
     @settings.setter
     def settings(self, settings: TractionSettings) -> None:
+        last = self._settings
+        self._apply(settings)
+        integrals = self._speed.integral, self._heading.integral
+        self._create_loops()
+        if settings.rover is last.rover:
+            self._speed.integral, self._heading.integral = integrals
+            return
+        self._estimator = MotionContactEstimator(settings.rover)
+        self._last = None
+        if self._terrain is not None:
+            self.take_terrain(self._terrain)
+
+    def _apply(self, settings: TractionSettings) -> None:
+        """Take what follows from settings and has no state."""
         self._settings = settings
-        rover = settings.rover
-        self._monitor.timeout = settings.timeout
-        self._odometry_monitor.timeout = settings.odometry_timeout
+        rover, timeouts = settings.rover, settings.timeouts
+        self._monitor.timeouts = {
+            JOINT_STATES: timeouts.joint_states,
+            IMU: timeouts.imu,
+            CMD_VEL: timeouts.cmd_vel,
+        }
+        self._odometry_monitor.timeouts = {ODOMETRY: timeouts.odometry}
         self._writer = BalanceWriter(rover, settings.payload)
-        self._estimator = MotionContactEstimator(rover)
+        self._limits = MeasurementLimits(rover)
         self._optimal = settings.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
         self._inputs = ProgramInputs(friction, settings.max_torque, rover.wheel.radius)
-        self._create_loops()
-        if self._terrain is not None:
-            self.take_terrain(self._terrain)
-        self._reset()
 
     def _create_loops(self) -> None:
         """Create the loops of speed and heading with the current gains."""
@@ -177,39 +146,89 @@ class TractionService:
             heading, HEADING_INTEGRAL_GAIN * heading, max_push * self._half_track
         )
 
+    @property
+    def weight(self) -> float:
+        """Weight with payload [N]."""
+        return float(self._writer.weight)
+
+    @property
+    def wheel_rates(self) -> Floats:
+        """Last measured rates (6,) of the wheels [rad/s]."""
+        return self._wheel_rates
+
+    @property
+    def wheel_time(self) -> float:
+        """Time of the oldest of these rates [s]."""
+        return self._joints.wheel_time
+
+    @property
+    def pitch(self) -> float:
+        """Last measured pitch [rad], positive with the nose down."""
+        return self._attitude[1]
+
+    @property
+    def wanted(self) -> tuple[float, float]:
+        """Commanded speed [m/s] and yaw rate [rad/s], within what the rover can do."""
+        return self._wanted_speed, self._wanted_yaw_rate
+
+    @property
+    def expiry(self) -> float:
+        """Time at which the first of the needed inputs becomes stale [s]."""
+        return self._monitor.expiry
+
     def take_joints(
-        self, positions: Mapping[str, float], velocities: Mapping[str, float], now: float
+        self,
+        positions: Mapping[str, float],
+        velocities: Mapping[str, float],
+        now: float,
+        stamp: int = 0,
     ) -> None:
-        """Take angles [rad] and rates [rad/s] of joints by name, measured at time `now` [s]."""
-        missing = [name for name in SUSPENSION_JOINTS if name not in positions]
-        missing += [name for name in WHEEL_JOINTS if name not in velocities]
-        if missing:
-            what = "position" if missing[0] in SUSPENSION_JOINTS else "velocity"
-            self._monitor.refuse(
-                "joint_states", f"joint_states has no {what} of {', '.join(missing)}"
-            )
+        """Take angles [rad] and rates [rad/s] of joints by name, measured at time `now` [s].
+
+        A message may hold some of the joints only; each keeps its last value and time. `stamp` is
+        the header stamp [ns], 0 if there is none; values whose stamp does not advance are old.
+        """
+        wrong = self._limits.find_wrong_joint(positions, velocities)
+        if wrong:
+            self._monitor.refuse(JOINT_STATES, wrong, now)
             return
-        self._suspension_angles = np.array([positions[name] for name in SUSPENSION_JOINTS])
-        self._wheel_rates = np.array([velocities[name] for name in WHEEL_JOINTS])
+        if not self._joints.take(positions, velocities, now, stamp):
+            if positions or velocities:
+                self._monitor.ignore(JOINT_STATES, "stamps do not advance")
+            return
+        self._suspension_angles = self._joints.suspension_angles
+        self._wheel_rates = self._joints.wheel_rates
         self._mean_rate = float(self._wheel_rates.sum()) / WHEEL_COUNT
-        known = all(name in velocities for name in SUSPENSION_JOINTS)
-        self._suspension_rates = (
-            np.array([velocities[name] for name in SUSPENSION_JOINTS]) if known else None
-        )
-        self._monitor.take("joint_states", now)
+        earliest = now - self._settings.timeouts.joint_states
+        self._suspension_rates = self._joints.find_suspension_rates(earliest)
+        if math.isfinite(self._joints.time):
+            self._monitor.take(JOINT_STATES, self._joints.time)
+
+    def forget_times(self) -> None:
+        """Forget when inputs came, after a step of the clock: each must arrive anew."""
+        self._joints.forget()
+        self._monitor.forget()
+        self._odometry_monitor.forget()
 
     def take_attitude(self, roll: float, pitch: float, rates: Floats | None, now: float) -> None:
         """Take roll and pitch [rad], measured at time `now` [s].
 
         `rates` is the angular velocity (3,) in the body frame [rad/s], None if not measured.
         """
+        wrong = self._limits.find_wrong_rates(rates)
+        if wrong:
+            self._monitor.refuse(IMU, wrong, now)
+            return
         self._attitude, self._body_rates = (roll, pitch), rates
-        self._monitor.take("imu", now)
+        self._monitor.take(IMU, now)
 
     def take_command(self, speed: float, yaw_rate: float, now: float) -> None:
-        """Take the wanted speed [m/s] and yaw rate [rad/s], received at time `now` [s]."""
-        self._wanted_speed, self._wanted_yaw_rate = speed, yaw_rate
-        self._monitor.take("cmd_vel", now)
+        """Take the wanted speed [m/s] and yaw rate [rad/s], received at time `now` [s].
+
+        Speeds beyond those of the rover's wheels are reduced.
+        """
+        self._wanted_speed, self._wanted_yaw_rate = self._limits.clip_command(speed, yaw_rate)
+        self._monitor.take(CMD_VEL, now)
 
     def take_odometry(self, pose: Floats, deviation: float, now: float) -> None:
         """Take x, y, z [m], yaw [rad] (4,), map frame, and the standard deviation of x, y [m]."""
@@ -227,14 +246,30 @@ class TractionService:
             prepared = prepare_map(rover, prepared.terrain)
         self._terrain, self._finder = prepared.terrain, prepared.finder
 
-    def refuse(self, name: str, error: str) -> None:
-        """Record an invalid input and its error."""
-        (self._odometry_monitor if name == ODOMETRY else self._monitor).refuse(name, error)
+    def refuse(self, name: str, error: str, now: float = NEVER) -> None:
+        """Record an invalid input and its error; later inputs end it."""
+        (self._odometry_monitor if name == ODOMETRY else self._monitor).refuse(name, error, now)
+
+    def ignore(self, name: str, reason: str) -> None:
+        """Record why a message was not used; it is a fault only if no other one comes."""
+        (self._odometry_monitor if name == ODOMETRY else self._monitor).ignore(name, reason)
+
+    def find_fault(self, now: float) -> str:
+        """Return the fault of the inputs at time `now` [s]; empty if there is none."""
+        if not self._monitor.is_fresh(JOINT_STATES, now) and not self._joints.is_empty:
+            timeout = self._settings.timeouts.joint_states
+            missing = self._joints.describe_older(now - timeout)
+            self._monitor.describe(JOINT_STATES, missing)
+        return self._monitor.find_fault(now)
+
+    def start_from(self, torques: Floats) -> None:
+        """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
+        self._torques = torques.copy()
 
     def update(self, now: float) -> TractionUpdate:
         """Return the torques for time `now` [s], on the same clock as the inputs."""
         start = time.perf_counter()
-        fault = self._monitor.find_fault(now)
+        fault = self.find_fault(now)
         if fault:
             return self.rest(fault, start)
         duration = 0.0 if self._last_time is None else min(now - self._last_time, MAX_STEP)
@@ -267,7 +302,7 @@ class TractionService:
         self._heading.reset()
         self._stall = StallDetector()
         self._last_time = None
-        self._last: Floats | None = None
+        self._last = None
         self._limited = False
         self._torques = np.zeros(WHEEL_COUNT)
 

@@ -47,6 +47,11 @@ def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
     return ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
 
 
+def start_controller(ros) -> TractionController:
+    enabled = [Parameter("enabled_at_start", value=True)]
+    return ros.spin(TractionController(context=ros.context, parameter_overrides=enabled))
+
+
 class Ear(Node):
     """Keeps what it hears."""
 
@@ -133,7 +138,7 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
 ):
     simulator = start_simulator(ros, terrain_file, follow_commands=True, engine=engine)
     server = ros.spin(TraverseServer(context=ros.context))
-    controller = ros.spin(TractionController(context=ros.context))
+    controller = start_controller(ros)
     planner = ros.spin(MissionPlanner(context=ros.context))
     planner.wait_for_server()
     wait_until(lambda: server.service.terrain is not None, "the map")
@@ -151,7 +156,7 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
 def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(ros, terrain_file):
     ear = Ear(ros)
     simulator = start_simulator(ros, terrain_file, follow_commands=True)
-    controller = ros.spin(TractionController(context=ros.context))
+    controller = start_controller(ros)
     wait_until(lambda: controller.statistics.updates > 5, "the controller to run")
     twist = TwistStamped()
     twist.twist.linear.x = 0.06

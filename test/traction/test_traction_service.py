@@ -7,7 +7,8 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.traction.traction_service import TractionService, load_traction_settings
+from rover_planner.traction.settings import load_traction_settings
+from rover_planner.traction.traction_service import TractionService
 from support.rough_grounds import plane
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
@@ -54,13 +55,13 @@ def test_nothing_moves_before_all_inputs_are_there():
 
 
 @pytest.mark.parametrize("silent", ["joint_states", "imu", "cmd_vel"])
-def test_a_silent_input_stops_the_wheels_within_a_tenth_of_a_second_and_its_return_starts_them(
+def test_a_silent_input_stops_the_wheels_after_its_timeout_and_its_return_starts_them(
     silent,
 ):
     rig = Rig()
     assert rig.run().torques.any()
     others = [name for name in ("joint_states", "imu", "cmd_vel") if name != silent]
-    update = rig.run(5, *others)
+    update = rig.run(26 if silent == "cmd_vel" else 4, *others)
     assert not update.torques.any() and update.fault.startswith(f"{silent} stale")
     update = rig.run(3)
     assert update.fault == "" and update.torques.any()
@@ -73,14 +74,16 @@ def test_a_silent_input_stops_the_wheels_within_a_tenth_of_a_second_and_its_retu
         ("rear_left_wheel", "no velocity of rear_left_wheel"),
     ],
 )
-def test_a_missing_joint_stops_the_wheels_at_once(lost, text):
+def test_a_missing_joint_stops_the_wheels_within_a_tenth_of_a_second(lost, text):
     rig = Rig()
     rig.run()
     whole = dict(rig.positions), dict(rig.velocities)
     rig.positions.pop(lost, None)
     rig.velocities.pop(lost, None)
-    update = rig.run(1)
-    assert not update.torques.any() and text in update.fault
+    assert rig.run(1).fault == ""
+    update = rig.run(4)
+    assert not update.torques.any()
+    assert update.fault == f"joint_states stale: none for 60 ms ({text})"
     rig.positions, rig.velocities = whole
     assert rig.run(2).fault == ""
 
@@ -183,11 +186,129 @@ def test_equal_torques_are_equal():
     assert np.ptp(rig.run().torques) < 1e-9
 
 
-def test_new_settings_are_taken_over_at_once():
+def test_joints_of_an_arm_between_those_of_the_wheels_change_nothing():
+    rig = Rig()
+    for _ in range(50):
+        assert rig.run(1).torques.any() or rig.now < 0.1
+        rig.service.take_joints({"arm_yaw": 0.1}, {"arm_yaw": 0.0}, rig.now + 0.01)
+        assert rig.service.update(rig.now + 0.01).fault == ""
+
+
+def test_frozen_stamps_of_joints_stop_the_wheels_within_a_tenth_of_a_second():
+    rig = Rig()
+    for k in range(1, 40):
+        rig.now += PERIOD
+        rig.send("imu", "cmd_vel")
+        rig.service.take_joints(rig.positions, rig.velocities, rig.now, stamp=min(k, 35))
+        update = rig.service.update(rig.now)
+        assert bool(update.fault) == (k > 37)
+    assert update.fault == "joint_states stale: none for 60 ms (stamps do not advance)"
+
+
+@pytest.mark.parametrize(
+    ("joint", "value", "text"),
+    [
+        ("front_left_wheel", 1000.0, "velocity 1000 of front_left_wheel"),
+        ("rocker_left", 100.0, "velocity 100 of rocker_left"),
+    ],
+)
+def test_an_impossible_rate_of_a_joint_is_a_fault(joint, value, text):
+    rig = Rig()
+    rig.run()
+    rig.velocities[joint] = value
+    update = rig.run(1)
+    assert text in update.fault and not update.torques.any()
+
+
+def test_an_impossible_angle_is_a_fault():
+    rig = Rig()
+    rig.positions["bogie_right"] = 3.0
+    assert "position 3 of bogie_right; it must be in -1.4 to 1.4 rad" in rig.run(1).fault
+
+
+def test_an_impossible_turning_rate_is_a_fault():
+    rig = Rig()
+    rig.rates = np.array([0.0, 1000.0, 0.0])
+    assert rig.run(1).fault.startswith("imu has angular velocity [0.0, 1000.0, 0.0]")
+
+
+def test_commands_are_reduced_to_what_the_wheels_can_do():
+    service = TractionService(settings())
+    service.take_command(5.0, 0.0, 0.0)
+    assert service.wanted == pytest.approx((0.1, 0.0))
+    service.take_command(-0.1, 1.0, 0.0)
+    speed, yaw_rate = service.wanted
+    assert yaw_rate / speed == pytest.approx(-10.0)
+    assert abs(speed) + 0.31 * abs(yaw_rate) == pytest.approx(0.1)
+    service.take_command(0.03, 0.05, 0.0)
+    assert service.wanted == (0.03, 0.05)
+
+
+CHANGES = [
+    {"friction": 0.3},
+    {"max_torque": 0.3},
+    {"payload": 2.0},
+    {"policy": "equal"},
+    {"torque_rate": 15.0},
+    {"speed_gain": 0.0},
+    {"travel_gain": 500.0},
+    {"heading_gain": 20.0},
+    {"slip_gain": 8.0},
+    {"imu_timeout": 0.2},
+    {"rover": "m2020"},
+]
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda change: next(iter(change)))
+def test_no_change_of_a_parameter_moves_a_torque_faster_than_torque_rate(change):
+    rig = Rig()
+    rig.pitch = -0.2
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.1) | {"rear_left_wheel": 0.4}
+    last = rig.run().torques
+    assert np.abs(last).max() > 0.2
+    parameters = TractionControllerParameters(**change)
+    rig.service.settings = load_traction_settings(parameters, rig.service.settings)
+    for _ in range(20):
+        torques = rig.run(1).torques
+        most = rig.service.settings.gains.torque_rate * PERIOD
+        assert np.abs(torques - last).max() <= most + 1e-9
+        last = torques
+    assert torques.any()
+
+
+def test_a_change_without_a_meaning_for_the_torques_leaves_them_as_they_are():
+    rigs = Rig(), Rig()
+    for rig in rigs:
+        rig.run()
+    rigs[1].service.settings = load_traction_settings(
+        TractionControllerParameters(stall_time=3.0), rigs[1].service.settings
+    )
+    one, other = (rig.run(5).torques for rig in rigs)
+    assert one.tolist() == other.tolist()
+
+
+def test_a_new_limit_of_torques_is_kept_after_the_time_that_torque_rate_needs():
     rig = Rig()
     rig.run()
     rig.service.settings = replace(rig.service.settings, max_torque=0.01)
     assert np.abs(rig.run().torques).max() <= 0.01
+
+
+def test_the_torque_rate_scales_with_the_rover():
+    for name in ("lsr1", "m2020"):
+        found = settings(rover=name)
+        assert found.gains.torque_rate == 10.0 * found.rover.wheel.max_torque
+    assert settings(torque_rate=3.0).gains.torque_rate == 3.0
+
+
+def test_m2020_has_nine_tenths_of_its_torque_on_a_slope_within_a_fifth_of_a_second():
+    rig = Rig(rover="m2020")
+    rig.pitch = -np.radians(17.0)
+    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.03 / 0.2625)
+    rover = rig.service.settings.rover
+    wanted = rover.weight * np.sin(-rig.pitch) * rover.wheel.radius
+    while rig.run(1).torques.sum() < 0.9 * wanted:
+        assert rig.now < 0.2
 
 
 def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():

@@ -1,5 +1,7 @@
 """Contact angles from simulated motion and from the map, over slopes, steps and rocks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,15 @@ def follow(rover, motions, duration):
 
 def rms(errors):
     return float(np.sqrt(np.mean(errors[150:] ** 2)))
+
+
+@pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])
+@pytest.mark.parametrize("rover", [LSR1, load_rover("m2020")], ids=lambda rover: rover.name)
+def test_on_an_even_slope_the_angles_are_known_before_the_rover_has_moved(rover, slope):
+    prediction, motions, _ = drive_states(rover, plane(*slope, half=4.0))
+    still = replace(motions[0], wheel_rates=np.zeros(6), body_rates=np.zeros(3))
+    estimate = MotionContactEstimator(rover).update(still, 0.02)
+    assert estimate.angles == pytest.approx(prediction.contact_angle[0], abs=0.01)
 
 
 @pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])

@@ -1,0 +1,138 @@
+"""A node that sends what a creeping rover measures, and hears what its controller commands."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, TwistStamped
+from rcl_interfaces.msg import Log
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool, Float64MultiArray, String
+
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_planner.ros.qos import sensor_qos, topic_qos
+
+RATE = 50.0
+"""Messages per second of each sensor."""
+NANOSECONDS = 1_000_000_000
+JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+CONTROLLER = "traction_controller"
+
+Stamp = Callable[[], int]
+"""Returns a header stamp [ns]."""
+
+
+def no_stamp() -> int:
+    """Return the stamp of a driver that has none."""
+    return 0
+
+
+class DrivenRover(Node):
+    """A rover whose wheels turn at a constant rate, whatever the torques are."""
+
+    def __init__(
+        self, context: Context, namespace: str = "", rate: float = RATE, **arguments: Any
+    ):
+        """Send at `rate` [Hz] from now on; stamps are zero until `stamp` is replaced."""
+        super().__init__("rover", context=context, namespace=namespace, **arguments)
+        self.joints = JointState(name=list(JOINTS))
+        self.joints.position = [0.0] * len(JOINTS)
+        self.joints.velocity = [0.0] * len(SUSPENSION_JOINTS) + [0.2] * len(WHEEL_JOINTS)
+        self.imu = Imu()
+        self.twist: TwistStamped | Twist = TwistStamped()
+        self.speed = 0.03
+        self.stamp: Stamp = no_stamp
+        self.silent: set[str] = set()
+        """Topics that are not sent."""
+        self.cmd_vel_divider = 1
+        """cmd_vel is sent with every so many-th message of the sensors."""
+        self.commands: list[tuple[float, float, float]] = []
+        """Time of arrival [s], largest magnitude and sum of each command's torques [N m]."""
+        self.states: list[str] = []
+        self.brakes: list[bool] = []
+        self.diagnostics: list[tuple[float, Any]] = []
+        """Time of arrival [s] and status."""
+        self.log: list[str] = []
+        self._count = 0
+        self._senders = {
+            "joint_states": self.create_publisher(JointState, "joint_states", sensor_qos()),
+            "imu": self.create_publisher(Imu, "imu", sensor_qos()),
+        }
+        self.listen()
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0 / RATE, self._send, clock=steady)
+
+    def send_twists(self, kind: type = TwistStamped) -> None:
+        """Send cmd_vel of a type from now on."""
+        self.twist = kind()
+        self._senders["cmd_vel"] = self.create_publisher(kind, "cmd_vel", sensor_qos())
+
+    def listen(self) -> None:
+        """Subscribe to what the controller publishes."""
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        for kind, name, hear, qos in (
+            (Float64MultiArray, f"{CONTROLLER}/commands", self._hear_command, topic_qos()),
+            (String, f"{CONTROLLER}/state", lambda m: self.states.append(m.data), latched),
+            (Bool, f"{CONTROLLER}/brake", lambda m: self.brakes.append(m.data), latched),
+            (DiagnosticArray, "diagnostics", self._hear_diagnostics, topic_qos()),
+            (Log, "/rosout", self._hear_log, 100),
+        ):
+            self.create_subscription(kind, name, hear, qos)
+
+    def _send(self) -> None:
+        self._count += 1
+        stamp = self.stamp()
+        now = Time(sec=stamp // NANOSECONDS, nanosec=stamp % NANOSECONDS)
+        self.joints.header.stamp = self.imu.header.stamp = now
+        twist = self.twist
+        if isinstance(twist, TwistStamped):
+            twist.header.stamp, twist = now, twist.twist
+        twist.linear.x = self.speed
+        messages = {"joint_states": self.joints, "imu": self.imu, "cmd_vel": self.twist}
+        for name, sender in self._senders.items():
+            if name in self.silent or (name == "cmd_vel" and self._count % self.cmd_vel_divider):
+                continue
+            sender.publish(messages[name])
+
+    def _hear_command(self, message: Float64MultiArray) -> None:
+        torques = list(message.data)
+        self.commands.append((time.monotonic(), max(map(abs, torques)), sum(torques)))
+
+    def _hear_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.startswith(CONTROLLER):
+                self.diagnostics.append((time.monotonic(), status))
+
+    def _hear_log(self, message: Log) -> None:
+        if CONTROLLER in message.name:
+            self.log.append(message.msg)
+
+    @property
+    def state(self) -> str:
+        """The last state of the controller; empty if there is none."""
+        return self.states[-1] if self.states else ""
+
+    @property
+    def torque(self) -> float:
+        """The largest torque of the last command [N m]; 0 if there is none."""
+        return self.commands[-1][1] if self.commands else 0.0
+
+    @property
+    def push(self) -> float:
+        """The sum of the torques of the last command [N m]; 0 if there is none."""
+        return self.commands[-1][2] if self.commands else 0.0
+
+    @property
+    def status(self) -> Any:
+        """The controller's last status on diagnostics; None if there is none."""
+        return self.diagnostics[-1][1] if self.diagnostics else None
+
+    def count_lines(self, text: str) -> int:
+        """Return how many lines of the controller's log have a text."""
+        return sum(text in line for line in self.log)

@@ -1,0 +1,140 @@
+"""What a rover on a slope does when it stops to be driven, by rest policy, in MuJoCo.
+
+Run from the repository: python -m benchmarks.hold [--slope DEG] [--seconds S]
+It needs the extra `bench`. Its results are in docs/reliability.md. The rover rests, is enabled and
+climbs or descends at its nominal speed; then an input is lost or the command becomes zero. Torques
+reach the wheels two periods (40 ms) after the measurement.
+"""
+
+import argparse
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.parameters.traction_controller import (
+    BRAKE,
+    REST_POLICIES,
+    TractionControllerParameters,
+)
+from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.traction.settings import load_traction_settings
+from rover_planner.traction.supervisor import TractionSupervisor
+from support.rough_grounds import plane
+
+PERIOD = 0.02
+"""Period of the controller [s]."""
+DELAY = 2
+"""Periods from a measurement to its torques at the wheels."""
+FRICTION = 0.8
+SETTLING_TIME = 1.0
+"""Time at rest before the rover is enabled [s]."""
+EVENT_TIME = SETTLING_TIME + 3.0
+"""Time of the event [s]."""
+EVENTS = ("cmd_vel lost", "imu lost", "wheel rates lost", "commanded to stop", "emergency stop")
+ROVERS = {"lsr1": 6.0, "m2020": 12.0}
+"""Rovers, and half the length of their slope [m]."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What a rover did after an event."""
+
+    state: str
+    """State of the controller at the end."""
+    brake: bool
+    """Whether the controller commanded the brake at the end."""
+    peak: float
+    """Largest distance from the place of the event [m]."""
+    end: float
+    """Way along the slope since the event, positive uphill [m]."""
+    speed: float
+    """Speed at the end [m/s]."""
+
+
+def rest_on_slope(rover_name: str, policy: str, event: str, slope: float, seconds: float) -> Rest:
+    """Drive along a slope [rad] (negative: downhill) and rest for a time [s] after an event.
+
+    A brake that is commanded locks the wheels: with the policy brake only, as other rovers may
+    have none.
+    """
+    rover = load_rover(rover_name)
+    ground = plane(np.tan(abs(slope)), 0.0, half=ROVERS[rover_name])
+    heading = 0.0 if slope > 0.0 else np.pi
+    plant = MujocoRover(rover, ground, (0.0, 0.0, heading), FRICTION)
+    parameters = TractionControllerParameters(
+        rover=rover_name, rest_policy=policy, friction=FRICTION
+    )
+    supervisor = TractionSupervisor(load_traction_settings(parameters), False)
+    delayed = deque([supervisor.update(plant.time)] * DELAY)
+    places = []
+    while plant.time < EVENT_TIME + seconds:
+        over = plant.time > EVENT_TIME
+        if plant.time > SETTLING_TIME and not over:
+            supervisor.permission.set_enabled(True)
+        _measure(supervisor, plant, event if over else "", rover.nominal_speed)
+        delayed.append(supervisor.update(plant.time))
+        command = delayed.popleft()
+        if policy == BRAKE and command.brake:
+            plant.servo(np.zeros(6), PERIOD)
+        else:
+            plant.step(command.torques, PERIOD)
+        if over:
+            places.append(float(plant.pose[0]))
+    along = (np.array(places) - places[0]) / np.cos(slope)
+    return Rest(
+        state=command.state,
+        brake=command.brake,
+        peak=float(np.abs(along).max()),
+        end=float(along[-1]),
+        speed=float((along[-1] - along[-2]) / PERIOD),
+    )
+
+
+def _measure(supervisor: TractionSupervisor, plant: MujocoRover, event: str, speed: float) -> None:
+    """Give a supervisor what it measures after an event; empty: none."""
+    service, now = supervisor.service, plant.time
+    if event != "wheel rates lost":
+        service.take_joints(plant.joint_positions, plant.joint_velocities, now)
+    if event != "imu lost":
+        service.take_attitude(*plant.attitude, plant.body_rates, now)
+    if event != "cmd_vel lost":
+        service.take_command(0.0 if event == "commanded to stop" else speed, 0.0, now)
+    if event == "emergency stop":
+        supervisor.permission.take_emergency_stop(True)
+
+
+def main() -> None:
+    """Run all cases and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--slope", type=float, default=20.0, help="slope [deg]")
+    parser.add_argument("--seconds", type=float, default=5.0, help="time of rest [s]")
+    arguments = parser.parse_args()
+    table = Table(
+        title=f"Slope of {arguments.slope:g} deg, friction {FRICTION:g}, {arguments.seconds:g} s "
+        "after the event"
+    )
+    headings = ("rover", "drives", "policy", "event", "state", "~/brake", "farthest [m]",
+                "end, uphill [m]", "speed [m/s]")  # fmt: skip
+    for heading in headings:
+        table.add_column(heading)
+    for rover in ROVERS:
+        for policy in REST_POLICIES:
+            for event in EVENTS:
+                for direction, sign in (("up", 1.0), ("down", -1.0)):
+                    slope = sign * np.radians(arguments.slope)
+                    rest = rest_on_slope(rover, policy, event, slope, arguments.seconds)
+                    table.add_row(
+                        rover, direction, policy, event, rest.state, str(rest.brake).lower(),
+                        f"{rest.peak:.3f}", f"{rest.end:+.3f}", f"{rest.speed:+.3f}",
+                    )  # fmt: skip
+    console = Console()
+    console.width = max(console.width, 130)
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()

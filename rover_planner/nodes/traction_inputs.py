@@ -1,0 +1,152 @@
+"""The subscriptions of the traction controller: checks messages and passes them to its service."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, JointState, PointCloud2
+
+from msg_adapters.commands import twist_to_speeds
+from msg_adapters.imu import ImuMounting, imu_to_attitude
+from msg_adapters.joints import joint_positions, joint_velocities
+from msg_adapters.odometry import odometry_to_pose
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.ros.guard import Guard
+from rover_planner.ros.map_intake import MapIntake
+from rover_planner.ros.publisher_check import ExpectedType, PublisherCheck
+from rover_planner.ros.qos import map_subscriptions, sensor_qos
+from rover_planner.ros.qos_warnings import warn_of_mismatch
+from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.transition_log import TransitionLog
+from rover_planner.traction.stamps import NANOSECONDS, StampCheck, StampError
+from rover_planner.traction.traction_service import (
+    CMD_VEL,
+    IMU,
+    JOINT_STATES,
+    ODOMETRY,
+    TractionService,
+)
+
+JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+CLOUD = "elevation_cloud"
+
+
+class TractionInputs:
+    """Takes joint states, attitude, commands and odometry; nothing in them ends the node."""
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: TractionControllerParameters,
+        service: TractionService,
+        maps: MapIntake,
+        guard: Guard,
+    ):
+        """Subscribe to all inputs of a node; `guard` counts unexpected errors."""
+        self._node, self._service, self._maps = node, service, maps
+        self._errors = guard
+        self._map_frame, self._base_frame = parameters.map_frame, parameters.base_frame
+        self._mounting = ImuMounting(
+            parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
+        )
+        self._log = TransitionLog(node.get_logger())
+        self.stamps = StampCheck(parameters.stamp_tolerance)
+        """Judges the header stamps."""
+        self._subscribe(parameters)
+        self.publishers = self._check_publishers(parameters)
+        """Looks for publishers that are not heard."""
+
+    def _subscribe(self, parameters: TractionControllerParameters) -> None:
+        twist = TwistStamped if parameters.cmd_vel_stamped else Twist
+        for kind, name, take in (
+            (JointState, JOINT_STATES, self._take_joints),
+            (Imu, IMU, self._take_imu),
+            (twist, CMD_VEL, self._take_command),
+            (Odometry, ODOMETRY, self._take_odometry),
+        ):
+            self._node.create_subscription(kind, name, self._guard(name, take), sensor_qos())
+        for qos, mends in map_subscriptions(
+            parameters.map_durability, parameters.input_reliability
+        ):
+            events = warn_of_mismatch(self._node, CLOUD, mends)
+            self._node.create_subscription(
+                PointCloud2, CLOUD, self._maps.offer, qos, event_callbacks=events, raw=True
+            )
+
+    def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
+        stamped = parameters.cmd_vel_stamped
+        other = (TWIST, "false") if stamped else (TWIST_STAMPED, "true")
+        types = {
+            JOINT_STATES: ExpectedType("sensor_msgs/msg/JointState", {}),
+            IMU: ExpectedType("sensor_msgs/msg/Imu", {}),
+            CMD_VEL: ExpectedType(
+                TWIST_STAMPED if stamped else TWIST,
+                {other[0]: f"set parameter cmd_vel_stamped to {other[1]}"},
+            ),
+            ODOMETRY: ExpectedType("nav_msgs/msg/Odometry", {}),
+            CLOUD: ExpectedType("sensor_msgs/msg/PointCloud2", {}),
+        }
+        return PublisherCheck(self._node, types)
+
+    def _guard(self, name: str, take: Callable[[Any, float], None]) -> Callable[[Any], None]:
+        """Return a callback that passes a message and the time of its arrival on.
+
+        A message with an error is refused.
+        """
+
+        def receive(message: Any) -> None:
+            now = time.monotonic()
+            try:
+                take(message, now)
+            except StampError as error:
+                self._service.ignore(name, str(error))
+            except INPUT_ERRORS as error:
+                self._refuse(name, str(error), now)
+            except Exception as error:
+                self._refuse(name, f"internal error: {self._errors.report(name, error)}", now)
+
+        return receive
+
+    def _refuse(self, name: str, error: str, now: float) -> None:
+        self._service.refuse(name, error, now)
+        if name == ODOMETRY:  # the others are faults, which the node logs
+            self._log.update(name, f"odometry not used: {error}", "odometry is used again", now)
+
+    def _find_time(self, name: str, stamp: int, now: float, *, merged: bool = False) -> float:
+        clock = self._node.get_clock().now().nanoseconds
+        return self.stamps.find_time(name, stamp, clock, now, merged=merged)
+
+    def _take_joints(self, state: JointState, now: float) -> None:
+        if not set(JOINTS).intersection(state.name):  # an arm's message, for example
+            return
+        stamp = _stamp_of(state)
+        measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
+        positions = joint_positions(state, SUSPENSION_JOINTS)
+        self._service.take_joints(positions, joint_velocities(state, JOINTS), measured, stamp)
+
+    def _take_imu(self, imu: Imu, now: float) -> None:
+        measured = self._find_time(IMU, _stamp_of(imu), now)
+        attitude = imu_to_attitude(imu, self._mounting)
+        self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
+
+    def _take_command(self, twist: TwistStamped | Twist, now: float) -> None:
+        if isinstance(twist, TwistStamped):
+            now = self._find_time(CMD_VEL, _stamp_of(twist), now)
+        self._service.take_command(*twist_to_speeds(twist), now)
+
+    def _take_odometry(self, odometry: Odometry, now: float) -> None:
+        measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)
+        pose, deviation = odometry_to_pose(odometry, self._map_frame, self._base_frame)
+        self._service.take_odometry(pose, deviation, measured)
+        self._log.update(ODOMETRY, "", "odometry is used again", now)
+
+
+def _stamp_of(message: Any) -> int:
+    """Return the header stamp [ns]."""
+    stamp = message.header.stamp
+    return int(stamp.sec * NANOSECONDS + stamp.nanosec)

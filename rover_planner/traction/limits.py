@@ -1,0 +1,71 @@
+"""Limits of what a rover can measure and do: impossible measurements, commands that are too fast.
+
+A measurement outside these limits comes from a broken sensor or driver, not from a rover.
+"""
+
+from collections.abc import Mapping
+
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+
+MAX_WHEEL_RATE_RATIO = 20.0
+"""Largest possible wheel rate, over the drive's largest; a rover that rolls down a slope is
+faster than its drives."""
+MAX_TURNING_RATE = 20.0
+"""Largest possible rate of the body, a rocker or a bogie [rad/s]."""
+ANGLE_MARGIN = 0.5
+"""Angle beyond the limit of a suspension joint that is possible [rad]."""
+
+
+class MeasurementLimits:
+    """The limits of one rover; bad measurements are described, good ones give an empty text."""
+
+    def __init__(self, rover: Rover):
+        """Take the limits from a rover."""
+        suspension, wheel = rover.suspension, rover.wheel
+        self._max_wheel_rate = MAX_WHEEL_RATE_RATIO * wheel.max_speed
+        self._angles = {
+            name: suspension.rocker_limits if "rocker" in name else suspension.bogie_limits
+            for name in SUSPENSION_JOINTS
+        }
+        self._max_speed = wheel.max_speed * wheel.radius
+        self._half_width = max(abs(place[1]) for place in suspension.wheels.values())
+
+    def find_wrong_joint(
+        self, positions: Mapping[str, float], velocities: Mapping[str, float]
+    ) -> str:
+        """Describe an impossible angle [rad] or rate [rad/s] of a wheel or suspension joint."""
+        for name, angle in positions.items():
+            low, high = self._angles.get(name, (angle, angle))
+            if not low - ANGLE_MARGIN <= angle <= high + ANGLE_MARGIN:
+                return (
+                    f"joint_states has position {angle:g} of {name}; it must be in "
+                    f"{low - ANGLE_MARGIN:g} to {high + ANGLE_MARGIN:g} rad"
+                )
+        for name, rate in velocities.items():
+            most = self._max_wheel_rate if name in WHEEL_JOINTS else MAX_TURNING_RATE
+            if not abs(rate) <= most:
+                return (
+                    f"joint_states has velocity {rate:g} of {name}; it must be within "
+                    f"{most:g} rad/s"
+                )
+        return ""
+
+    def find_wrong_rates(self, rates: Floats | None) -> str:
+        """Describe an impossible angular velocity (3,) of the body [rad/s]."""
+        if rates is None or bool((abs(rates) <= MAX_TURNING_RATE).all()):
+            return ""
+        return (
+            f"imu has angular velocity {rates.tolist()}; it must be within "
+            f"{MAX_TURNING_RATE:g} rad/s"
+        )
+
+    def clip_command(self, speed: float, yaw_rate: float) -> tuple[float, float]:
+        """Return a speed [m/s] and yaw rate [rad/s] at which no wheel exceeds its largest speed.
+
+        Both are scaled by the same factor, so that the curvature stays.
+        """
+        fastest = abs(speed) + abs(yaw_rate) * self._half_width
+        share = min(1.0, self._max_speed / fastest) if fastest > 0.0 else 1.0
+        return share * speed, share * yaw_rate

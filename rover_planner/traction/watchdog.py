@@ -1,0 +1,90 @@
+"""A watchdog in a thread of its own: it acts when commands are not renewed in time.
+
+It counts on the monotonic clock and sleeps relative times, so a step of the system clock cannot
+delay it. It cannot act while another thread holds Python's interpreter lock, or when the process
+hangs: a rover needs a hardware watchdog as well.
+"""
+
+import select
+import threading
+import time
+import traceback
+from collections.abc import Callable
+
+POLL = 0.01
+"""Longest sleep of the thread [s]."""
+SHORTEST = 0.001
+"""Shortest sleep of the thread [s]."""
+
+
+class Watchdog:
+    """Calls a function while the last command has expired; commands pass through it."""
+
+    def __init__(self, act: Callable[[], None]):
+        """Start the thread; `act` is called in it, about every POLL, while nothing is valid."""
+        self._act = act
+        self._lock = threading.Lock()
+        self._deadline = float("inf")
+        self._acted_at = float("-inf")
+        self._trips = 0
+        self._ending = False
+        self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
+        self._thread.start()
+
+    @property
+    def trips(self) -> int:
+        """How often commands expired."""
+        return self._trips
+
+    def send(self, command: Callable[[], None], started: float, deadline: float) -> bool:
+        """Send a command that is valid until a deadline.
+
+        Args:
+            command: Sends it.
+            started: Monotonic time at which its computation began [s]. If the watchdog has acted
+                since, the command is too late and is not sent.
+            deadline: Monotonic time at which the watchdog acts [s].
+
+        Returns:
+            Whether it was sent.
+        """
+        with self._lock:
+            if self._acted_at >= started:
+                return False
+            command()
+            self._deadline = deadline
+        return True
+
+    def close(self) -> None:
+        """End the thread."""
+        self._ending = True
+        self._thread.join()
+
+    def _run(self) -> None:
+        tripped = False
+        while not self._ending:
+            now = time.monotonic()
+            if now < self._deadline:
+                tripped = False
+                _sleep(min(max(self._deadline - now, SHORTEST), POLL))
+                continue
+            # A thread that hangs while it sends must not keep the watchdog from acting.
+            locked = self._lock.acquire(timeout=POLL)
+            try:
+                if time.monotonic() >= self._deadline:
+                    self._acted_at = time.monotonic()
+                    self._trips += not tripped
+                    tripped = True
+                    self._act()
+            except Exception:
+                # An error must not end the thread: the next attempt may work.
+                traceback.print_exc()
+            finally:
+                if locked:
+                    self._lock.release()
+            _sleep(POLL)
+
+
+def _sleep(seconds: float) -> None:
+    """Sleep by `select`, whose time is relative on every system and version of Python."""
+    select.select((), (), (), seconds)

@@ -1,0 +1,104 @@
+"""Publishers that cannot be heard are named; two rovers in two namespaces do not meet."""
+
+import pytest
+from geometry_msgs.msg import Twist, TwistStamped
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import PointCloud2
+
+from benchmarks.driven_rover import DrivenRover
+from rover_planner.nodes.traction_controller import TractionController
+from support.ros_fixtures import RosRun, wait_until
+
+NAMED_WITHIN = 2.0
+"""Time within which a publisher that is not heard is named [s]."""
+
+
+@pytest.fixture
+def other_context():
+    """Return a participant of its own: one participant refuses two types on a topic."""
+    run = RosRun()
+    yield run
+    run.close()
+
+
+def start_rover(run, kind):
+    rover = DrivenRover(run.context)
+    rover.send_twists(kind)
+    return run.spin(rover)
+
+
+@pytest.mark.parametrize(
+    ("kind", "stamped"), [(Twist, False), (TwistStamped, True)], ids=["twist", "stamped"]
+)
+def test_cmd_vel_of_the_type_of_the_parameter_is_driven(
+    other_context, start_controller, kind, stamped
+):
+    rover = start_rover(other_context, kind)
+    start_controller(cmd_vel_stamped=stamped)
+    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
+
+
+@pytest.mark.parametrize(
+    ("kind", "stamped", "advice"),
+    [(Twist, True, "false"), (TwistStamped, False, "true")],
+    ids=["twist", "stamped"],
+)
+def test_cmd_vel_of_another_type_is_named_with_the_parameter(
+    other_context, start_controller, kind, stamped, advice
+):
+    start_controller(cmd_vel_stamped=stamped)
+    rover = start_rover(other_context, kind)
+    text = f"cmd_vel of /rover is not heard: its type is geometry_msgs/msg/{kind.__name__}; "
+    text += f"set parameter cmd_vel_stamped to {advice}"
+    wait_until(lambda: rover.count_lines(text), "the warning", NAMED_WITHIN + 1.0)
+
+    def is_shown():
+        return rover.status and any(text in item.value for item in rover.status.values)
+
+    wait_until(is_shown, "the warning in the diagnostics")
+    assert rover.count_lines(text) == 1
+
+
+def test_a_best_effort_map_is_named_and_the_parameter_mends_it(rover, start_controller):
+    qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    rover.create_publisher(PointCloud2, "elevation_cloud", qos)
+    node = start_controller()
+    text = "a publisher of elevation_cloud is not heard: its reliability does not match; "
+    text += "set input_reliability to best_effort"
+    wait_until(lambda: rover.count_lines(text), "the warning", NAMED_WITHIN + 1.0)
+    assert node.get_parameter("input_reliability").value == "reliable"
+
+
+def test_a_best_effort_map_is_heard_with_the_parameter(rover, start_controller):
+    qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    sender = rover.create_publisher(PointCloud2, "elevation_cloud", qos)
+    start_controller(input_reliability="best_effort")
+    cloud = PointCloud2()
+    cloud.header.frame_id = "elsewhere"
+
+    def is_refused():
+        sender.publish(cloud)
+        return rover.count_lines("elevation_cloud refused")
+
+    wait_until(is_refused, "the cloud")
+    assert not rover.count_lines("not heard")
+
+
+def test_two_rovers_in_two_namespaces_do_not_meet(ros):
+    rovers = {}
+    for name in ("one", "two"):
+        rover = DrivenRover(ros.context, namespace=name)
+        rover.send_twists()
+        rovers[name] = ros.spin(rover)
+    enabled = [Parameter("enabled_at_start", value=True)]
+    for name in rovers:
+        node = TractionController(context=ros.context, namespace=name, parameter_overrides=enabled)
+        assert {topic for topic, _ in ros.spin(node).get_topic_names_and_types()}.isdisjoint(
+            {"/diagnostics", "/cmd_vel", "/joint_states", "/imu"}
+        )
+    wait_until(lambda: all(rover.state == "driving" for rover in rovers.values()), "both")
+    rovers["one"].silent.add("imu")
+    wait_until(lambda: rovers["one"].state == "fault", "the fault of one")
+    wait_until(lambda: "imu stale" in rovers["one"].status.message, "its diagnostics")
+    assert rovers["two"].state == "driving" and rovers["two"].status.level == b"\x00"

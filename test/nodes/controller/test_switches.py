@@ -1,0 +1,139 @@
+"""Enabling, emergency stop, rest and the end of the node over DDS."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+from support.ros_fixtures import call, domain_id, wait_until
+
+
+@pytest.fixture
+def enable(rover):
+    """Return a function that calls ~/enable."""
+    client = rover.create_client(SetBool, "traction_controller/enable")
+    return lambda data: call(client, SetBool.Request(data=data))
+
+
+def test_a_node_starts_disabled_and_drives_once_it_is_enabled(rover, start_controller, enable):
+    start_controller(enabled_at_start=False, rest_policy="coast")
+    wait_until(lambda: rover.state == "disabled", "the state")
+    wait_until(lambda: len(rover.commands) > 20, "commands")
+    assert not any(torque for _, torque, _ in rover.commands)
+    answer = enable(True)
+    assert (answer.success, answer.message) == (True, "enabled")
+    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
+    assert enable(False).message == "disabled"
+    wait_until(lambda: rover.state == "disabled" and rover.torque == 0.0, "rest")
+    assert rover.status.level == rover.status.OK
+
+
+@pytest.mark.parametrize("reliability", ["RELIABLE", "BEST_EFFORT"])
+@pytest.mark.parametrize("durability", ["VOLATILE", "TRANSIENT_LOCAL"])
+def test_every_emergency_stop_is_heard_and_acts_within_one_cycle(
+    rover, controller, enable, reliability, durability
+):
+    qos = QoSProfile(
+        depth=1,
+        reliability=ReliabilityPolicy[reliability],
+        durability=DurabilityPolicy[durability],
+    )
+    button = rover.create_publisher(Bool, "traction_controller/emergency_stop", qos)
+
+    def press(data):
+        button.publish(Bool(data=data))
+        return rover.state == "emergency_stop"
+
+    wait_until(lambda: press(True), "the stop")
+    assert rover.push <= 0.0
+    assert not enable(True).success
+    wait_until(lambda: not press(False), "the release")
+    wait_until(lambda: rover.state == "disabled", "disabled")
+    assert enable(True).success
+    wait_until(lambda: rover.state == "driving", "driving")
+    assert rover.count_lines("emergency stop released") == 1
+
+
+def test_an_emergency_stop_from_before_the_start_is_heard(rover, start_controller):
+    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    button = rover.create_publisher(Bool, "traction_controller/emergency_stop", qos)
+    button.publish(Bool(data=True))
+    start_controller()
+    wait_until(lambda: rover.state == "emergency_stop", "the stop")
+
+
+def test_a_stop_is_not_delayed_to_the_next_update(rover, start_controller):
+    controller = start_controller(rate=10.0)
+    wait_until(lambda: rover.state == "driving", "driving")
+    updates = controller.statistics.updates
+    controller._take_emergency_stop(Bool(data=True))
+    assert controller.state == "emergency_stop"
+    assert controller.statistics.updates in (updates + 1, updates + 2)
+
+
+def test_a_late_subscriber_gets_the_state(ros, rover, controller):
+    from benchmarks.driven_rover import DrivenRover
+
+    late = ros.spin(DrivenRover(ros.context))
+    wait_until(lambda: late.state == "driving" and late.brakes[-1] is False, "the latched state")
+
+
+def test_a_stall_ends_the_push_and_is_reported(rover, start_controller):
+    rover.joints.velocity = [0.0] * len(rover.joints.velocity)
+    start_controller(stall_time=1.0)
+    wait_until(lambda: rover.push > 0.1, "the push")
+    wait_until(lambda: rover.state == "stalled", "the stall")
+    wait_until(lambda: rover.torque < 0.01, "the end of the push")
+    wait_until(lambda: rover.status.message.startswith("stalled: no progress"), "the report")
+    rover.speed = 0.0
+    wait_until(lambda: rover.state == "standstill", "the way out")
+
+
+def test_a_parameter_change_moves_no_torque_by_a_step(rover, controller):
+    assert controller.set_parameters([Parameter("torque_rate", value=2.0)])[0].successful
+    heard = len(rover.commands)
+    for name, value in (("friction", 0.3), ("policy", "equal"), ("slip_gain", 5.0)):
+        assert controller.set_parameters([Parameter(name, value=value)])[0].successful
+        before = len(rover.commands)
+        wait_until(lambda before=before: len(rover.commands) > before + 10, "commands")
+    pushes = [push for *_, push in rover.commands[heard:]]
+    assert all(push > 0.0 for push in pushes)
+    times = [at for at, *_ in rover.commands[heard:]]
+    steps = zip(pushes, pushes[1:], times, times[1:], strict=False)
+    # Six torques of 2 N m/s each, over at most 0.1 s between two updates.
+    assert max(abs(new - old) for old, new, _, _ in steps) < 6 * 2.0 * 0.1
+
+
+def test_a_node_that_is_stopped_sends_zeros_and_no_more(rover, controller):
+    controller.stop()
+    wait_until(lambda: rover.torque == 0.0 and rover.brakes[-1], "zeros and the brake")
+    updates, heard = controller.statistics.updates, len(rover.commands)
+    time.sleep(0.1)
+    assert controller.statistics.updates == updates and len(rover.commands) == heard
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_process_that_is_told_to_end_sends_zeros_last(rover, how):
+    words = ["--ros-args", "-p", "enabled_at_start:=true"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rover_planner.nodes.traction_controller", *words],
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain_id())},
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        wait_until(lambda: rover.commands, "the node", 120.0)
+        wait_until(lambda: rover.push > 0.0, "torque")
+        process.send_signal(how)
+        assert process.wait(timeout=20.0) == 0
+    finally:
+        process.kill()
+        process.wait()
+    wait_until(lambda: rover.torque == 0.0, "zeros")

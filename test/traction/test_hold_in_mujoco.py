@@ -1,0 +1,34 @@
+"""On a slope of 20 degrees in MuJoCo a rover is held, as docs/reliability.md says."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco", reason="install the extra bench")
+SLOPE = np.radians(20.0)
+
+
+@pytest.mark.parametrize("rover", ["lsr1", "m2020"])
+@pytest.mark.parametrize("event", ["imu lost", "emergency stop", "commanded to stop"])
+def test_hold_stops_a_rover_that_climbs_and_keeps_it_there(rover, event):
+    hold = importlib.import_module("benchmarks.hold")
+    rest = hold.rest_on_slope(rover, "hold", event, SLOPE, 2.0)
+    assert rest.state != "driving" and not rest.brake
+    assert rest.peak < 0.04 and abs(rest.speed) < 0.003
+
+
+@pytest.mark.parametrize(
+    ("policy", "event", "brake"),
+    [("coast", "imu lost", False), ("hold", "wheel rates lost", True)],
+)
+def test_a_rover_without_torque_and_brake_rolls_away(policy, event, brake):
+    hold = importlib.import_module("benchmarks.hold")
+    rest = hold.rest_on_slope("lsr1", policy, event, SLOPE, 1.0)
+    assert rest.end < -0.5 and rest.brake == brake
+
+
+def test_the_brake_holds():
+    hold = importlib.import_module("benchmarks.hold")
+    rest = hold.rest_on_slope("lsr1", "brake", "wheel rates lost", SLOPE, 1.0)
+    assert rest.brake and rest.peak < 0.02

@@ -1,0 +1,209 @@
+"""The rover drives only while it may; at rest it is held, braked or left to coast."""
+
+import numpy as np
+import pytest
+
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.traction.fault_latch import RECOVERY_TIME, FaultLatch
+from rover_planner.traction.settings import load_traction_settings
+from rover_planner.traction.stall_watch import StallWatch
+from rover_planner.traction.supervisor import STANDSTILL_DELAY, TractionSupervisor
+
+PERIOD = 0.02
+INPUTS = ("joint_states", "imu", "cmd_vel")
+
+
+class Rig:
+    """A supervisor and the measurements of a rover that creeps over level ground."""
+
+    def __init__(self, enabled=True, **values):
+        settings = load_traction_settings(TractionControllerParameters(**values))
+        self.supervisor = TractionSupervisor(settings, enabled)
+        self.now, self.speed, self.pitch, self.rate = 0.0, 0.03, 0.0, 0.2
+        self.commands = []
+
+    def send(self, names):
+        service = self.supervisor.service
+        rates = dict.fromkeys(SUSPENSION_JOINTS, 0.0) | dict.fromkeys(WHEEL_JOINTS, self.rate)
+        if "joint_states" in names:
+            service.take_joints(dict.fromkeys(SUSPENSION_JOINTS, 0.0), rates, self.now)
+        if "imu" in names:
+            service.take_attitude(0.0, self.pitch, np.zeros(3), self.now)
+        if "cmd_vel" in names:
+            service.take_command(self.speed, 0.0, self.now)
+
+    def run(self, seconds, *names, clock_fault=""):
+        for _ in range(round(seconds / PERIOD)):
+            self.now += PERIOD
+            self.send(names or INPUTS)
+            self.commands.append(self.supervisor.update(self.now, clock_fault))
+        return self.commands[-1]
+
+    def states(self):
+        return list(dict.fromkeys(command.state for command in self.commands))
+
+
+def test_it_is_disabled_until_it_is_enabled():
+    rig = Rig(enabled=False)
+    assert rig.run(1.0).state == "disabled"
+    assert rig.supervisor.permission.set_enabled(True) == (True, "enabled")
+    assert rig.run(PERIOD).state == "driving"
+    assert rig.supervisor.permission.set_enabled(False) == (True, "disabled")
+    assert rig.run(PERIOD).state == "disabled"
+
+
+def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_enabling():
+    rig = Rig()
+    assert rig.run(1.0).state == "driving"
+    permission = rig.supervisor.permission
+    permission.take_emergency_stop(True)
+    command = rig.run(PERIOD)
+    assert command.state == "emergency_stop" and (command.torques < 0.0).all()
+    done, why = permission.set_enabled(True)
+    assert not done and "~/emergency_stop" in why
+    permission.take_emergency_stop(False)
+    assert rig.run(1.0).state == "disabled"
+    assert permission.set_enabled(True)[0]
+    assert rig.run(PERIOD).state == "driving"
+
+
+def test_hold_brakes_wheels_that_turn_and_stays_within_the_limit():
+    rig = Rig(max_torque=0.1)
+    rig.run(1.0)
+    torques = [rig.run(PERIOD, "joint_states", "imu").torques for _ in range(200)]
+    assert rig.commands[-1].state == "fault" and not rig.commands[-1].brake
+    assert max(np.abs(torque).max() for torque in torques) <= 0.1
+    assert (torques[-1] == -0.1).all()
+    rig.rate = -0.2
+    assert (rig.run(1.0, "joint_states").torques > -0.1).all()
+
+
+@pytest.mark.parametrize("degrees", [-20.0, 20.0])
+def test_hold_starts_from_the_torques_that_balance_the_weight_on_a_slope(degrees):
+    rig = Rig(enabled=False)
+    rig.rate, rig.pitch = 0.0, np.radians(degrees)
+    rover = rig.supervisor.service.settings.rover
+    wanted = -rover.weight * np.sin(rig.pitch) * rover.wheel.radius
+    assert rig.run(0.1).torques.sum() == pytest.approx(wanted)
+
+
+def test_hold_without_wheel_rates_lets_go_and_applies_the_brake():
+    rig = Rig()
+    assert not rig.run(1.0).brake
+    command = rig.run(0.1, "imu", "cmd_vel")
+    assert command.state == "fault" and command.brake and not command.torques.any()
+    assert command.update.fault.startswith("joint_states stale")
+    assert not rig.run(0.1).brake
+
+
+@pytest.mark.parametrize(("policy", "brake"), [("brake", True), ("coast", False)])
+def test_brake_and_coast_give_no_torque(policy, brake):
+    rig = Rig(rest_policy=policy)
+    assert not rig.run(1.0).brake
+    command = rig.run(0.1, "joint_states", "cmd_vel")
+    assert command.state == "fault" and command.brake == brake and not command.torques.any()
+
+
+def test_a_rover_that_is_commanded_to_stand_is_held_after_a_moment():
+    rig = Rig()
+    rig.run(1.0)
+    rig.speed = rig.rate = 0.0
+    assert rig.run(STANDSTILL_DELAY - 0.1).state == "driving"
+    assert rig.run(0.2).state == "standstill"
+    rig.speed = 0.03
+    assert rig.run(PERIOD).state == "driving"
+
+
+def test_driving_goes_on_from_the_torques_of_rest():
+    rig = Rig(torque_rate=1.0)
+    rig.rate, rig.pitch = 0.0, -np.radians(20.0)
+    rig.speed = 0.0
+    held = rig.run(1.0).torques
+    rig.speed = 0.03
+    first = rig.run(PERIOD)
+    assert first.state == "driving" and np.abs(first.torques - held).max() <= 1.0 * PERIOD + 1e-9
+    assert first.torques.sum() > 0.8 * held.sum()
+
+
+def test_a_fault_passes_only_after_its_cause_was_gone_for_a_while():
+    latch = FaultLatch()
+    assert latch.update("", 0.0) == ""
+    assert latch.update("imu is nan", 1.0) == "imu is nan"
+    assert latch.update("", 1.0 + 0.9 * RECOVERY_TIME) == "imu is nan"
+    assert latch.update("", 1.0 + 1.1 * RECOVERY_TIME) == ""
+
+
+def test_an_input_that_is_bad_every_other_time_is_one_fault():
+    rig = Rig()
+    rig.run(1.0)
+    rig.commands.clear()
+    for k in range(100):
+        if k % 2:
+            rig.supervisor.service.refuse("imu", "imu is nan", rig.now + PERIOD)
+            rig.run(PERIOD, "joint_states", "cmd_vel")
+        else:
+            rig.run(PERIOD)
+    assert rig.states() == ["driving", "fault"]
+    assert [command.state for command in rig.commands].count("driving") == 1
+    assert rig.run(RECOVERY_TIME + 0.1).state == "driving"
+
+
+def test_a_fault_found_elsewhere_is_taken_into_the_next_update():
+    rig = Rig()
+    rig.run(1.0)
+    rig.supervisor.trip("updates came too late")
+    assert rig.run(PERIOD).update.fault == "updates came too late"
+    assert rig.run(1.0).state == "driving"
+    assert rig.run(PERIOD, clock_fault="the clock was stepped back").state == "fault"
+
+
+def test_a_rover_that_makes_no_progress_stops_pushing_until_it_is_commanded_otherwise():
+    rig = Rig(stall_time=2.0)
+    rig.rate = 0.0
+    assert rig.run(1.9).state == "driving"
+    pushed = np.abs(rig.commands[-1].torques).sum()
+    command = rig.run(0.2)
+    assert command.state == "stalled" and np.abs(command.torques).sum() < 0.01 * pushed
+    assert rig.run(5.0).state == "stalled"
+    rig.speed = -0.03
+    assert rig.run(PERIOD).state == "driving"
+    rig.speed = 0.03
+    assert rig.run(2.2).state == "stalled"
+    rig.speed = 0.0
+    assert rig.run(1.0).state == "standstill"
+    rig.speed = 0.03
+    assert rig.run(1.0).state == "driving"
+    rig.run(2.0)
+    for enabled in (False, True):
+        rig.supervisor.permission.set_enabled(enabled)
+        assert rig.run(PERIOD).state == ("driving" if enabled else "disabled")
+
+
+def test_progress_now_and_then_is_no_stall():
+    watch = StallWatch()
+    for k in range(1000):
+        rates = np.full(6, 0.3 if k % 2 else 0.0)
+        assert not watch.update(rates, (0.3, 0.3), 0.02, 2.0)
+
+
+@pytest.mark.parametrize("wanted", [(0.3, -0.3), (-0.3, 0.3), (0.3, 0.0)])
+def test_a_rover_that_does_not_turn_is_stalled_one_that_turns_is_not(wanted):
+    turns = np.repeat(wanted, 3)
+    for rates, stalled in ((turns, False), (np.zeros(6), True), (-turns, True)):
+        watch = StallWatch()
+        found = [watch.update(rates, wanted, 0.02, 2.0) for _ in range(110)]
+        assert found[-1] == stalled
+    assert watch.update(turns, wanted, 0.02, 2.0)
+    assert not watch.update(turns, (-wanted[0], -wanted[1]), 0.02, 2.0)
+
+
+def test_new_settings_change_the_policy_at_rest():
+    rig = Rig(enabled=False)
+    rig.pitch = -0.3
+    assert rig.run(0.1).torques.any()
+    settings = load_traction_settings(
+        TractionControllerParameters(rest_policy="coast"), rig.supervisor.service.settings
+    )
+    rig.supervisor.configure(settings)
+    assert not rig.run(PERIOD).torques.any()
