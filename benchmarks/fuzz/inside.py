@@ -21,6 +21,7 @@ from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
+from rover_physics.warm_up import warm_up
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.reach_query import ReachQuery
@@ -177,6 +178,7 @@ class ControllerTarget:
 
 def fuzz_inside(seed: int, count: int) -> Tally:
     """Throw hostile messages at services in this process and return what became of them."""
+    warm_up()
     maker, tally = HostileMaker(seed), Tally()
     planner, controller = PlannerTarget(), ControllerTarget()
     targets = (

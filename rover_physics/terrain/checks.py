@@ -120,7 +120,7 @@ def _as_grid(name: str, values: ArrayLike, largest: float) -> NDArray[np.float64
         )
     grid = np.ascontiguousarray(grid, dtype=np.float64)
     must = f"finite and within {largest:g}, or NaN where unknown"
-    _refuse_first(grid, np.abs(grid) > largest, name, must)
+    _refuse_first(grid, (grid > largest) | (grid < -largest), name, must)
     return grid
 
 
