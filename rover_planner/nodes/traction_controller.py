@@ -42,6 +42,7 @@ from rover_planner.nodes.programs import read_words
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
+from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions_qos, sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
@@ -270,11 +271,12 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
             return EXIT_OK
-        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.logging.get_logger(NODE_NAME).info(
             "compiling kernels; the first start takes longest"
         )
         node = TractionController()
+        warn_of_disk(node.get_logger())
         node.take_priority()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
