@@ -1,6 +1,8 @@
 """Two clients ask at the same time; each tells its own verdicts from the other's."""
 
 import itertools
+import random
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +13,8 @@ from support.ros_fixtures import wait_until
 
 WALL = 1.5
 """x of a wall that no rover climbs [m]."""
+MAX_PAUSE = 0.01
+"""Longest time between a path and its check [s]."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +61,17 @@ def start_server(stage: Stage, is_paused: bool) -> list[Client]:
 
 
 def check_paths(client: Client, errand: Errand, count: int) -> Tally:
-    """Check paths one after another, each until the verdict is on it."""
-    tally = Tally()
+    """Check paths one after another, each until the verdict is on it.
+
+    The client waits a random time between path and check, in which the other's path may come.
+    """
+    tally, chance = Tally(), random.Random(errand.name)
     for number in range(count):
         path = straight_path(*errand.poses(number))
         own, request = path_hash(path), 0
         for _ in itertools.count():
             client.publish(path)
+            time.sleep(chance.uniform(0.0, MAX_PAUSE))
             verdict = client.check()
             assert verdict["request"] > request, "the numbers of questions rise"
             request = verdict["request"]
