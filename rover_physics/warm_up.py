@@ -1,23 +1,23 @@
-"""Compilation of the kernels of predictions and bounds, or their loading from the cache."""
+"""Compilation of the kernels of predictions, verdicts and bounds, or their loading from disk."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from rover_physics.bounds.path import bound_path
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge_path import judge_path
 
 
 def warm_up() -> None:
-    """Compile the kernels, or load them from the cache, by a short prediction up a step."""
+    """Compile the kernels, or load them from disk, by judging short paths up a step."""
     rover, layer = load_rover("lsr1"), np.ones((64, 64))
     step = Terrain(np.where(np.arange(64) > 40, 0.1, 0.0) * layer, 0.05, (-1.6, -1.6))
     poses = np.zeros((8, 3))
     poses[:, 0] = np.linspace(-0.12, 0.02, 8)
-    for ground in (step, replace(step, friction=layer, elevation_std=layer)):
-        bound_path(rover, ground, sweep_path(rover, ground, poses))
+    judge_path(rover, replace(step, friction=layer, elevation_std=layer), poses)
+    judge_path(rover, step, poses, SweepOptions(soil="mars_simulant"))
 
 
 if __name__ == "__main__":

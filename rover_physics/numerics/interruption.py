@@ -9,6 +9,8 @@ FIRST_SLICE = 512
 """Number of items in the first slice."""
 SLICE_TIME = 0.05
 """Time of a slice that the size of the next one aims at [s]."""
+MAX_SLICE = 2048
+"""Largest number of items in a slice: the next ones may take ten times as long."""
 MAX_GROWTH = 8.0
 """Largest growth from one slice to the next."""
 
@@ -54,4 +56,4 @@ def slices(items: int) -> Iterator[slice]:
         yield slice(first, min(first + size, items))
         first += size
         growth = SLICE_TIME / max(time.perf_counter() - start, 1e-9)
-        size = max(1, round(size * min(growth, MAX_GROWTH)))
+        size = min(max(1, round(size * min(growth, MAX_GROWTH))), MAX_SLICE)

@@ -1,9 +1,8 @@
-"""Decorators that compile kernels with Numba, and the removal of stale cached kernels."""
-
-import hashlib
-from pathlib import Path
+"""Decorators that compile kernels with Numba and keep them on disk."""
 
 import numba
+
+from rover_physics.numerics.kernel_cache import KernelCache, drop_stale_kernels
 
 LOOPS_ONLY = {
     "prange": True,
@@ -17,7 +16,6 @@ LOOPS_ONLY = {
 }
 """What Numba may make parallel: `prange` loops only. The other analyses double compile time."""
 COMPILE_OPTIONS = {
-    "cache": True,
     "nogil": True,
     "error_model": "numpy",
     "fastmath": {"contract"},
@@ -31,45 +29,30 @@ def kernel(function):
     Numba does not count references to arrays in it. Counting them at every call took most of the
     time of a settled pose.
     """
-    return numba.njit(_nrt=False, **COMPILE_OPTIONS)(function)
+    return _compile(function, _nrt=False)
 
 
 def exact_kernel(function):
     """Compile a kernel that rounds after each operation, as NumPy does."""
-    return numba.njit(_nrt=False, **{**COMPILE_OPTIONS, "fastmath": False})(function)
+    return _compile(function, _nrt=False, fastmath=False)
 
 
 def allocating_kernel(function):
     """Compile a function that may allocate arrays."""
-    return numba.njit(**COMPILE_OPTIONS)(function)
+    return _compile(function)
 
 
 def sweep_kernel(function):
     """Compile a function with a parallel `prange` loop, such as over poses."""
-    return numba.njit(parallel=LOOPS_ONLY, **COMPILE_OPTIONS)(function)
+    return _compile(function, parallel=LOOPS_ONLY)
 
 
-def drop_stale_kernels(package: Path) -> None:
-    """Remove all cached kernels below `package` if any of its sources has changed.
-
-    Numba checks only the file of a kernel, not the files of the kernels that it calls. After an
-    edit in one file, callers in other files would otherwise run stale.
-    """
-    digest = hashlib.sha256()
-    for source in sorted(package.rglob("*.py")):
-        digest.update(source.relative_to(package).as_posix().encode())
-        digest.update(source.read_bytes())
-    stamp = package / "__pycache__" / "kernels.sha256"
-    try:
-        if stamp.exists() and stamp.read_text() == digest.hexdigest():
-            return
-        stamp.parent.mkdir(exist_ok=True)
-        for cache in package.rglob("__pycache__"):
-            for compiled in [*cache.glob("*.nbi"), *cache.glob("*.nbc")]:
-                compiled.unlink(missing_ok=True)
-        stamp.write_text(digest.hexdigest())
-    except OSError:
-        return  # a read-only installation, whose sources do not change
+def _compile(function, **options):
+    """Return a compiled function with a cache that does without a disk."""
+    compiled = numba.njit(**{**COMPILE_OPTIONS, **options})(function)
+    # What njit(cache=True) does, but its own cache raises where it cannot write.
+    compiled._cache = KernelCache(function)
+    return compiled
 
 
-drop_stale_kernels(Path(__file__).parents[1])
+drop_stale_kernels()

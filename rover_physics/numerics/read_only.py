@@ -39,6 +39,17 @@ def seal_array(array: np.ndarray) -> np.ndarray:
     return array
 
 
+def view_read_only(array: np.ndarray) -> np.ndarray:
+    """Return a read-only view of an array.
+
+    Numba compiles a kernel once for arrays that can be written and once for others. It compiles
+    only once if all arrays that it reads are such views.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
 def freeze_fields(record: Any) -> None:
     """Make all arrays of a dataclass read-only in place; no one else may write into them."""
     for value in vars(record).values():

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.evaluation import NONE_HELD, RESULT, new_results
 from rover_physics.prediction.path_kernels import (
     JumpLimits,
@@ -52,8 +53,9 @@ class Crossings:
 
     @property
     def points(self) -> PathPoints:
-        """The same data as a PathPoints tuple, for kernels."""
-        return PathPoints(self.place, self.waypoint, self.poses, self.results)
+        """Read-only views of the data as a PathPoints tuple, for kernels."""
+        parts = (self.place, self.waypoint, self.poses, self.results)
+        return PathPoints(*map(view_read_only, parts))
 
     def select(self, rows: np.ndarray) -> "Crossings":
         """Return the poses at row indices, in that order, or where a mask (m,) is True."""

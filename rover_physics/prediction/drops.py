@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
+from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossings
 
 MIN_ANGLE = np.radians(15.0)
@@ -54,7 +55,8 @@ def find_falls(
         crossings: Poses between the waypoints.
         direction: 1 if the rover drives forwards along the path, -1 if backwards.
     """
-    found = _find_falls(float(radius), float(direction), poses, results, crossings.points)
+    path = view_read_only(poses), view_read_only(results)
+    found = _find_falls(float(radius), float(direction), *path, crossings.points)
     return Falls(*found)
 
 

@@ -102,10 +102,20 @@ WORK = record_type(
 
 def new_results(n: int) -> Any:
     """Return RESULTs (n,), all NaN with status 0."""
-    numbers = np.full((n, RESULT.itemsize // 8), np.nan)
-    results = numbers.view(RESULT)[:, 0]
-    results["status"] = 0
+    results = _unwritten_results(n)
+    _clear(results)
     return results
+
+
+def _unwritten_results(n: int) -> Any:
+    """Return RESULTs (n,) of any content: the system provides their memory when it is written."""
+    return np.empty((n, RESULT.itemsize // 8)).view(RESULT)[:, 0]
+
+
+def _clear(results: Any) -> None:
+    """Make RESULTs (n,) NaN with status 0."""
+    results.view(np.float64).fill(np.nan)
+    results["status"] = 0
 
 
 def new_work() -> Any:
@@ -128,10 +138,11 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
         held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
             those that rest on the ground; (0, 6, 2) if none climbs.
     """
-    results = new_results(len(poses))
+    results = _unwritten_results(len(poses))
     with limit_threads(effort(model["settings"][0], len(poses))) as threads:
         works = new_works(threads, len(poses))
         for part in slices(len(poses)):
+            _clear(results[part])
             evaluate_poses(model, poses[part], held[part], works, results[part])
     return results
 

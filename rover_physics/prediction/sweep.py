@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.errors import PoseError
+from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
+from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, find_crossings
 from rover_physics.prediction.drops import find_falls
@@ -90,6 +92,7 @@ def _sweep(
         crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
     predictions = []
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
+        check_interruption()
         part = crossings.between(first, end) if len(paths) > 1 else crossings
         predictions.append(
             _predict(model.settings, radius, poses[first:end], results[first:end], part)
@@ -151,7 +154,7 @@ def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any)
     position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
     position[~settled] = np.nan
     sums = np.empty((3, len(poses)))
-    add_up(poses, results, settings["speed"], sums)
+    add_up(view_read_only(poses), view_read_only(results), settings["speed"], sums)
     distance, time, energy = sums
     return PathPrediction(
         poses=poses,

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, OPTIMAL, TORQUE_POLICIES, WHEELS
+from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -208,6 +209,7 @@ def _decide_rows(rover: Rover, prediction: PathPrediction) -> Iterator[_Decision
     tightest = np.argmin([margins[code] for code in WHEEL_CONSTRAINTS], axis=0)
     falls = np.asarray(prediction.falling.any(axis=1)).tolist()
     for i, which in enumerate(tightest.tolist()):
+        check_interruption()
         code = codes[i] or WHEEL_CONSTRAINTS[which]
         if code not in margins:
             yield _Decision(code, -1, float("nan"), reasons[i])

@@ -6,6 +6,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
+from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_paths
@@ -63,6 +64,7 @@ def judge_paths(
     check_sigmas(sigmas)
     judged = []
     for prediction in sweep_paths(rover, terrain, paths, options):
+        check_interruption()
         verdict = judge(rover, prediction)
         if verdict.code != "wheel_drop":
             verdict = ask_for_ways_out(rover, terrain, prediction, verdict, options)

@@ -135,11 +135,12 @@ def _check_suspension(rover: Rover, prediction: PathPrediction) -> Check:
         return np.asarray(left.min(axis=1))
 
     def describe(i: int) -> str:
-        joint = int(np.argmax(beyond()[i]))
-        joints, low, high = joints_and_limits()
+        joints = np.hstack([rocker[i], bogie[i]])  # not all rows: a path may have thousands
+        low, high = np.repeat(limits, 2, axis=0).T
+        joint = int(np.argmax((joints < low - TOLERANCE) | (joints > high + TOLERANCE)))
         name = f"{SIDES[joint % 2]} {('rocker', 'bogie')[joint // 2]}"
-        limit = low[joint] if joints[i, joint] < low[joint] else high[joint]
-        return f"{name} angle {compare(joints[i, joint], limit, 2, ' rad')}"
+        limit = low[joint] if joints[joint] < low[joint] else high[joint]
+        return f"{name} angle {compare(joints[joint], limit, 2, ' rad')}"
 
     return Check(
         "suspension",

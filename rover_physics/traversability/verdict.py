@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
@@ -169,6 +170,7 @@ def _hold_against_limits(
             counts = needed if check.code in UNNEEDED_IN_A_FALL else True
             for row in np.flatnonzero(check.broken() & settled & counts).tolist():
                 if row not in found:
+                    check_interruption()
                     found[row] = check.explain(row)
     if needed is not True:
         extremes["friction"] = largest_of(prediction.friction_utilisation[needed])

@@ -30,6 +30,7 @@ from msg_adapters.results.predictions import array_values
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission_options import MissionOptions
 from rover_planner.nodes.programs import read_words
+from rover_planner.ros.disk import init_ros
 from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.shell.exit_codes import (
@@ -250,7 +251,7 @@ def _run(words: Sequence[str] | None) -> int:
         terrain = load_terrain(options.map_name) if options.map_name else None
     except INPUT_ERRORS as error:
         return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
-    rclpy.init(args=words)
+    init_ros(words)
     node = MissionPlanner(options.map_frame, options.timeout)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

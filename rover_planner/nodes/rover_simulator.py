@@ -30,6 +30,7 @@ from rover_planner.nodes.programs import read_words
 from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
+from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
@@ -222,9 +223,10 @@ def main(words: Sequence[str] | None = None) -> int:
         options = read_words(NODE_NAME, words)
         if options == EXIT_OK:  # help was printed
             return EXIT_OK
-        rclpy.init(args=words)
+        init_ros(words)
         overrides = [Parameter(name, value=value) for name, value in options.items()]
         node = RoverSimulator(parameter_overrides=overrides)
+        warn_of_disk(node.get_logger())
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()

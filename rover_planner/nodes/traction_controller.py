@@ -33,6 +33,7 @@ from rover_planner.nodes.traction_topics import TractionTopics, latched_qos
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
+from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import sensor_qos, topic_qos
@@ -314,11 +315,12 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
             return EXIT_OK
-        rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.logging.get_logger(NODE_NAME).info(
             "compiling kernels; the first start takes longest"
         )
         node = TractionController()
+        warn_of_disk(node.get_logger())
         node.take_priority()
         executor = GuardedExecutor()
         executor.add_guarded(node, node.guard)

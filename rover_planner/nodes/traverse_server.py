@@ -47,6 +47,7 @@ from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
+from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
@@ -238,7 +239,8 @@ def main(words: Sequence[str] | None = None) -> int:
             return EXIT_OK
         logger.info("compiling kernels; the first start takes longest")
         warm_up()
-        rclpy.init(args=words)
+        init_ros(words)
+        warn_of_disk(logger)
         _run(TraverseServer)
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_OK

@@ -84,9 +84,9 @@ class QuestionQueue:
             self._send(*self._answered.popleft())
 
     def refuse_overdue(self, grace: float) -> None:
-        """Refuse questions whose deadline passed more than `grace` [s] ago, even one in work."""
+        """Refuse questions whose deadline has passed, the one in work after `grace` [s] more."""
         for question in list(self._open):
-            if question.budget.remaining < -grace:
+            if question.budget.remaining < (-grace if question.has_begun else 0.0):
                 self._send(question, _refuse_stopped(question))
 
     def stop_all(self, code: str, reason: str) -> int:

@@ -1,0 +1,1 @@
+"""Trials of a traverse server in a process of its own, over DDS."""

@@ -1,0 +1,72 @@
+"""Servers on a disk that cannot be written, with nothing compiled."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.server_trials.stage import ROOT, START_TIME, server_environment
+from support.project.without_disk import drop_rights, fill_disk, read_only
+
+PACKAGES = ("rover_physics", "msg_adapters", "rover_planner", "config")
+
+
+@dataclass(frozen=True)
+class Start:
+    """The start of a server."""
+
+    time: float
+    """Until it is ready [s]."""
+    warnings: tuple[str, ...]
+    """The warnings in its log."""
+
+
+def start_read_only(folder: Path) -> Start:
+    """Start a server from a copy whose folders cannot be written, with such a home."""
+    copy = copy_packages(folder)
+    with read_only(folder):
+        return _start(copy, drop_rights)
+
+
+def start_full(folder: Path) -> Start:
+    """Start a server from a copy on a disk that is full."""
+    return _start(copy_packages(folder), fill_disk)
+
+
+def copy_packages(folder: Path) -> Path:
+    """Copy the packages without compiled files; return the copy."""
+    for name in PACKAGES:
+        unwanted = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / name, folder / name, ignore=unwanted)
+    return folder
+
+
+def _start(copy: Path, prepare: Callable[[], None]) -> Start:
+    environment = {**os.environ, **server_environment(), "PYTHONPATH": str(copy)}
+    environment |= {"HOME": str(copy), "ROS_LOG_DIR": str(copy / "log")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    began, warnings = time.perf_counter(), []
+    server = subprocess.Popen(
+        [sys.executable, "-m", "rover_planner.nodes.traverse_server"],
+        cwd=copy,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=prepare,
+    )
+    try:
+        assert server.stderr is not None
+        for line in server.stderr:
+            warnings += [line.strip()] if "[WARN]" in line else []
+            if "ready for rover" in line:
+                return Start(time.perf_counter() - began, tuple(warnings))
+            assert time.perf_counter() - began < START_TIME, "the server does not start"
+        raise AssertionError(f"the server has ended with {server.wait()}")
+    finally:
+        server.terminate()
+        server.wait(10.0)
