@@ -1,19 +1,19 @@
 """Measures how fast the traction controller fails safe, and that it drives through what is normal.
 
 Run from the repository: python -m benchmarks.reliability_controller [--repeats N] [--seconds S]
+    [--priority P]
 The controller runs in a process of its own. Both processes run under libfaketime (Debian's package
 faketime), which steps their system clock; without it those steps are left out. Times are from the
-cause to the arrival of the first command that does not push. The results are in
-docs/reliability.md.
+cause to the arrival of the first command that does not push. On a busy machine they need a
+real-time priority. The results are in docs/reliability.md.
 """
 
 import argparse
 import contextlib
 import json
 import os
+import resource
 import select
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -45,8 +45,13 @@ HOUR = 3600
 CLOCK_FILE = "FAKETIME_TIMESTAMP_FILE"
 """Environment variable of libfaketime that names the file with the offset of the clock."""
 LIBRARIES = sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))
-PRIORITY = 50
-"""Real-time priority of both processes, where it is granted: other programs run beside them."""
+NICENESS = -15
+"""Niceness of both processes, where it is granted: other programs run beside them."""
+MAX_BUSY_TIME = 1_000_000
+"""Processor time without a pause after which a process of real-time priority is ended [us]: it
+would block the machine."""
+LONGEST = 1800.0
+"""Longest time of the process whose clock is stepped [s]."""
 ROOT = Path(__file__).resolve().parents[1]
 PERIOD = 0.02
 """Period of the controller [s]."""
@@ -62,7 +67,6 @@ class Bench:
         self.rover.send_twists()
         self.rover.stamp = time.time_ns
         run.spin(self.rover)
-        take_priority(PRIORITY)
         self._stop = self.rover.create_publisher(Bool, f"{CONTROLLER}/emergency_stop", 1)
         self._clock = self.rover.create_publisher(Clock, "/clock", 10)
         self.clock_runs = False
@@ -77,7 +81,7 @@ class Bench:
 
     def start_controller(self, **parameters: object) -> None:
         """Start an enabled controller and wait until it drives."""
-        values = {"enabled_at_start": "true", "realtime_priority": PRIORITY} | parameters
+        values = {"enabled_at_start": "true"} | parameters
         words = [w for name, value in values.items() for w in ("-p", f"{name}:={value}")]
         environment = os.environ | {
             "ROS_DOMAIN_ID": str(domain_id()),
@@ -258,7 +262,6 @@ def measure_hang(bench: Bench, repeats: int) -> list[Figure]:
     node = TractionController(context=run.context, parameter_overrides=enabled)
     hang = node.create_guard_condition(lambda: time.sleep(0.5))
     run.spin(node)
-    take_priority(PRIORITY)
 
     def cause() -> None:
         hang.trigger()
@@ -333,6 +336,21 @@ def measure(repeats: int, seconds: float) -> list[Figure]:
     return figures
 
 
+def take_priority_safely(priority: int) -> None:
+    """Take a real-time priority, 0 for a low niceness; both pass on to child processes.
+
+    Threads that are there already keep theirs.
+    """
+    if priority == 0:
+        with contextlib.suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+        return
+    resource.setrlimit(resource.RLIMIT_RTTIME, (MAX_BUSY_TIME, MAX_BUSY_TIME))
+    refusal = take_priority(priority)
+    if refusal:
+        raise SystemExit(refusal)
+
+
 def measure_with_stepped_clock(repeats: int, seconds: float) -> list[Figure]:
     """Measure everything in a process whose system clock a file steps."""
     with tempfile.TemporaryDirectory() as folder:
@@ -346,8 +364,14 @@ def measure_with_stepped_clock(repeats: int, seconds: float) -> list[Figure]:
             "DONT_FAKE_MONOTONIC": "1",
         }
         words = ["--repeats", str(repeats), "--seconds", str(seconds), "--out", str(out)]
-        command = [sys.executable, "-m", "benchmarks.reliability_controller", *words]
-        subprocess.run(command, check=True, cwd=ROOT, env=environment)
+        with stopping_children() as children:
+            log = Path(folder) / "log"
+            child = ChildProcess("benchmarks.reliability_controller", words, environment, log)
+            children.append(child)
+            end = time.monotonic() + LONGEST
+            while child.running and time.monotonic() < end:
+                time.sleep(0.2)
+            assert child.exit_code == 0, log.read_text(errors="replace")
         rows = json.loads(out.read_text())
     return [Figure(**{k: v for k, v in row.items() if k != "met"}) for row in rows]
 
@@ -357,9 +381,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--repeats", type=int, default=10, help="repeats of each fault")
     parser.add_argument("--seconds", type=float, default=60.0, help="time of normal driving")
+    parser.add_argument("--priority", type=int, default=0, help="real-time priority, 0 for none")
     parser.add_argument("--out", type=Path, help="file for the figures as JSON")
     arguments = parser.parse_args()
     repeats, seconds = arguments.repeats, arguments.seconds
+    take_priority_safely(arguments.priority)
     if CLOCK_FILE in os.environ:  # libfaketime breaks the system call of time.sleep
         time.sleep = lambda seconds: select.select((), (), (), seconds)  # type: ignore[assignment]
         write(measure(repeats, seconds), arguments.out)
