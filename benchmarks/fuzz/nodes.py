@@ -57,7 +57,10 @@ class NodeProcesses:
         self._count = 0
         file = folder / "ground.npz"
         save_terrain(file, ground)
-        self._arguments = {SERVER: ["--ros-args", "-p", f"terrain_file:={file}"], CONTROLLER: []}
+        self._arguments = {
+            SERVER: ["--ros-args", "-p", f"terrain_file:={file}"],
+            CONTROLLER: ["--ros-args", "-p", "enabled_at_start:=true"],
+        }
         self.running = {name: self.start(name) for name in (SERVER, CONTROLLER)}
 
     def start(self, name: str) -> ChildProcess:
