@@ -200,7 +200,7 @@ def take_or_refuse(cloud, resolution):
             assert isinstance(terrain, Terrain)
         except (MessageError, TerrainError) as error:
             assert "\n" not in str(error).strip() or len(str(error)) <= MAX_TEXT
-    assert time.perf_counter() - began < 10.0
+    assert time.perf_counter() - began < 60.0
 
 
 @settings(max_examples=200, deadline=None)
