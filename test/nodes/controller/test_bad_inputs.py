@@ -82,7 +82,7 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
     assert sum(push > 0.0 for *_, push in rover.commands[before:]) <= CYCLES_IN_A_TENTH
     assert text in controller.statistics.last.fault
     wait_until(lambda: rover.count_lines(text), "the reason in the log")
-    wait_until(lambda: text in rover.status.message, "the reason in the diagnostics", 2.0)
+    wait_until(lambda: text in rover.status.message, "the reason in the diagnostics")
     assert rover.status.level == rover.status.ERROR
     rover.joints, rover.imu, rover.speed = kept
     wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving again")
