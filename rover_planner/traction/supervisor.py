@@ -1,5 +1,6 @@
 """Decides whether the rover drives or rests, and what its wheels do at rest."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,11 +9,11 @@ from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import BRAKE, HOLD
 from rover_planner.traction.drive_permission import DrivePermission
-from rover_planner.traction.fault_latch import FaultLatch
 from rover_planner.traction.hold import HoldServo
 from rover_planner.traction.settings import TractionSettings
 from rover_planner.traction.stall_watch import StallWatch
-from rover_planner.traction.traction_service import TractionService, TractionUpdate
+from rover_planner.traction.traction_service import TractionService
+from rover_planner.traction.traction_update import TractionUpdate
 
 DISABLED, EMERGENCY_STOP, FAULT = "disabled", "emergency_stop", "fault"
 STALLED, STANDSTILL, DRIVING = "stalled", "standstill", "driving"
@@ -20,6 +21,9 @@ STATES = (DISABLED, EMERGENCY_STOP, FAULT, STALLED, STANDSTILL, DRIVING)
 """What the rover does; it drives in the last state only."""
 STANDSTILL_DELAY = 0.5
 """Time for which the loops bring the rover to a stop before the rest policy takes over [s]."""
+
+RECOVERY_TIME = 0.2
+"""Time for which everything must be right before the rover drives again [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,3 +147,24 @@ class TractionSupervisor:
             self._hold.start(self.service.pitch)
         self._held = True
         return self._hold.update(self.service.wheel_rates, duration)
+
+
+class FaultLatch:
+    """A fault counts at once and passes RECOVERY_TIME after its cause."""
+
+    def __init__(self) -> None:
+        """Start without a fault."""
+        self._fault, self._end = "", -math.inf
+
+    def update(self, fault: str, now: float) -> str:
+        """Return the fault that counts at time `now` [s]; empty if there is none.
+
+        Args:
+            fault: What is wrong now; empty if nothing is.
+            now: Monotonic time [s].
+        """
+        if fault:
+            self._fault, self._end = fault, now + RECOVERY_TIME
+        elif now >= self._end:
+            self._fault = ""
+        return self._fault

@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
@@ -19,7 +18,7 @@ from rover_physics.traction.contact_ekf import (
     MotionContactEstimator,
     level_estimate,
 )
-from rover_physics.traction.map_contacts import MapContactFinder
+from rover_physics.traction.map_contacts import MAP_SOURCE, MapContactFinder
 from rover_physics.traction.program_inputs import ProgramInputs
 from rover_physics.traction.solver import (
     MAX_PROGRAMS,
@@ -31,13 +30,19 @@ from rover_planner.traction.input_monitor import NEVER, InputMonitor
 from rover_planner.traction.joint_memory import JointMemory
 from rover_planner.traction.limits import MeasurementLimits
 from rover_planner.traction.loops import (
+    MAP_STALL_DELAY,
+    STALL_DELAY,
+    STALLED_GROWTH,
     PIController,
+    PushLimit,
     StallDetector,
+    StallServos,
     estimate_rolling_rates,
     limit_rate,
 )
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
+from rover_planner.traction.traction_update import TractionUpdate
 
 __all__ = ["TractionService", "TractionSettings", "TractionUpdate", "load_traction_settings"]
 
@@ -46,30 +51,10 @@ MAX_PUSH = 0.6
 """Largest push of the speed loop, as a share of the rover's weight."""
 HEADING_INTEGRAL_GAIN = 0.5
 """Integral gain of the heading loop over its gain [1/s]."""
-SERVO_STIFFNESS = 6.0
-"""Gain of the speed servos during a stall, over the slip gain."""
 MAX_STEP = 0.1
 """Upper bound of the time step of loops and filter [s]."""
 TURN_LEFT = np.repeat([1.0, -1.0], 3)
 """Signs (6,) of wheel torques that turn the rover left: the right wheels drive forward."""
-
-
-@dataclass(frozen=True, eq=False)
-class TractionUpdate:
-    """The result of one update."""
-
-    torques: Floats
-    """(6,) torques to command, wheel order [N m]; zero if there is a fault."""
-    fault: str
-    """Reason for zero torques; empty if there is no fault."""
-    warning: str
-    """Problem that does not stop the rover; empty if there is none."""
-    answer: TractionAnswer | None
-    """The torque allocation, before heading and slip control; None if there is a fault."""
-    estimate: ContactEstimate | None
-    """The contact angles; None if there is a fault."""
-    duration: float
-    """Computation time of the update [s]."""
 
 
 class TractionService:
@@ -145,6 +130,8 @@ class TractionService:
         self._heading = PIController(
             heading, HEADING_INTEGRAL_GAIN * heading, max_push * self._half_track
         )
+        self._push_limit = PushLimit(max_push)
+        self._servos = StallServos(gains.slip, self._settings.max_torque)
 
     @property
     def weight(self) -> float:
@@ -278,10 +265,11 @@ class TractionService:
         state = self._measure_state(estimate)
         push = self._find_push(duration)
         try:
-            rows = self._writer.write(state, push)
+            rows = self._write_rows(state, push)
         except ModelError as error:
-            rows, warning = self._writer.write(self._measure_level_state(), push), str(error)
+            rows, warning = self._write_rows(self._measure_level_state(), push), str(error)
         answer = self._share_torques(rows)
+        self._stall_delay = MAP_STALL_DELAY if estimate.source == MAP_SOURCE else STALL_DELAY
         torques = self._command_torques(answer, rows, duration)
         if not np.isfinite(torques).all():
             return self.rest(
@@ -303,7 +291,9 @@ class TractionService:
         self._stall = StallDetector()
         self._last_time = None
         self._last = None
-        self._limited = False
+        self._limited = self._cut = False
+        self._peak = 0.0
+        self._push_limit.reset()
         self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
@@ -347,9 +337,22 @@ class TractionService:
         return state
 
     def _find_push(self, duration: float) -> float:
-        """Return the wanted net traction [N], from the mean travel of the wheels."""
+        """Return the wanted push [N], from the mean travel of the wheels."""
         speed = self._mean_rate * self._settings.rover.wheel.radius
-        return self._speed.update(self._wanted_speed - speed, duration, self._limited)
+        error = self._wanted_speed - speed
+        growth = STALLED_GROWTH * duration if self._stall.stalled else duration
+        push = self._speed.update(error, growth, self._limited)
+        if not self._optimal:
+            return push
+        within = self._push_limit.apply(push, self._peak, duration)
+        self._cut = within != push
+        return within
+
+    def _write_rows(self, state: MeasuredState, push: float) -> BalanceRows:
+        """Return the balance with a push; the program takes it as resistance at the wheels."""
+        if self._optimal:
+            return self._writer.write(state, 0.0, resistance=push)
+        return self._writer.write(state, push)
 
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
         """Return the torques of the policy, and record whether a limit is active."""
@@ -358,7 +361,9 @@ class TractionService:
             max_programs=MAX_PROGRAMS if self._optimal else 0,
         )  # fmt: skip
         self._last = answer.tractions
-        self._limited = answer.torque_slack > 0.0 or answer.friction_slack > 0.0
+        self._peak = float(answer.utilisation.max())
+        beyond = answer.torque_slack > 0.0 or (answer.friction_slack > 0.0 and not self._optimal)
+        self._limited = beyond or self._cut
         return answer
 
     def _command_torques(
@@ -387,7 +392,11 @@ class TractionService:
             wheel_rates - estimate_rolling_rates(wheel_rates, rows.wheel_speeds, wanted)
         )
         # The median is close to the rover's speed even if some wheels spin.
-        share = self._stall.update(median(wheel_rates.tolist()), wanted, duration)
+        rate = median(wheel_rates.tolist())
+        share = self._stall.update(
+            rate, wanted, duration, self._suspension_angles, self._stall_delay
+        )
         if share > 0.0:
-            servo = gain * SERVO_STIFFNESS * (wanted - wheel_rates)
-            torques += share * (servo - torques)
+            torques += share * (self._servos.update(wanted - wheel_rates, duration) - torques)
+        else:
+            self._servos.follow(torques)
