@@ -28,7 +28,8 @@ from rover_planner.parameters.traction_controller import TractionControllerParam
 from rover_planner.parameters.traverse_server import CONTROL_MARGIN
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
-from rover_planner.traction.traction_service import TractionService, load_traction_settings
+from rover_planner.traction.settings import load_traction_settings
+from rover_planner.traction.traction_service import TractionService
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bouldered, fractal
 

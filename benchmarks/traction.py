@@ -23,7 +23,8 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.simulator.mujoco_rover import MujocoRover
-from rover_planner.traction.traction_service import TractionService, load_traction_settings
+from rover_planner.traction.settings import load_traction_settings
+from rover_planner.traction.traction_service import TractionService
 from support.reference_drives import drive_ground
 from support.rough_grounds import bouldered, fractal
 

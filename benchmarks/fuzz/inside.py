@@ -29,7 +29,8 @@ from rover_planner.planning.answering.service_settings import load_service_setti
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.traction.prepared_map import prepare_map
-from rover_planner.traction.traction_service import TractionService, load_traction_settings
+from rover_planner.traction.settings import load_traction_settings
+from rover_planner.traction.traction_service import TractionService
 
 TOO_LONG = 10.0
 """Time for one input above which it counts as a hang [s]."""

@@ -41,10 +41,8 @@ from rover_planner.traction.loops import (
     limit_rate,
 )
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
-from rover_planner.traction.settings import TractionSettings, load_traction_settings
+from rover_planner.traction.settings import TractionSettings
 from rover_planner.traction.traction_update import TractionUpdate
-
-__all__ = ["TractionService", "TractionSettings", "TractionUpdate", "load_traction_settings"]
 
 JOINT_STATES, IMU, CMD_VEL, ODOMETRY = "joint_states", "imu", "cmd_vel", "odometry"
 MAX_PUSH = 0.6
