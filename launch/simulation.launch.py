@@ -21,6 +21,8 @@ ARGUMENTS = {
     "speed": ("0.0", "m/s along a path; 0 takes the rover's own"),
 }
 """Default and meaning of each argument."""
+RESPAWN_DELAY = 1.0
+"""Time after which a node that has ended is started again [s]."""
 NUMBERS = ("start_x", "start_y", "start_yaw", "speed")
 
 
@@ -51,6 +53,8 @@ def generate_launch_description() -> LaunchDescription:
                     name=name,
                     parameters=[parameters],
                     output="screen",
+                    respawn=True,
+                    respawn_delay=RESPAWN_DELAY,
                 )
                 for name, parameters in nodes.items()
             ),

@@ -29,12 +29,12 @@ def start_read_only(folder: Path) -> Start:
     """Start a server from a copy whose folders cannot be written, with such a home."""
     copy = copy_packages(folder)
     with read_only(folder):
-        return _start(copy, drop_rights)
+        return start(copy, folder, drop_rights)
 
 
 def start_full(folder: Path) -> Start:
     """Start a server from a copy on a disk that is full."""
-    return _start(copy_packages(folder), fill_disk)
+    return start(copy_packages(folder), folder, fill_disk)
 
 
 def copy_packages(folder: Path) -> Path:
@@ -45,14 +45,21 @@ def copy_packages(folder: Path) -> Path:
     return folder
 
 
-def _start(copy: Path, prepare: Callable[[], None]) -> Start:
-    environment = {**os.environ, **server_environment(), "PYTHONPATH": str(copy)}
-    environment |= {"HOME": str(copy), "ROS_LOG_DIR": str(copy / "log")}
+def start(checkout: Path, home: Path, prepare: Callable[[], None]) -> Start:
+    """Start a server and end it when it is ready.
+
+    Args:
+        checkout: Folder of the packages.
+        home: The user's home, with the folder of log files.
+        prepare: Called in the new process before the server starts.
+    """
+    environment = {**os.environ, **server_environment(), "PYTHONPATH": str(checkout)}
+    environment |= {"HOME": str(home), "ROS_LOG_DIR": str(home / "log")}
     environment.pop("NUMBA_CACHE_DIR", None)
     began, warnings = time.perf_counter(), []
     server = subprocess.Popen(
         [sys.executable, "-m", "rover_planner.nodes.traverse_server"],
-        cwd=copy,
+        cwd=checkout,
         env=environment,
         stdin=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

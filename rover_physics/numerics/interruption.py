@@ -9,7 +9,7 @@ FIRST_SLICE = 512
 """Number of items in the first slice."""
 SLICE_TIME = 0.05
 """Time of a slice that the size of the next one aims at [s]."""
-MAX_SLICE = 2048
+MAX_SLICE = 1024
 """Largest number of items in a slice: the next ones may take ten times as long."""
 MAX_GROWTH = 8.0
 """Largest growth from one slice to the next."""

@@ -26,6 +26,7 @@ from msg_adapters.paths import path_to_poses, stamped_pose_to_array
 from msg_adapters.results.server_status import server_diagnostics
 from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.stamps import stamp_to_ns
+from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes.map_file_service import MapFileService
 from rover_planner.nodes.map_topics import MapTopics
@@ -218,6 +219,7 @@ class TraverseServer(Node):
         counts = {
             "open questions": self.desk.open_count,
             "internal errors": self.guard.total,
+            **({"kernels not cached": kernel_cache_note()} if kernel_cache_note() else {}),
         }
         health = self.desk.health.describe(
             time.monotonic(),

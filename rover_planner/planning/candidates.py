@@ -11,6 +11,7 @@ that at least one candidate exists.
 
 import numpy as np
 
+from rover_physics.numerics.interruption import check_interruption
 from rover_planner.errors import PlanningError
 from rover_planner.planning.curve_kernels import (
     BumpedCurve,
@@ -162,6 +163,7 @@ class _Curve:
 
     def sample(self, waypoint_spacing: float) -> np.ndarray:
         """Sample equidistant poses (n, 3), at most `waypoint_spacing` [m] apart."""
+        check_interruption()  # a question may have many long candidates
         ends, middles = self._speed[::2], self._speed[1::2]
         pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
         driven = np.concatenate([[0.0], np.cumsum(pieces)])

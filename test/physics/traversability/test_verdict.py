@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics.numerics.interruption import interruptible
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
@@ -206,3 +207,11 @@ def test_a_stone_higher_than_the_belly_is_refused():
     ground = replace(level, elevation=heights)
     prediction = sweep_path(LSR1, ground, [[0.0, 0.0, 0.0]])
     assert judge(LSR1, prediction).code == "belly"
+
+
+def test_the_reasons_of_many_waypoints_can_be_interrupted(fine):
+    broken = replace(fine, rocker_angle=np.full_like(fine.rocker_angle, 3.0))
+    checks = []
+    with interruptible(lambda: checks.append(1)):
+        judge(LSR1, broken)
+    assert len(checks) >= len(POSES)

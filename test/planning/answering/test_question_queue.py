@@ -126,6 +126,17 @@ def test_work_that_checks_nothing_is_refused_all_the_same_and_its_answer_is_drop
     assert desk.queue.open_count == 0
 
 
+def test_a_waiting_question_is_refused_at_its_deadline_without_the_grace_of_one_in_work(desk):
+    go_on = threading.Event()
+    desk.ask("deaf", lambda _: go_on.wait(20.0), seconds=0.05)
+    desk.ask("waiting", work_on, seconds=0.05)
+    time.sleep(0.1)
+    desk.queue.refuse_overdue(10.0)
+    assert desk.told == [("waiting", BUSY)]
+    go_on.set()
+    assert desk.wait(2) == [("waiting", BUSY), ("deaf", True)]
+
+
 def test_all_open_questions_can_be_cancelled(desk):
     desk.ask("one", work_on)
     desk.ask("two", work_on)

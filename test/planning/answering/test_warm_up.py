@@ -1,0 +1,49 @@
+"""All kernels of answers are compiled by the start of a server, so that no question waits."""
+
+import subprocess
+import sys
+
+PROGRAM = """
+import gc
+from dataclasses import replace
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from rover_physics.warm_up import warm_up
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
+from support.grounds import make_terrain, rocky, wall_at, waves
+
+def compiled():
+    kernels = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
+    return {f"{one.__module__}.{one.__name__}": len(one.signatures) for one in kernels}
+
+def service(**parameters):
+    values = TraverseServerParameters(waypoint_spacing=0.05, candidate_count=3, **parameters)
+    return TraverseService(load_service_settings(values))
+
+warm_up()
+service()
+before = compiled()
+start, goal = (-1.0, 0.0, 0.0), (2.0, 0.2, 0.0)
+edge = make_terrain(lambda x, y: waves(x, y) - np.where(x > 0.5, 0.06, 0.0))
+grounds = [make_terrain(waves), make_terrain(rocky), make_terrain(wall_at(0.5)), edge]
+grounds += [replace(one, elevation_std=np.full_like(one.elevation, 0.005)) for one in grounds]
+for parameters in ({}, {"policy": "optimal"}, {"soil": "mars_simulant"}):
+    answering = service(**parameters)
+    for ground in grounds:
+        answering.take_terrain(ground)
+        answering.answer(start, goal, 0.3).complete()
+        answering.take_path(np.array([start, goal]))
+        answering.check_last_path().complete()
+after = compiled()
+print({name: count - before[name] for name, count in after.items() if count > before[name]})
+"""
+
+
+def test_no_question_compiles_a_kernel():
+    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "{}"
