@@ -143,6 +143,7 @@ MEASUREMENT = record_type(
     ("contact_angles", float, (WHEEL_COUNT,)),  # [rad]
     ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
     ("push", float),  # wanted push along body +x [N]
+    ("resistance", float),  # resistance to the travel of the wheels [N]
 )
 """A `MeasuredState` and the wanted push, for kernels; x, y, z and yaw are 0."""
 
@@ -176,18 +177,23 @@ class BalanceWriter:
         # Views are kept because looking up a field of a record is as slow as writing it.
         measured = self._works["measured"]
         self._q, self._push = measured["q"][0], measured["push"]
+        self._resistance = measured["resistance"]
         self._contact_angles = measured["contact_angles"][0]
         self._contact_offsets = measured["contact_offsets"][0]
         self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
 
-    def write(self, state: MeasuredState, net_traction: float) -> BalanceRows:
+    def write(
+        self, state: MeasuredState, net_traction: float, resistance: float = 0.0
+    ) -> BalanceRows:
         """Return the balance at a measured state.
 
         Args:
             state: Attitude, suspension and contact angles.
             net_traction: Push along body +x in [N], in addition to the force that holds the rover
                 against gravity.
+            resistance: Resistance to travel that the tractions overcome too, in [N]. A wheel's
+                share is in proportion to its speed as all wheels roll.
 
         Raises:
             ModelError: The equations are singular: the contact angles contradict each other, so
@@ -198,7 +204,7 @@ class BalanceWriter:
         q[4:] = state.bogie_angles
         self._contact_angles[:] = state.contact_angles
         self._contact_offsets[:] = state.contact_offsets
-        self._push[0] = net_traction
+        self._push[0], self._resistance[0] = net_traction, resistance
         packed = np.zeros(1, MEASURED_BALANCE)
         if not _write_balance(self._linkages, self._works, packed):
             raise ModelError(
@@ -249,6 +255,7 @@ def _write_balance(linkages, works, balances):
     rows.force_unit = linkage.mass * linkage.gravity / WHEEL_COUNT
     _write_places(linkage.length, placement, rows.along)
     _write_rows(balance, rows)
+    _add_resistance(measured.resistance / rows.force_unit, rows)
     return True
 
 
@@ -321,3 +328,16 @@ def _write_rows(balance, rows):
                 A[row, TRACTION + column - 1] = -value
                 A[row, LAST_WHEEL] += value
     A[TRACTION_EQUATION, LAST_WHEEL] += 1.0
+
+
+@kernel
+def _add_resistance(resistance, rows):
+    """Add what the tractions have to overcome at the wheels, in force units.
+
+    The rest of the tractions keeps the balance, so that loads are those without resistance.
+    """
+    A, b = rows.A, rows.b
+    for row in range(EQUATIONS):
+        for wheel in range(WHEEL_COUNT):
+            share = A[TRACTION_EQUATION, TRACTION + wheel]
+            b[row] += resistance * share * A[row, TRACTION + wheel]

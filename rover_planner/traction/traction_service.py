@@ -46,6 +46,11 @@ MAX_PUSH = 0.6
 """Largest push of the speed loop, as a share of the rover's weight."""
 HEADING_INTEGRAL_GAIN = 0.5
 """Integral gain of the heading loop over its gain [1/s]."""
+import os
+LIMIT_FALL, LIMIT_RISE = 0.1, 0.5
+STIFF = float(os.environ.get("STIFF", "1.0")); KI = float(os.environ.get("KI", "5.0"))
+MAX_UTILISATION = 0.95
+"""Peak friction utilisation above which the push does not grow."""
 SERVO_STIFFNESS = 6.0
 """Gain of the speed servos during a stall, over the slip gain."""
 MAX_STEP = 0.1
@@ -276,11 +281,11 @@ class TractionService:
         self._last_time = now
         estimate, warning = self._estimate_contacts(now, duration)
         state = self._measure_state(estimate)
-        push = self._find_push(duration)
+        push = self._limit_push(self._find_push(duration), duration)
         try:
-            rows = self._writer.write(state, push)
+            rows = self._writer.write(state, 0.0, push)
         except ModelError as error:
-            rows, warning = self._writer.write(self._measure_level_state(), push), str(error)
+            rows, warning = self._writer.write(self._measure_level_state(), 0.0, push), str(error)
         answer = self._share_torques(rows)
         torques = self._command_torques(answer, rows, duration)
         if not np.isfinite(torques).all():
@@ -304,6 +309,10 @@ class TractionService:
         self._last_time = None
         self._last = None
         self._limited = False
+        self._push_limit = MAX_PUSH * self._writer.weight
+        self._last_answer = None
+        self._push = self._applied = 0.0
+        self._servo = np.zeros(WHEEL_COUNT)
         self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
@@ -351,6 +360,18 @@ class TractionService:
         speed = self._mean_rate * self._settings.rover.wheel.radius
         return self._speed.update(self._wanted_speed - speed, duration, self._limited)
 
+    def _limit_push(self, push, duration):
+        """Return the push that the ground can take."""
+        most = MAX_PUSH * self._writer.weight
+        last = self._last_answer
+        if last is not None:
+            tight = last.utilisation.max() > MAX_UTILISATION
+            change = duration / (-LIMIT_FALL if tight else LIMIT_RISE)
+            self._push_limit = min(max(self._push_limit * (1.0 + change), 1e-3 * most), most)
+        self._push = abs(push)
+        self._applied = min(abs(push), self._push_limit)
+        return float(np.copysign(self._applied, push))
+
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
         """Return the torques of the policy, and record whether a limit is active."""
         answer = solve_traction(
@@ -358,7 +379,8 @@ class TractionService:
             max_programs=MAX_PROGRAMS if self._optimal else 0,
         )  # fmt: skip
         self._last = answer.tractions
-        self._limited = answer.torque_slack > 0.0 or answer.friction_slack > 0.0
+        self._last_answer = answer
+        self._limited = self._applied < self._push or answer.torque_slack > 0.0
         return answer
 
     def _command_torques(
@@ -389,5 +411,10 @@ class TractionService:
         # The median is close to the rover's speed even if some wheels spin.
         share = self._stall.update(median(wheel_rates.tolist()), wanted, duration)
         if share > 0.0:
-            servo = gain * SERVO_STIFFNESS * (wanted - wheel_rates)
-            torques += share * (servo - torques)
+            error = wanted - wheel_rates
+            self._servo += KI * STIFF * gain * error * duration
+            most = self._settings.max_torque
+            self._servo = np.clip(self._servo, -most, most)
+            torques += share * (STIFF * gain * error + self._servo - torques)
+        else:
+            self._servo = torques.copy()
