@@ -39,7 +39,8 @@ SETTINGS = record_type(
     ("policy", np.int64),  # TorquePolicy.EQUAL or OPTIMAL
     ("friction", float),  # friction coefficient where the terrain has no friction layer
     ("max_torque", float),  # largest wheel torque [N m]
-    ("allowed_torque", float),  # largest wheel torque within the safety limit [N m]
+    ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
+    ("control_margin", float),  # share of the limits left to the controller, for the results
     ("on_soil", np.bool_),  # whether the terrain or the options name soils; else Coulomb friction
     ("direction", float),  # 1 if the rover drives forwards, -1 if backwards
     ("speed", float),  # speed of the wheels over the ground [m/s]

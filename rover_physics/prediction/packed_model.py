@@ -109,7 +109,10 @@ def _pack_request(
         policy=POLICIES[options.policy],
         friction=float(mu),
         max_torque=float(torque),
-        allowed_torque=float(torque * rover.limits.torque_saturation),
+        allowed_torque=float(
+            torque * rover.limits.torque_saturation * (1.0 - options.kept_margin)
+        ),
+        control_margin=float(options.kept_margin),
         on_soil=on_soil,
         direction=options.direction,
         speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),

@@ -87,6 +87,8 @@ class PathPrediction:
     """(n,) index of the waypoint of a row: its own, or the next one for a pose in between."""
     policy: str
     """Torque policy: "equal" or "optimal"."""
+    control_margin: float = 0.0
+    """Share of the limits of friction and torque that is left to the controller."""
     bounds: PathBounds | None = None
     """Bounds on the prediction if the map is uncertain, added by `judge_path`; else None."""
 

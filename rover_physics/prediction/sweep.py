@@ -168,6 +168,7 @@ def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any)
         time=time,
         distance=distance,
         policy=POLICY_NAMES[int(settings["policy"])],
+        control_margin=float(settings["control_margin"]),
         **same,
         **more,
     )

@@ -52,12 +52,18 @@ class SweepOptions:
     (default: none)."""
     backward: bool = False
     """Whether the rover drives backwards along the poses."""
+    control_margin: float = 0.0
+    """Share of the limits of friction and torque that policy OPTIMAL leaves to the controller,
+    0 to below 1; 0 is the physical limit. Policy EQUAL has none."""
 
     def __post_init__(self) -> None:
         if self.policy not in POLICIES:
             raise ModelError(
                 f"no torque policy {self.policy!r}; policies are {', '.join(POLICIES)}"
             )
+        margin = self.control_margin
+        if not 0.0 <= margin < 1.0:
+            raise ModelError(f"control_margin is {margin}; it must be at least 0 and below 1")
         for name, least, most in (
             ("friction", MIN_FRICTION, MAX_FRICTION),
             ("max_torque", MIN_TORQUE, MAX_TORQUE),
@@ -78,6 +84,11 @@ class SweepOptions:
     def direction(self) -> float:
         """1.0 if the rover drives forwards, -1.0 if backwards."""
         return -1.0 if self.backward else 1.0
+
+    @property
+    def kept_margin(self) -> float:
+        """The control margin of the policy: 0 for EQUAL."""
+        return self.control_margin if self.policy == OPTIMAL else 0.0
 
     @property
     def arm_angles(self) -> dict[str, float] | None:

@@ -56,6 +56,8 @@ def classify_path(
 ) -> tuple[ClassifiedWaypoint, ...]:
     """Classify each waypoint of a path from its verdicts under both torque policies.
 
+    A waypoint that needs traction control leaves the control margin of the options.
+
     Args:
         rover: The rover.
         terrain: The ground.

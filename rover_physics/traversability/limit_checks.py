@@ -230,15 +230,30 @@ def _check_sinkage(rover: Rover, prediction: PathPrediction) -> Check:
 
 
 def _check_friction(rover: Rover, prediction: PathPrediction) -> Check:
-    limit = rover.limits.friction_utilisation
+    limit, margin = rover.limits.friction_utilisation, prediction.control_margin
     words = "wheel slips: friction utilisation"
-    return _check_wheels("friction", prediction.friction_utilisation, limit, words)
+    check = _check_wheels(
+        "friction", prediction.friction_utilisation, limit * (1.0 - margin), words
+    )
+    return _name_margin(check, limit, margin)
 
 
 def _check_torque(rover: Rover, prediction: PathPrediction) -> Check:
-    limit = rover.limits.torque_saturation
+    limit, margin = rover.limits.torque_saturation, prediction.control_margin
     words = "motor saturates: torque saturation"
-    return _check_wheels("torque", prediction.torque_saturation, limit, words)
+    check = _check_wheels("torque", prediction.torque_saturation, limit * (1.0 - margin), words)
+    return _name_margin(check, limit, margin)
+
+
+def _name_margin(check: Check, limit: float, margin: float) -> Check:
+    """Return a check whose reasons say that its limit is `limit` less the control margin."""
+    if margin == 0.0:
+        return check
+
+    def describe(i: int) -> str:
+        return f"{check.describe(i)} ({limit:g} less control margin {margin:g})"
+
+    return check._replace(describe=describe)
 
 
 def _check_wheel_drop(rover: Rover, prediction: PathPrediction) -> Check:

@@ -92,7 +92,7 @@ def judge_reach(
         terrain: The ground.
         pose: (3,) x, y [m] and yaw [rad] of base_link, map frame.
         target: (3,) point that the tip of the arm has to reach [m], map frame.
-        options: As for `sweep_path`; its arm angles and tool load are ignored.
+        options: As for `sweep_path`; its arm angles, tool load and control margin are ignored.
         force: (3,) force of the surroundings on the tip [N], map frame (default: none). A tool
             that presses on the ground is pushed up.
         moment: (3,) moment of the surroundings on the tip [N m], map frame (default: none).
@@ -113,7 +113,9 @@ def judge_reach(
         as_vector(name, NO_LOAD if value is None else value)
         for name, value in (("force", force), ("moment", moment))
     ]
-    at_rest = replace(options, joint_angles=None, tool_force=None, tool_moment=None)
+    at_rest = replace(
+        options, joint_angles=None, tool_force=None, tool_moment=None, control_margin=0.0
+    )
     standing = sweep_path(rover, terrain, poses, at_rest)
     if not standing.settled[0]:
         return _refuse_to_stand(judge(rover, standing))

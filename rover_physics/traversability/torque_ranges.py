@@ -75,7 +75,7 @@ def find_torque_ranges(
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        options: As for `sweep_path`; its policy is ignored.
+        options: As for `sweep_path`; its policy and control margin are ignored.
 
     Raises:
         PoseError: Poses of wrong shape, or not finite.
@@ -83,7 +83,7 @@ def find_torque_ranges(
         SoilError: A soil that is not a preset.
     """
     poses = check_poses(poses)
-    model = pack_model(rover, terrain, replace(options, policy="optimal"))
+    model = pack_model(rover, terrain, replace(options, policy="optimal", control_margin=0.0))
     n = len(poses)
     results, work = new_results(n), new_work()
     feasible = np.zeros(n, dtype=bool)

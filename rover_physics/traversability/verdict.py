@@ -1,6 +1,6 @@
 """Verdict on a prediction: whether each waypoint keeps the safety limits, and if not, why."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,8 @@ CODES = (
     "trapped",
 )
 """Codes of a verdict; the first that applies is the reason of a waypoint."""
+MARGIN_CODES = ("friction", "torque")
+"""Codes of the limits that a control margin reduces; their reasons name it."""
 UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Codes of limits that do not count while a wheel rolls off an edge."""
 _LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
@@ -137,6 +139,49 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
         min_belly_clearance=extremes["belly"],
         max_wheel_drop=extremes["wheel_drop"],
         max_sinkage=extremes["sinkage"],
+    )
+
+
+def forgive(verdict: Verdict, other: Verdict) -> Verdict:
+    """Return a verdict without its refusals of waypoints that another verdict does not refuse.
+
+    Args:
+        verdict: The verdict.
+        other: The verdict on the same path under another policy.
+    """
+    refused = [bool(code) for code in other.codes]
+    codes = [code if keep else "" for code, keep in zip(verdict.codes, refused, strict=True)]
+    reasons = [text if keep else "" for text, keep in zip(verdict.reasons, refused, strict=True)]
+    return _with_refusals(verdict, codes, reasons)
+
+
+def name_margin(verdict: Verdict, physical: Verdict, margin: float) -> Verdict:
+    """Return a verdict whose refusals that are due to its control margin alone say so.
+
+    Args:
+        verdict: The verdict with a control margin.
+        physical: The verdict on the same path without one.
+        margin: The control margin.
+    """
+    codes, reasons = list(verdict.codes), list(verdict.reasons)
+    for i, code in enumerate(codes):
+        if code and code not in MARGIN_CODES and not physical.codes[i]:
+            codes[i] = "torque"
+            reasons[i] = f"no torques within their limit less control margin {margin:g}"
+    return _with_refusals(verdict, codes, reasons)
+
+
+def _with_refusals(verdict: Verdict, codes: list[str], reasons: list[str]) -> Verdict:
+    """Return a verdict with other codes and reasons of its waypoints."""
+    first = next((i for i, code in enumerate(codes) if code), -1)
+    return replace(
+        verdict,
+        traversable=first < 0,
+        codes=tuple(codes),
+        reasons=tuple(reasons),
+        first_failure=first,
+        code=codes[first] if first >= 0 else "",
+        reason=reasons[first] if first >= 0 else "",
     )
 
 

@@ -32,6 +32,13 @@ def predict(
     friction: Friction = None,
     max_torque: MaxTorque = None,
     policy: Policy = "equal",
+    control_margin: Annotated[
+        float,
+        typer.Option(
+            metavar="SHARE",
+            help="Share of friction and torque that policy optimal leaves to the controller.",
+        ),
+    ] = 0.0,
     soil: SoilName = None,
     arm: Annotated[
         list[str] | None,
@@ -85,6 +92,7 @@ def predict(
     path = read_poses(poses)
     options = SweepOptions(
         policy=policy,
+        control_margin=control_margin,
         friction=friction,
         max_torque=max_torque,
         soil=soil,

@@ -15,6 +15,8 @@ from rover_planner.parameters.shared import (
 )
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 
+CONTROL_MARGIN = 0.1
+"""Default of control_margin: drives that keep it pass in closed loop, see docs/reliability.md."""
 MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
@@ -41,6 +43,12 @@ class TraverseServerParameters(ParameterTable):
         EQUAL,
         "How the wheels share the traction: equal torques, or optimal with traction control.",
         choices=TORQUE_POLICIES,
+    )
+    control_margin: float = parameter(
+        CONTROL_MARGIN,
+        "Share of friction and torque that a path passable only with traction control leaves to "
+        "the controller; 0 is the physical limit.",
+        bounds=(0.0, 0.9),
     )
     candidate_count: int = parameter(
         9, "Largest number of candidate paths between start and goal.", bounds=(1, 99)

@@ -33,6 +33,8 @@ class PathQueryOptions:
     """Largest distance between waypoints along a path [m]."""
     policy: str = EQUAL
     """How the wheels share the traction, one of `TORQUE_POLICIES`."""
+    control_margin: float = 0.0
+    """Share of friction and torque left to the traction controller where it is needed."""
     friction: float | None = None
     """Coulomb friction where the terrain has none; None: that of the rover file."""
     max_torque: float | None = None
@@ -48,6 +50,7 @@ class PathQueryOptions:
         """Return the options of the model; `joint_angles` [rad] of the arm, None is stowed."""
         return SweepOptions(
             policy=self.policy,
+            control_margin=self.control_margin,
             friction=self.friction,
             max_torque=self.max_torque,
             soil=self.soil,

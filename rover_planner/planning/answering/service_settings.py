@@ -59,6 +59,7 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             spacing=parameters.candidate_spacing,
             waypoint_spacing=parameters.waypoint_spacing,
             policy=parameters.policy,
+            control_margin=parameters.control_margin,
             friction=parameters.friction or None,
             max_torque=parameters.max_torque or None,
             soil=parameters.soil or None,
