@@ -20,6 +20,8 @@ from rover_physics.terrain.ground import height_at_cell, is_cell_on_map, pack_gr
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import ContactEstimate
 
+MAP_SOURCE = "map"
+"""Source of an estimate from a map."""
 PROFILE_STEPS = 14
 """Number of ground samples from below a wheel's centre to PROFILE_REACH ahead; same behind."""
 PROFILE_REACH = 1.25
@@ -99,7 +101,7 @@ class MapContactFinder:
             )
         error = np.hypot(deviation, CELL_DEVIATION * self._resolution) / self._radius
         covariance = (ANGLE_DEVIATION**2 + error**2) * np.eye(WHEEL_COUNT)
-        return ContactEstimate(self._angles.copy(), covariance, "map")
+        return ContactEstimate(self._angles.copy(), covariance, MAP_SOURCE)
 
 
 @kernel

@@ -5,6 +5,7 @@ from statistics import median
 
 import numpy as np
 
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 
@@ -16,10 +17,26 @@ STALL_RATIO = 0.3
 """Share of the wanted rate below which the rover counts as stalled."""
 STALL_DELAY = 0.5
 """Delay between stall and takeover by the speed servos, in units of TAKEOVER_TIME."""
+MAP_STALL_DELAY = 2.5
+"""The same if the contact angles come from a map: the program may need that time for a face."""
+STALLED_GROWTH = 2.0
+"""Growth of the push of a stalled rover, over that of one that moves."""
 TAKEOVER_TIME = 1.0
 """Time in which the share of the speed servos rises from 0 to 1 [s]."""
+SERVO_TIME = 3.5
+"""Time after which servos in vain leave the torques to the program again, with its delay [s]."""
+CLIMBING_ANGLE = 0.02
+"""Change of a suspension angle that shows that the rover climbs, however slowly [rad]."""
 RELEASE_TIME = 1.5
 """Time in which their share falls from 1 to 0 when the rover moves again [s]."""
+SERVO_INTEGRAL_GAIN = 5.0
+"""Integral gain of the speed servos over their gain [1/s]."""
+MAX_PEAK = 0.95
+"""Peak friction utilisation above which the push falls: beyond it wheels slip."""
+FALL_TIME, REGROWTH_TIME = 0.1, 0.5
+"""Time constants with which the largest push falls and grows again [s]."""
+MIN_PUSH_SHARE = 1e-3
+"""Lower bound of the largest push, over its upper bound, from where it grows again."""
 
 
 @dataclass(frozen=True)
@@ -93,20 +110,93 @@ class StallDetector:
 
     def __init__(self) -> None:
         """Start with a share of 0, as for a rover that moves."""
-        self._share = 0.0
+        self._share, self._servo_time = 0.0, 0.0
+        self._seen = np.zeros(len(SUSPENSION_JOINTS))
+        self.stalled = False
+        """Whether the rover was stalled at the last update."""
 
-    def update(self, rate: float, wanted: float, duration: float) -> float:
+    def update(
+        self,
+        rate: float,
+        wanted: float,
+        duration: float,
+        suspension: Floats,
+        delay: float = STALL_DELAY,
+    ) -> float:
         """Return the share of the speed servos, 0 to 1.
 
         Args:
             rate: Median wheel rate [rad/s]; spinning wheels would raise a mean.
             wanted: Wanted wheel rate [rad/s].
             duration: Time since the last call [s].
+            suspension: (4,) angles of rockers and bogies [rad]. They change while one wheel climbs
+                a steep face and the others hardly turn.
+            delay: Delay before the servos take over, in units of TAKEOVER_TIME.
         """
-        stalled = wanted != 0.0 and rate / wanted < STALL_RATIO
-        change = duration / (TAKEOVER_TIME if stalled else -RELEASE_TIME)
-        self._share = min(max(self._share + change, -STALL_DELAY), 1.0)
+        self.stalled = wanted != 0.0 and rate / wanted < STALL_RATIO
+        change = duration / (TAKEOVER_TIME if self.stalled else -RELEASE_TIME)
+        self._share = min(max(self._share + change, -delay), 1.0)
+        if float(np.abs(suspension - self._seen).max()) > CLIMBING_ANGLE:
+            self._seen = suspension
+            self._share = self._share if self._share > 0.0 else -delay
+        self._servo_time = self._servo_time + duration if self._share == 1.0 else 0.0
+        if self._servo_time > SERVO_TIME:
+            self._share = -delay
         return max(self._share, 0.0)
+
+
+class StallServos:
+    """Speed servos of the wheels of a stalled rover: PI controllers with limited torque."""
+
+    def __init__(self, gain: float, max_torque: float):
+        """Start with an integral of zero.
+
+        Args:
+            gain: Torque per error of a wheel's rate [N m s/rad]. A servo that is stiffer than the
+                wheel's inertia over the period allows makes a slipping wheel oscillate.
+            max_torque: Largest magnitude of the integral part [N m].
+        """
+        self._gain, self._max_torque = gain, max_torque
+        self._integral = np.zeros(WHEEL_COUNT)
+
+    def follow(self, torques: Floats) -> None:
+        """Take over from torques (6,) [N m] when the rover stalls."""
+        self._integral = np.clip(torques, -self._max_torque, self._max_torque)
+
+    def update(self, errors: Floats, duration: float) -> Floats:
+        """Return torques (6,) [N m] for errors (6,) of the rates [rad/s]."""
+        step = SERVO_INTEGRAL_GAIN * self._gain * duration * errors
+        self._integral = np.clip(self._integral + step, -self._max_torque, self._max_torque)
+        return self._gain * errors + self._integral
+
+
+class PushLimit:
+    """The largest push that the wheels can give without slip, found by trying.
+
+    The program answers a push that is too large with wheels beyond their friction. More push does
+    not help then: the wheels slip, and the one at a face loses the force that presses it on.
+    """
+
+    def __init__(self, most: float):
+        """Start with the largest push, `most` [N]."""
+        self._most = self._limit = most
+
+    def reset(self) -> None:
+        """Allow the largest push again."""
+        self._limit = self._most
+
+    def apply(self, push: float, peak: float, duration: float) -> float:
+        """Return a push [N] within the limit.
+
+        Args:
+            push: The wanted push [N].
+            peak: The peak friction utilisation with the last push.
+            duration: Time since the last call [s].
+        """
+        change = duration / (-FALL_TIME if peak > MAX_PEAK else REGROWTH_TIME)
+        limit = self._limit * max(1.0 + change, 0.0)
+        self._limit = min(max(limit, MIN_PUSH_SHARE * self._most), self._most)
+        return min(max(push, -self._limit), self._limit)
 
 
 def estimate_rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:

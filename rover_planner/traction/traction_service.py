@@ -19,7 +19,7 @@ from rover_physics.traction.contact_ekf import (
     MotionContactEstimator,
     level_estimate,
 )
-from rover_physics.traction.map_contacts import MapContactFinder
+from rover_physics.traction.map_contacts import MAP_SOURCE, MapContactFinder
 from rover_physics.traction.program_inputs import ProgramInputs
 from rover_physics.traction.solver import (
     MAX_PROGRAMS,
@@ -31,8 +31,13 @@ from rover_planner.traction.input_monitor import NEVER, InputMonitor
 from rover_planner.traction.joint_memory import JointMemory
 from rover_planner.traction.limits import MeasurementLimits
 from rover_planner.traction.loops import (
+    MAP_STALL_DELAY,
+    STALL_DELAY,
+    STALLED_GROWTH,
     PIController,
+    PushLimit,
     StallDetector,
+    StallServos,
     estimate_rolling_rates,
     limit_rate,
 )
@@ -46,13 +51,6 @@ MAX_PUSH = 0.6
 """Largest push of the speed loop, as a share of the rover's weight."""
 HEADING_INTEGRAL_GAIN = 0.5
 """Integral gain of the heading loop over its gain [1/s]."""
-import os
-LIMIT_FALL, LIMIT_RISE = 0.1, 0.5
-STIFF = float(os.environ.get("STIFF", "1.0")); KI = float(os.environ.get("KI", "5.0"))
-MAX_UTILISATION = 0.95
-"""Peak friction utilisation above which the push does not grow."""
-SERVO_STIFFNESS = 6.0
-"""Gain of the speed servos during a stall, over the slip gain."""
 MAX_STEP = 0.1
 """Upper bound of the time step of loops and filter [s]."""
 TURN_LEFT = np.repeat([1.0, -1.0], 3)
@@ -150,6 +148,8 @@ class TractionService:
         self._heading = PIController(
             heading, HEADING_INTEGRAL_GAIN * heading, max_push * self._half_track
         )
+        self._push_limit = PushLimit(max_push)
+        self._servos = StallServos(gains.slip, self._settings.max_torque)
 
     @property
     def weight(self) -> float:
@@ -281,12 +281,14 @@ class TractionService:
         self._last_time = now
         estimate, warning = self._estimate_contacts(now, duration)
         state = self._measure_state(estimate)
-        push = self._limit_push(self._find_push(duration), duration)
+        push = self._find_push(duration)
         try:
             rows = self._writer.write(state, 0.0, push)
         except ModelError as error:
-            rows, warning = self._writer.write(self._measure_level_state(), 0.0, push), str(error)
+            level = self._measure_level_state()
+            rows, warning = self._writer.write(level, 0.0, push), str(error)
         answer = self._share_torques(rows)
+        self._stall_delay = MAP_STALL_DELAY if estimate.source == MAP_SOURCE else STALL_DELAY
         torques = self._command_torques(answer, rows, duration)
         if not np.isfinite(torques).all():
             return self.rest(
@@ -308,11 +310,9 @@ class TractionService:
         self._stall = StallDetector()
         self._last_time = None
         self._last = None
-        self._limited = False
-        self._push_limit = MAX_PUSH * self._writer.weight
-        self._last_answer = None
-        self._push = self._applied = 0.0
-        self._servo = np.zeros(WHEEL_COUNT)
+        self._limited = self._cut = False
+        self._peak = 0.0
+        self._push_limit.reset()
         self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
@@ -356,21 +356,16 @@ class TractionService:
         return state
 
     def _find_push(self, duration: float) -> float:
-        """Return the wanted net traction [N], from the mean travel of the wheels."""
+        """Return the resistance [N] to overcome, from the mean travel of the wheels."""
         speed = self._mean_rate * self._settings.rover.wheel.radius
-        return self._speed.update(self._wanted_speed - speed, duration, self._limited)
-
-    def _limit_push(self, push, duration):
-        """Return the push that the ground can take."""
-        most = MAX_PUSH * self._writer.weight
-        last = self._last_answer
-        if last is not None:
-            tight = last.utilisation.max() > MAX_UTILISATION
-            change = duration / (-LIMIT_FALL if tight else LIMIT_RISE)
-            self._push_limit = min(max(self._push_limit * (1.0 + change), 1e-3 * most), most)
-        self._push = abs(push)
-        self._applied = min(abs(push), self._push_limit)
-        return float(np.copysign(self._applied, push))
+        error = self._wanted_speed - speed
+        growth = STALLED_GROWTH * duration if self._stall.stalled else duration
+        push = self._speed.update(error, growth, self._limited)
+        if not self._optimal:
+            return push
+        within = self._push_limit.apply(push, self._peak, duration)
+        self._cut = within != push
+        return within
 
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
         """Return the torques of the policy, and record whether a limit is active."""
@@ -379,8 +374,9 @@ class TractionService:
             max_programs=MAX_PROGRAMS if self._optimal else 0,
         )  # fmt: skip
         self._last = answer.tractions
-        self._last_answer = answer
-        self._limited = self._applied < self._push or answer.torque_slack > 0.0
+        self._peak = float(answer.utilisation.max())
+        beyond = answer.torque_slack > 0.0 or (answer.friction_slack > 0.0 and not self._optimal)
+        self._limited = beyond or self._cut
         return answer
 
     def _command_torques(
@@ -409,12 +405,11 @@ class TractionService:
             wheel_rates - estimate_rolling_rates(wheel_rates, rows.wheel_speeds, wanted)
         )
         # The median is close to the rover's speed even if some wheels spin.
-        share = self._stall.update(median(wheel_rates.tolist()), wanted, duration)
+        rate = median(wheel_rates.tolist())
+        share = self._stall.update(
+            rate, wanted, duration, self._suspension_angles, self._stall_delay
+        )
         if share > 0.0:
-            error = wanted - wheel_rates
-            self._servo += KI * STIFF * gain * error * duration
-            most = self._settings.max_torque
-            self._servo = np.clip(self._servo, -most, most)
-            torques += share * (STIFF * gain * error + self._servo - torques)
+            torques += share * (self._servos.update(wanted - wheel_rates, duration) - torques)
         else:
-            self._servo = torques.copy()
+            self._servos.follow(torques)
