@@ -283,10 +283,9 @@ class TractionService:
         state = self._measure_state(estimate)
         push = self._find_push(duration)
         try:
-            rows = self._writer.write(state, 0.0, push)
+            rows = self._write_rows(state, push)
         except ModelError as error:
-            level = self._measure_level_state()
-            rows, warning = self._writer.write(level, 0.0, push), str(error)
+            rows, warning = self._write_rows(self._measure_level_state(), push), str(error)
         answer = self._share_torques(rows)
         self._stall_delay = MAP_STALL_DELAY if estimate.source == MAP_SOURCE else STALL_DELAY
         torques = self._command_torques(answer, rows, duration)
@@ -356,7 +355,7 @@ class TractionService:
         return state
 
     def _find_push(self, duration: float) -> float:
-        """Return the resistance [N] to overcome, from the mean travel of the wheels."""
+        """Return the wanted push [N], from the mean travel of the wheels."""
         speed = self._mean_rate * self._settings.rover.wheel.radius
         error = self._wanted_speed - speed
         growth = STALLED_GROWTH * duration if self._stall.stalled else duration
@@ -366,6 +365,12 @@ class TractionService:
         within = self._push_limit.apply(push, self._peak, duration)
         self._cut = within != push
         return within
+
+    def _write_rows(self, state: MeasuredState, push: float) -> BalanceRows:
+        """Return the balance with a push; the program takes it as resistance at the wheels."""
+        if self._optimal:
+            return self._writer.write(state, 0.0, resistance=push)
+        return self._writer.write(state, push)
 
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
         """Return the torques of the policy, and record whether a limit is active."""

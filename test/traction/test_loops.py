@@ -4,11 +4,17 @@ import numpy as np
 import pytest
 
 from rover_planner.traction.loops import (
+    SERVO_TIME,
     PIController,
+    PushLimit,
     StallDetector,
+    StallServos,
     estimate_rolling_rates,
     limit_rate,
 )
+
+LEVEL = np.zeros(4)
+"""Suspension angles on level ground [rad]."""
 
 
 def test_a_push_that_cannot_be_given_does_not_add_up():
@@ -36,9 +42,47 @@ def test_rolling_goes_with_the_wheels_but_not_with_those_that_spin():
 
 def test_servos_take_over_only_where_the_rover_does_not_get_on():
     detector = StallDetector()
-    assert detector.update(0.3, 0.3, 5.0) == 0.0
-    assert detector.update(0.0, 0.3, 0.4) == 0.0
+    assert detector.update(0.3, 0.3, 5.0, LEVEL) == 0.0
+    assert detector.update(0.0, 0.3, 0.4, LEVEL) == 0.0
+    assert detector.stalled
     for _ in range(20):
-        share = detector.update(0.0, 0.3, 0.1)
+        share = detector.update(0.0, 0.3, 0.1, LEVEL)
     assert share == 1.0
-    assert detector.update(0.3, 0.3, 0.3) < 1.0
+    assert detector.update(0.3, 0.3, 0.3, LEVEL) < 1.0
+
+
+def test_a_rover_that_climbs_slowly_is_left_to_the_program():
+    detector, angles = StallDetector(), LEVEL.copy()
+    detector.update(0.3, 0.3, 5.0, angles)
+    for _ in range(100):
+        angles = angles + np.array([0.0, 0.0, 0.003, 0.0])
+        assert detector.update(0.0, 0.3, 0.02, angles) == 0.0
+
+
+def test_servos_in_vain_leave_the_torques_to_the_program_again():
+    detector = StallDetector()
+    shares = [detector.update(0.0, 0.3, 0.02, LEVEL) for _ in range(round(12.0 / 0.02))]
+    taken = np.flatnonzero(np.diff(np.array(shares) == 1.0))
+    assert len(taken) >= 3
+    assert 0.02 * (taken[1] - taken[0]) == pytest.approx(SERVO_TIME, abs=0.05)
+
+
+def test_a_servo_starts_from_the_torques_that_act_and_rises_to_its_limit():
+    servos, acting = StallServos(0.8, 2.0), np.linspace(-0.5, 0.5, 6)
+    servos.follow(acting)
+    np.testing.assert_allclose(servos.update(np.zeros(6), 0.02), acting)
+    for _ in range(200):
+        torques = servos.update(np.full(6, 0.3), 0.02)
+    np.testing.assert_allclose(torques, 2.0 + 0.8 * 0.3)
+
+
+def test_a_push_that_makes_wheels_slip_falls_until_they_do_not():
+    limit = PushLimit(50.0)
+    assert limit.apply(10.0, 0.5, 0.02) == 10.0
+    for _ in range(20):
+        push = limit.apply(10.0, 1.2, 0.02)
+    assert push < 1.0
+    assert limit.apply(-10.0, 1.2, 0.02) > -1.0
+    for _ in range(200):
+        push = limit.apply(10.0, 0.5, 0.02)
+    assert push == 10.0

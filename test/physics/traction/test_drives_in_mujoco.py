@@ -5,9 +5,12 @@ import pytest
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.classification import classify_path
+from rover_planner.parameters.traverse_server import CONTROL_MARGIN
 from support.reference_drives import drive_ground, drive_path, unlimited
 
 pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
+from benchmarks.control_margin import MAP, Case, find_margin
+from benchmarks.control_margin import drive as drive_case
 from benchmarks.traction import EQUAL_CONTROLLER, MAP_CONTROLLER, Obstacle, drive
 
 STEP = Obstacle("step", 0.10, 0.5)
@@ -32,3 +35,10 @@ def test_in_mujoco_the_step_is_passed_with_the_program_and_not_with_equal_torque
     controller, passes
 ):
     assert drive(STEP, controller).passed is passes
+
+
+@pytest.mark.slow
+def test_a_promise_is_kept_where_one_wheel_needs_nearly_all_its_torque():
+    bump = Case("bump_one_side", 0.113, friction=0.99, max_torque=0.903)
+    assert find_margin(bump) >= CONTROL_MARGIN
+    assert drive_case(bump, MAP).passed

@@ -164,6 +164,20 @@ def test_tractions_add_up_to_the_wanted_push():
     assert answer.loads.sum() == pytest.approx(LSR1.weight, rel=1e-9)
 
 
+def test_a_resistance_is_overcome_by_each_wheel_as_fast_as_it_rolls_and_moves_no_load():
+    angles = np.array([0.0, 0.0, 1.2, 0.0, 0.0, 0.0])
+    writer = BalanceWriter(LSR1)
+    still = writer.write(level(angles), 0.0)
+    pushed = writer.write(level(angles), 0.0, resistance=12.0)
+    unit, speeds = still.force_unit, still.wheel_speeds
+    extra = 12.0 / unit * speeds / 6.0
+    held = still.complete(np.linspace(0.0, 0.5, 6))
+    found = pushed.complete(held[TRACTIONS] + extra)
+    np.testing.assert_allclose(found[TRACTIONS], held[TRACTIONS] + extra, atol=1e-9)
+    np.testing.assert_allclose(found[LOADS], held[LOADS], atol=1e-9)
+    assert speeds[2] > 2.0 and abs(speeds[5]) < 1.0
+
+
 @pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
 @pytest.mark.parametrize("push", [0.1, -0.2])
 def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
