@@ -8,7 +8,7 @@ It needs the extra `bench`. Its results are in docs/reliability.md.
 import argparse
 import json
 import multiprocessing
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -64,6 +64,8 @@ TORQUES = 0.3, 2.5
 """Smallest and largest torque limit [N m]; their logarithm is uniform."""
 MARGINS = tuple(round(0.02 * k, 2) for k in range(26))
 """Control margins that are tried."""
+BATCH = 40
+"""Cases that are drawn at once."""
 SHOWN = (0.0, 0.04, 0.08, 0.1, 0.12, 0.16, 0.2, 0.24, 0.3)
 """Control margins in the table."""
 
@@ -149,15 +151,16 @@ def find_margin(case: Case, margins: Sequence[float] = MARGINS) -> float:
     return kept
 
 
-def draw_promised(count: int, seed: int) -> Iterator[tuple[Case, float]]:
-    """Yield `count` cases that are passable with traction control, with their margins."""
-    rng = np.random.default_rng(seed)
-    while count:
-        case = draw_case(rng)
-        margin = find_margin(case)
-        if margin >= 0.0:
-            count -= 1
-            yield case, margin
+def draw_promised(pool: ProcessPoolExecutor, count: int, seed: int) -> dict[Case, float]:
+    """Return `count` cases that are passable with traction control, with their margins."""
+    rng, margins = np.random.default_rng(seed), {}
+    while True:
+        cases = [draw_case(rng) for _ in range(BATCH)]
+        for case, margin in zip(cases, pool.map(find_margin, cases), strict=True):
+            if margin >= 0.0:
+                margins[case] = margin
+            if len(margins) == count:
+                return margins
 
 
 def drive(case: Case, source: str = MAP) -> Drive:
@@ -199,21 +202,15 @@ def _place_rover(case: Case) -> tuple[Terrain, MujocoRover]:
     return ground, MujocoRover(rover, ground, (START, 0.0, 0.0), case.friction)
 
 
-def drive_all(cases: Sequence[Case], sources: Sequence[str], workers: int) -> dict:
-    """Drive all cases with contact angles from each source, in processes of their own."""
+def drive_all(pool: ProcessPoolExecutor, cases: Sequence[Case], sources: Sequence[str]) -> dict:
+    """Drive all cases with contact angles from each source."""
     jobs = [(case, source) for case in cases for source in sources]
-    context = multiprocessing.get_context("spawn")
-    with (
-        ProcessPoolExecutor(workers, mp_context=context) as pool,
-        Progress(console=Console(stderr=True)) as progress,
-    ):
+    futures = {pool.submit(drive, *job): job for job in jobs}
+    with Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task("drive", total=len(jobs))
-        futures = {pool.submit(drive, *job): job for job in jobs}
-        drives = {}
-        for future in as_completed(futures):
-            drives[futures[future]] = future.result()
+        for _ in as_completed(futures):
             progress.advance(task)
-    return drives
+    return {job: future.result() for future, job in futures.items()}
 
 
 def show_margins(margins: dict[Case, float], drives: dict, sources: Sequence[str]) -> Table:
@@ -256,8 +253,10 @@ def main() -> None:
     parser.add_argument("--sources", nargs="+", choices=(MAP, MOTION), default=[MAP, MOTION])
     parser.add_argument("--out", type=Path, default=Path("bench_output/control_margin.json"))
     arguments = parser.parse_args()
-    margins = dict(draw_promised(arguments.count, arguments.seed))
-    drives = drive_all(list(margins), arguments.sources, arguments.workers)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(arguments.workers, mp_context=context) as pool:
+        margins = draw_promised(pool, arguments.count, arguments.seed)
+        drives = drive_all(pool, list(margins), arguments.sources)
     console = Console()
     console.print(show_failures(margins, drives))
     console.print(show_margins(margins, drives, arguments.sources))
