@@ -22,7 +22,7 @@ from rover_physics.traction.contact_ekf import ContactEstimate
 
 MAP_SOURCE = "map"
 """Source of an estimate from a map."""
-PROFILE_STEPS = 14
+PROFILE_STEPS = 40
 """Number of ground samples from below a wheel's centre to PROFILE_REACH ahead; same behind."""
 PROFILE_REACH = 1.25
 """Distance ahead of and behind a wheel's centre over which the ground is sampled [wheel radii]."""
