@@ -100,6 +100,79 @@ class PIController:
         return min(max(output, -self._limit), self._limit)
 
 
+class PushLimit:
+    """The largest push that the wheels can give without slip, found by trying.
+
+    The program answers a push that is too large with wheels beyond their friction. More push does
+    not help then: the wheels slip, and the one at a face loses the force that presses it on.
+    """
+
+    def __init__(self, most: float):
+        """Start with the largest push, `most` [N]."""
+        self._most = self._limit = most
+
+    def reset(self) -> None:
+        """Allow the largest push again."""
+        self._limit = self._most
+
+    def apply(self, push: float, peak: float, duration: float) -> float:
+        """Return a push [N] within the limit.
+
+        Args:
+            push: The wanted push [N].
+            peak: The peak friction utilisation with the last push.
+            duration: Time since the last call [s].
+        """
+        change = duration / (-FALL_TIME if peak > MAX_PEAK else REGROWTH_TIME)
+        limit = self._limit * max(1.0 + change, 0.0)
+        self._limit = min(max(limit, MIN_PUSH_SHARE * self._most), self._most)
+        return min(max(push, -self._limit), self._limit)
+
+
+class PushLoop(PIController):
+    """The speed loop: the push that the wheels' travel asks for, within what the ground takes."""
+
+    def __init__(self, gain: float, integral_gain: float, most: float):
+        """Start with an integral of zero; `most` is the largest push [N], else as PIController."""
+        super().__init__(gain, integral_gain, most)
+        self._limit_of_ground = PushLimit(most)
+        self._cut = False
+
+    def reset(self) -> None:
+        """Set the integral to zero and allow the largest push again."""
+        super().reset()
+        self._limit_of_ground.reset()
+        self._cut = False
+
+    def push(self, error: float, duration: float, limited: bool, peak: float) -> float:
+        """Return the push [N].
+
+        Args:
+            error: Wanted minus measured speed [m/s].
+            duration: Time since the last call [s].
+            limited: As for `update`.
+            peak: Peak friction utilisation with the last push.
+        """
+        wanted = self.update(error, duration, limited or self._cut)
+        within = self._limit_of_ground.apply(wanted, peak, duration)
+        self._cut = within != wanted
+        return within
+
+
+@dataclass(frozen=True, eq=False)
+class WheelMotion:
+    """How the wheels move and should move."""
+
+    rates: Floats
+    """(6,) measured rates [rad/s]."""
+    ratios: Floats
+    """(6,) speeds of the wheels' centres over their mean."""
+    suspension_angles: Floats
+    """(4,) angles of rockers and bogies [rad]."""
+    wanted: float
+    """Wanted mean rate [rad/s]."""
+
+
 class StallDetector:
     """Computes the share of speed servos in the torques of a stalled rover.
 
@@ -114,30 +187,27 @@ class StallDetector:
         self._seen = np.zeros(len(SUSPENSION_JOINTS))
         self.stalled = False
         """Whether the rover was stalled at the last update."""
+        self.climbs = False
+        """Whether the suspension has moved by CLIMBING_ANGLE with the last update."""
 
-    def update(
-        self,
-        rate: float,
-        wanted: float,
-        duration: float,
-        suspension: Floats,
-        delay: float = STALL_DELAY,
-    ) -> float:
+    def update(self, motion: WheelMotion, duration: float, delay: float = STALL_DELAY) -> float:
         """Return the share of the speed servos, 0 to 1.
 
         Args:
-            rate: Median wheel rate [rad/s]; spinning wheels would raise a mean.
-            wanted: Wanted wheel rate [rad/s].
-            duration: Time since the last call [s].
-            suspension: (4,) angles of rockers and bogies [rad]. They change while one wheel climbs
+            motion: How the wheels move. The median of their rates counts, because spinning wheels
+                would raise a mean; and the suspension angles, which change while one wheel climbs
                 a steep face and the others hardly turn.
+            duration: Time since the last call [s].
             delay: Delay before the servos take over, in units of TAKEOVER_TIME.
         """
-        self.stalled = wanted != 0.0 and rate / wanted < STALL_RATIO
+        rate = median(motion.rates.tolist())
+        self.stalled = motion.wanted != 0.0 and rate / motion.wanted < STALL_RATIO
         change = duration / (TAKEOVER_TIME if self.stalled else -RELEASE_TIME)
         self._share = min(max(self._share + change, -delay), 1.0)
-        if float(np.abs(suspension - self._seen).max()) > CLIMBING_ANGLE:
-            self._seen = suspension
+        moved = np.abs(motion.suspension_angles - self._seen).max()
+        self.climbs = bool(moved > CLIMBING_ANGLE)
+        if self.climbs:
+            self._seen = motion.suspension_angles.copy()
             self._share = self._share if self._share > 0.0 else -delay
         self._servo_time = self._servo_time + duration if self._share == 1.0 else 0.0
         if self._servo_time > SERVO_TIME:
@@ -170,33 +240,44 @@ class StallServos:
         return self._gain * errors + self._integral
 
 
-class PushLimit:
-    """The largest push that the wheels can give without slip, found by trying.
+class SlipControl:
+    """Adds torques against slip, and those of speed servos if the rover is stalled."""
 
-    The program answers a push that is too large with wheels beyond their friction. More push does
-    not help then: the wheels slip, and the one at a face loses the force that presses it on.
-    """
-
-    def __init__(self, most: float):
-        """Start with the largest push, `most` [N]."""
-        self._most = self._limit = most
-
-    def reset(self) -> None:
-        """Allow the largest push again."""
-        self._limit = self._most
-
-    def apply(self, push: float, peak: float, duration: float) -> float:
-        """Return a push [N] within the limit.
+    def __init__(self, gain: float, max_torque: float):
+        """Start as for a rover that moves.
 
         Args:
-            push: The wanted push [N].
-            peak: The peak friction utilisation with the last push.
-            duration: Time since the last call [s].
+            gain: Torque per difference between a wheel's rate and that of rolling [N m s/rad].
+            max_torque: Largest torque of a wheel [N m].
         """
-        change = duration / (-FALL_TIME if peak > MAX_PEAK else REGROWTH_TIME)
-        limit = self._limit * max(1.0 + change, 0.0)
-        self._limit = min(max(limit, MIN_PUSH_SHARE * self._most), self._most)
-        return min(max(push, -self._limit), self._limit)
+        self._gain = gain
+        self._servos = StallServos(gain, max_torque)
+        self.detector = StallDetector()
+        """Tells whether the rover is stalled or climbs."""
+
+    def reset(self) -> None:
+        """Start as for a rover that moves."""
+        self.detector = StallDetector()
+
+    def correct(
+        self, torques: Floats, motion: WheelMotion, duration: float, delay: float
+    ) -> Floats:
+        """Return torques (6,) [N m] with slip control.
+
+        Args:
+            torques: (6,) torques of the other loops [N m].
+            motion: How the wheels move.
+            duration: Time since the last call [s].
+            delay: As for `StallDetector`.
+        """
+        rolling = estimate_rolling_rates(motion.rates, motion.ratios, motion.wanted)
+        torques = torques - self._gain * (motion.rates - rolling)
+        share = self.detector.update(motion, duration, delay)
+        if share == 0.0:
+            self._servos.follow(torques)
+            return torques
+        servo = self._servos.update(motion.wanted - motion.rates, duration)
+        return torques + share * (servo - torques)
 
 
 def estimate_rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:

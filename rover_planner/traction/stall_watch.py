@@ -24,6 +24,10 @@ class StallWatch:
         """Forget the stall."""
         self._time, self._blocked = 0.0, (0.0, 0.0)
 
+    def reset_time(self) -> None:
+        """Start to count anew, for a rover that climbs."""
+        self._time = 0.0
+
     def update(
         self, rates: Floats, wanted: tuple[float, float], duration: float, stall_time: float
     ) -> bool:

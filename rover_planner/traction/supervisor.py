@@ -120,6 +120,8 @@ class TractionSupervisor:
         wheel, middle = settings.rover.wheel, settings.rover.suspension.wheels["middle"]
         turning = yaw_rate * abs(middle[1])
         wanted = (speed + turning) / wheel.radius, (speed - turning) / wheel.radius
+        if self.service.climbs:
+            self._stall.reset_time()
         return self._stall.update(self.service.wheel_rates, wanted, duration, settings.stall_time)
 
     def _is_standing(self, duration: float) -> bool:

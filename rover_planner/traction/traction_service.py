@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Mapping
-from statistics import median
 
 import numpy as np
 
@@ -34,10 +33,9 @@ from rover_planner.traction.loops import (
     STALL_DELAY,
     STALLED_GROWTH,
     PIController,
-    PushLimit,
-    StallDetector,
-    StallServos,
-    estimate_rolling_rates,
+    PushLoop,
+    SlipControl,
+    WheelMotion,
     limit_rate,
 )
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
@@ -124,17 +122,21 @@ class TractionService:
         self._half_track = rover.suspension.wheels["middle"][1]
         inertia = mass * self._half_track**2
         heading = inertia * gains.heading
-        self._speed = PIController(mass * gains.speed, mass * gains.travel, max_push)
+        self._speed = PushLoop(mass * gains.speed, mass * gains.travel, max_push)
         self._heading = PIController(
             heading, HEADING_INTEGRAL_GAIN * heading, max_push * self._half_track
         )
-        self._push_limit = PushLimit(max_push)
-        self._servos = StallServos(gains.slip, self._settings.max_torque)
+        self._slip = SlipControl(gains.slip, self._settings.max_torque)
 
     @property
     def weight(self) -> float:
         """Weight with payload [N]."""
         return float(self._writer.weight)
+
+    @property
+    def climbs(self) -> bool:
+        """Whether the suspension shows that the rover climbs, at the last update."""
+        return self._slip.detector.climbs
 
     @property
     def wheel_rates(self) -> Floats:
@@ -286,12 +288,10 @@ class TractionService:
         """Discard the last answer and set all integrals to zero."""
         self._speed.reset()
         self._heading.reset()
-        self._stall = StallDetector()
+        self._slip.reset()
         self._last_time = None
         self._last = None
-        self._limited = self._cut = False
-        self._peak = 0.0
-        self._push_limit.reset()
+        self._limited, self._peak = False, 0.0
         self._torques = np.zeros(WHEEL_COUNT)
 
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
@@ -336,21 +336,16 @@ class TractionService:
 
     def _find_push(self, duration: float) -> float:
         """Return the wanted push [N], from the mean travel of the wheels."""
-        speed = self._mean_rate * self._settings.rover.wheel.radius
-        error = self._wanted_speed - speed
-        growth = STALLED_GROWTH * duration if self._stall.stalled else duration
-        push = self._speed.update(error, growth, self._limited)
+        error = self._wanted_speed - self._mean_rate * self._settings.rover.wheel.radius
+        growth = STALLED_GROWTH * duration if self._slip.detector.stalled else duration
         if not self._optimal:
-            return push
-        within = self._push_limit.apply(push, self._peak, duration)
-        self._cut = within != push
-        return within
+            return self._speed.update(error, growth, self._limited)
+        return self._speed.push(error, growth, self._limited, self._peak)
 
     def _write_rows(self, state: MeasuredState, push: float) -> BalanceRows:
         """Return the balance with a push; the program takes it as resistance at the wheels."""
-        if self._optimal:
-            return self._writer.write(state, 0.0, resistance=push)
-        return self._writer.write(state, push)
+        push, resistance = (0.0, push) if self._optimal else (push, 0.0)
+        return self._writer.write(state, push, resistance)
 
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
         """Return the torques of the policy, and record whether a limit is active."""
@@ -360,8 +355,7 @@ class TractionService:
         )  # fmt: skip
         self._last = answer.tractions
         self._peak = float(answer.utilisation.max())
-        beyond = answer.torque_slack > 0.0 or (answer.friction_slack > 0.0 and not self._optimal)
-        self._limited = beyond or self._cut
+        self._limited = answer.torque_slack > 0.0 or answer.friction_slack > 0.0
         return answer
 
     def _command_torques(
@@ -376,25 +370,11 @@ class TractionService:
                 settings.rover.wheel.radius * moment / (WHEEL_COUNT * self._half_track) * TURN_LEFT
             )
         if self._optimal:
-            self._add_slip_control(torques, rows, duration)
+            speed = self._wanted_speed / settings.rover.wheel.radius
+            angles, rates = self._suspension_angles, self._wheel_rates
+            motion = WheelMotion(rates, rows.wheel_speeds, angles, speed)
+            torques = self._slip.correct(torques, motion, duration, self._stall_delay)
         torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)
         max_change = settings.gains.torque_rate * duration
         self._torques = limit_rate(torques, self._torques, max_change)
         return self._torques
-
-    def _add_slip_control(self, torques: Floats, rows: BalanceRows, duration: float) -> None:
-        """Add torques against slip, and those of the speed servos if the rover is stalled."""
-        gain, wheel_rates = self._settings.gains.slip, self._wheel_rates
-        wanted = self._wanted_speed / self._settings.rover.wheel.radius
-        torques -= gain * (
-            wheel_rates - estimate_rolling_rates(wheel_rates, rows.wheel_speeds, wanted)
-        )
-        # The median is close to the rover's speed even if some wheels spin.
-        rate = median(wheel_rates.tolist())
-        share = self._stall.update(
-            rate, wanted, duration, self._suspension_angles, self._stall_delay
-        )
-        if share > 0.0:
-            torques += share * (self._servos.update(wanted - wheel_rates, duration) - torques)
-        else:
-            self._servos.follow(torques)

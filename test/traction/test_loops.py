@@ -4,17 +4,21 @@ import numpy as np
 import pytest
 
 from rover_planner.traction.loops import (
+    CLIMBING_ANGLE,
     SERVO_TIME,
     PIController,
     PushLimit,
     StallDetector,
     StallServos,
+    WheelMotion,
     estimate_rolling_rates,
     limit_rate,
 )
 
-LEVEL = np.zeros(4)
-"""Suspension angles on level ground [rad]."""
+
+def moves(rate, wanted=0.3, suspension=(0.0, 0.0, 0.0, 0.0)):
+    """Return wheels that all turn at a rate."""
+    return WheelMotion(np.full(6, rate), np.ones(6), np.array(suspension), wanted)
 
 
 def test_a_push_that_cannot_be_given_does_not_add_up():
@@ -42,26 +46,28 @@ def test_rolling_goes_with_the_wheels_but_not_with_those_that_spin():
 
 def test_servos_take_over_only_where_the_rover_does_not_get_on():
     detector = StallDetector()
-    assert detector.update(0.3, 0.3, 5.0, LEVEL) == 0.0
-    assert detector.update(0.0, 0.3, 0.4, LEVEL) == 0.0
+    assert detector.update(moves(0.3), 5.0) == 0.0
+    assert detector.update(moves(0.0), 0.4) == 0.0
     assert detector.stalled
     for _ in range(20):
-        share = detector.update(0.0, 0.3, 0.1, LEVEL)
+        share = detector.update(moves(0.0), 0.1)
     assert share == 1.0
-    assert detector.update(0.3, 0.3, 0.3, LEVEL) < 1.0
+    assert detector.update(moves(0.3), 0.3) < 1.0
 
 
 def test_a_rover_that_climbs_slowly_is_left_to_the_program():
-    detector, angles = StallDetector(), LEVEL.copy()
-    detector.update(0.3, 0.3, 5.0, angles)
-    for _ in range(100):
-        angles = angles + np.array([0.0, 0.0, 0.003, 0.0])
-        assert detector.update(0.0, 0.3, 0.02, angles) == 0.0
+    detector, climbed = StallDetector(), []
+    detector.update(moves(0.3), 5.0)
+    for k in range(200):
+        slowly = moves(0.0, suspension=(0.0, 0.0, 0.003 * k, 0.0))
+        assert detector.update(slowly, 0.02) == 0.0
+        climbed.append(detector.climbs)
+    assert sum(climbed) == 199 // (int(CLIMBING_ANGLE / 0.003) + 1)
 
 
 def test_servos_in_vain_leave_the_torques_to_the_program_again():
     detector = StallDetector()
-    shares = [detector.update(0.0, 0.3, 0.02, LEVEL) for _ in range(round(12.0 / 0.02))]
+    shares = [detector.update(moves(0.0), 0.02) for _ in range(round(12.0 / 0.02))]
     taken = np.flatnonzero(np.diff(np.array(shares) == 1.0))
     assert len(taken) >= 3
     assert 0.02 * (taken[1] - taken[0]) == pytest.approx(SERVO_TIME, abs=0.05)
