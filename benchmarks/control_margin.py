@@ -24,8 +24,8 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_path
+from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.parameters.traverse_server import CONTROL_MARGIN
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.traction.settings import load_traction_settings

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_planner.parameters.shared import (
+    CONTROL_MARGIN,
     cell_height_parameter,
     input_reliability_parameter,
     map_durability_parameter,
@@ -17,8 +18,6 @@ from rover_planner.parameters.table import ParameterError, ParameterTable, param
 
 MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""
-CONTROL_MARGIN = 0.1
-"""Default of control_margin: drives that keep it pass in closed loop, see docs/reliability.md."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
 """Values of the parameter unknown_cells."""
 

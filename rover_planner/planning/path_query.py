@@ -15,6 +15,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_paths
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.planning.candidates import generate_candidates, path_length
 
 RISK_STEP = 0.05
@@ -33,7 +34,7 @@ class PathQueryOptions:
     """Largest distance between waypoints along a path [m]."""
     policy: str = EQUAL
     """How the wheels share the traction, one of `TORQUE_POLICIES`."""
-    control_margin: float = 0.0
+    control_margin: float = CONTROL_MARGIN
     """Share of friction and torque left to the traction controller where it is needed."""
     friction: float | None = None
     """Coulomb friction where the terrain has none; None: that of the rover file."""

@@ -51,7 +51,7 @@ def test_cmd_vel_of_another_type_is_named_with_the_parameter(
     rover = start_rover(other_context, kind)
     text = f"cmd_vel of /rover is not heard: its type is geometry_msgs/msg/{kind.__name__}; "
     text += f"set parameter cmd_vel_stamped to {advice}"
-    wait_until(lambda: rover.count_lines(text), "the warning", NAMED_WITHIN + 1.0)
+    wait_until(lambda: rover.count_lines(text), "the warning", 10.0 * NAMED_WITHIN)
 
     def is_shown():
         return rover.status and any(text in item.value for item in rover.status.values)
@@ -66,7 +66,7 @@ def test_a_best_effort_map_is_named_and_the_parameter_mends_it(rover, start_cont
     node = start_controller()
     text = "a publisher of elevation_cloud is not heard: its reliability does not match; "
     text += "set input_reliability to best_effort"
-    wait_until(lambda: rover.count_lines(text), "the warning", NAMED_WITHIN + 1.0)
+    wait_until(lambda: rover.count_lines(text), "the warning", 10.0 * NAMED_WITHIN)
     assert node.get_parameter("input_reliability").value == "reliable"
 
 

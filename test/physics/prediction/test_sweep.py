@@ -29,12 +29,15 @@ def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndar
     return np.column_stack([np.linspace(start, end, count), np.zeros(count), np.full(count, yaw)])
 
 
+OF_THE_WHOLE = {"policy", "control_margin"}
+
+
 def columns(prediction):
     """Return the arrays of a prediction that hold a row per waypoint of its own, by name."""
     return {
         field.name: getattr(prediction, field.name)
         for field in fields(prediction)
-        if field.name not in ALONG_THE_PATH and field.name != "policy"
+        if field.name not in ALONG_THE_PATH | OF_THE_WHOLE
     }
 
 

@@ -5,7 +5,7 @@ import pytest
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.classification import classify_path
-from rover_planner.parameters.traverse_server import CONTROL_MARGIN
+from rover_planner.parameters.shared import CONTROL_MARGIN
 from support.reference_drives import drive_ground, drive_path, unlimited
 
 pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
