@@ -18,6 +18,8 @@ from benchmarks.server_trials.stage import (
 from support.grounds import make_terrain, rocky, waves
 from support.ros_fixtures import wait_until
 
+ANSWER_TIME, PAUSE = 0.2, 0.05
+"""Time after which a client asks again without an answer, and after a refusal [s]."""
 START, GOAL = (-3.0, 0.0, 0.0), (3.0, 0.5, 0.0)
 
 
@@ -102,7 +104,7 @@ def time_restart(stage: Stage) -> Restart:
     answer = None
     while True:
         try:
-            plan = asker.plan(START, GOAL, 0.25)
+            plan = asker.plan(START, GOAL, ANSWER_TIME)
         except LostAnswerError:
             assert second.running, second.last_words()
             continue
@@ -110,6 +112,7 @@ def time_restart(stage: Stage) -> Restart:
         if plan.poses:
             wait_for_log(second, "map from elevation_cloud")
             return Restart(answer, time.perf_counter() - began)
+        time.sleep(PAUSE)
 
 
 def _time(work: Callable[[], object]) -> float:

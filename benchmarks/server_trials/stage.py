@@ -24,7 +24,7 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
-from rover_planner.ros.qos import map_qos, topic_qos
+from rover_planner.ros.qos import map_qos, service_qos, topic_qos
 from support.ros_fixtures import RosRun, call, domain_id, wait_until
 
 SERVER = "/traverse_server"
@@ -50,7 +50,9 @@ class Client:
         self.verdicts: list[DiagnosticArray] = []
         """Messages of ~/verdict since `hear_verdicts`."""
         self._plan = self.node.create_client(GetPlan, f"{SERVER}/can_traverse")
-        self._check = self.node.create_client(Trigger, f"{SERVER}/check_path")
+        self._check = self.node.create_client(
+            Trigger, f"{SERVER}/check_path", qos_profile=service_qos()
+        )
         self._cancel = self.node.create_client(Trigger, f"{SERVER}/cancel")
         self._parameters = self.node.create_client(SetParameters, f"{SERVER}/set_parameters")
         self._path = self.node.create_publisher(PathMessage, f"{SERVER}/path", topic_qos())

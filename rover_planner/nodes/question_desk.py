@@ -18,6 +18,7 @@ from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover
+from rover_planner.ros.paced_sender import PacedSender
 from rover_planner.ros.refusals import refuse_error
 
 PATROL = 0.05
@@ -49,6 +50,7 @@ class QuestionDesk:
         self._node, self._service, self._maps = node, service, maps
         self.guard = guard
         """Takes unexpected errors."""
+        self._sender = PacedSender(node, guard)
         self._register = Register()
         self._time_budget = 1.0
         self.health = ServerHealth()
@@ -89,7 +91,7 @@ class QuestionDesk:
             identity = self._register.identify(
                 asked.number, inquiry.service, inquiry.question_hash, asked.situation
             )
-            inquiry.deliver(given, identity)
+            self._sender.send(lambda: inquiry.deliver(given, identity))
 
         budget = Budget(self._time_budget)
         self._queue.ask(Question(answer, inquiry.refuse, fail, self.guard.around(deliver), budget))
@@ -103,6 +105,7 @@ class QuestionDesk:
     def close(self) -> None:
         """Refuse all open questions and end the thread."""
         self._queue.close()
+        self._sender.send_all()
 
     def _deliver(self) -> None:
         self._queue.deliver()

@@ -15,6 +15,8 @@ from rover_planner.planning.answering.budget import (
     QuestionStoppedError,
 )
 
+HOPELESS = 0.02
+"""Share of its time that a waiting question must have left to be worth waiting for."""
 END_TIME = 2.0
 """Longest wait for the thread when the queue is closed [s]."""
 
@@ -84,10 +86,13 @@ class QuestionQueue:
             self._send(*self._answered.popleft())
 
     def refuse_overdue(self, grace: float) -> None:
-        """Refuse questions whose deadline has passed, the one in work after `grace` [s] more."""
+        """Refuse waiting questions just before their deadline, one in work `grace` [s] after."""
         for question in list(self._open):
-            if question.budget.remaining < (-grace if question.has_begun else 0.0):
+            budget = question.budget
+            if question.has_begun and budget.remaining < -grace:
                 self._send(question, _refuse_stopped(question))
+            elif not question.has_begun and budget.remaining < HOPELESS * budget.seconds:
+                self._send(question, _refuse_waiting(question))
 
     def stop_all(self, code: str, reason: str) -> int:
         """Stop all open questions with a code and reason; return their number."""
@@ -143,8 +148,13 @@ def _refuse_stopped(question: Question) -> Any:
         question.budget.check()
     except QuestionStoppedError as error:
         if error.code == TOO_LONG and not question.has_begun:
-            seconds = question.budget.seconds
-            reason = f"others were in work for its time budget of {seconds:g} s; ask again later"
-            return question.refuse(BUSY, reason)
+            return _refuse_waiting(question)
         return question.refuse(error.code, str(error))
     raise AssertionError("the question is not over")
+
+
+def _refuse_waiting(question: Question) -> Any:
+    """Return the refusal of a question that was not begun in time."""
+    seconds = question.budget.seconds
+    reason = f"others were in work for its time budget of {seconds:g} s; ask again later"
+    return question.refuse(BUSY, reason)
