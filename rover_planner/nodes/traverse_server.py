@@ -1,6 +1,7 @@
 """The node /traverse_server: answers over ROS 2 whether the rover can traverse a path."""
 
 import gc
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -70,6 +71,9 @@ class TraverseServer(Node):
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
+        # Other nodes discover this one meanwhile, which may take DDS three seconds.
+        warm_up()
+        warn_of_disk(self.get_logger())
         self._values = declare_parameters(self, TraverseServerParameters)
         self._service = TraverseService(load_service_settings(self._values))
         self.guard = Guard(self.get_logger())
@@ -240,9 +244,8 @@ def main(words: Sequence[str] | None = None) -> int:
         if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
             return EXIT_OK
         logger.info("compiling kernels; the first start takes longest")
-        warm_up()
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a compilation too
         init_ros(words)
-        warn_of_disk(logger)
         _run(TraverseServer)
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_OK

@@ -62,6 +62,18 @@ def test_it_says_what_it_does_and_ends_cleanly(start_process, how):
     assert process.returncode == 0 and "Traceback" not in rest
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_while_kernels_compile(start_process, tmp_path, monkeypatch, how):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    process = start_process()
+    read_until(process, "compiling kernels")
+    time.sleep(2.0)
+    process.send_signal(how)
+    rest, _ = process.communicate(timeout=10.0)
+    assert process.returncode == 0 and "Traceback" not in rest and "ready" not in rest
+
+
 def test_another_process_gets_an_answer(start_process, tmp_path):
     save_terrain(tmp_path / "flat.npz", Terrain(np.zeros((101, 101)), 0.05, (-2.5, -2.5)))
     run = RosRun()
