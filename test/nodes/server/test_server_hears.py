@@ -202,6 +202,7 @@ def best_effort() -> QoSProfile:
 
 
 def test_a_best_effort_map_is_not_heard_and_the_log_names_the_parameter(server, client):
+    client.send_terrain(make_terrain(waves))  # the client hears the log from now on
     client.create_publisher(PointCloud2, "elevation_cloud", best_effort())
     client.wait_for_log("set input_reliability to best_effort")
 
