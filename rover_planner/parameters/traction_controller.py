@@ -116,7 +116,7 @@ class TractionControllerParameters(ParameterTable):
         2.0, "Angular acceleration per error of yaw rate.", unit="1/s", bounds=(0.0, 1e3)
     )
     slip_gain: float = parameter(
-        1.0,
+        0.4,
         "Torque per difference of a wheel's rate from rolling, in weights times radius squared.",
         unit="s/m",
         bounds=(0.0, 1e3),

@@ -171,6 +171,8 @@ class WheelMotion:
     """(4,) angles of rockers and bogies [rad]."""
     wanted: float
     """Wanted mean rate [rad/s]."""
+    from_map: bool = False
+    """Whether the ratios come from a map; from motion they may miss a face."""
 
 
 class StallDetector:
@@ -190,7 +192,7 @@ class StallDetector:
         self.climbs = False
         """Whether the suspension has moved by CLIMBING_ANGLE with the last update."""
 
-    def update(self, motion: WheelMotion, duration: float, delay: float = STALL_DELAY) -> float:
+    def update(self, motion: WheelMotion, duration: float) -> float:
         """Return the share of the speed servos, 0 to 1.
 
         Args:
@@ -198,8 +200,8 @@ class StallDetector:
                 would raise a mean; and the suspension angles, which change while one wheel climbs
                 a steep face and the others hardly turn.
             duration: Time since the last call [s].
-            delay: Delay before the servos take over, in units of TAKEOVER_TIME.
         """
+        delay = MAP_STALL_DELAY if motion.from_map else STALL_DELAY
         rate = median(motion.rates.tolist())
         self.stalled = motion.wanted != 0.0 and rate / motion.wanted < STALL_RATIO
         change = duration / (TAKEOVER_TIME if self.stalled else -RELEASE_TIME)
@@ -259,25 +261,35 @@ class SlipControl:
         """Start as for a rover that moves."""
         self.detector = StallDetector()
 
-    def correct(
-        self, torques: Floats, motion: WheelMotion, duration: float, delay: float
-    ) -> Floats:
+    def correct(self, torques: Floats, motion: WheelMotion, duration: float) -> Floats:
         """Return torques (6,) [N m] with slip control.
 
         Args:
             torques: (6,) torques of the other loops [N m].
             motion: How the wheels move.
             duration: Time since the last call [s].
-            delay: As for `StallDetector`.
         """
-        rolling = estimate_rolling_rates(motion.rates, motion.ratios, motion.wanted)
-        torques = torques - self._gain * (motion.rates - rolling)
-        share = self.detector.update(motion, duration, delay)
+        torques = torques - self._gain * _find_slip(motion)
+        share = self.detector.update(motion, duration)
         if share == 0.0:
             self._servos.follow(torques)
             return torques
         servo = self._servos.update(motion.wanted - motion.rates, duration)
         return torques + share * (servo - torques)
+
+
+def _find_slip(motion: WheelMotion) -> Floats:
+    """Return the differences (6,) between the wheels' rates and those of rolling [rad/s].
+
+    While one wheel climbs a steep face, the median rate is about zero and would call that wheel
+    slipping. With a map, a wheel whose rate fits the motion of all wheels is not.
+    """
+    rates, ratios = motion.rates, motion.ratios
+    slip = rates - estimate_rolling_rates(rates, ratios, motion.wanted)
+    if not motion.from_map:
+        return slip
+    other = rates - ratios * float(ratios @ rates) / float(ratios @ ratios)
+    return np.where(np.abs(other) < np.abs(slip), other, slip)
 
 
 def estimate_rolling_rates(wheel_rates: Floats, ratios: Floats, wanted: float) -> Floats:

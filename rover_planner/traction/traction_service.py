@@ -29,8 +29,6 @@ from rover_planner.traction.input_monitor import NEVER, InputMonitor
 from rover_planner.traction.joint_memory import JointMemory
 from rover_planner.traction.limits import MeasurementLimits
 from rover_planner.traction.loops import (
-    MAP_STALL_DELAY,
-    STALL_DELAY,
     STALLED_GROWTH,
     PIController,
     PushLoop,
@@ -269,7 +267,7 @@ class TractionService:
         except ModelError as error:
             rows, warning = self._write_rows(self._measure_level_state(), push), str(error)
         answer = self._share_torques(rows)
-        self._stall_delay = MAP_STALL_DELAY if estimate.source == MAP_SOURCE else STALL_DELAY
+        self._from_map = estimate.source == MAP_SOURCE
         torques = self._command_torques(answer, rows, duration)
         if not np.isfinite(torques).all():
             return self.rest(
@@ -355,7 +353,8 @@ class TractionService:
         )  # fmt: skip
         self._last = answer.tractions
         self._peak = float(answer.utilisation.max())
-        self._limited = answer.torque_slack > 0.0 or answer.friction_slack > 0.0
+        slips = not self._optimal and answer.friction_slack > 0.0
+        self._limited = answer.torque_slack > 0.0 or slips
         return answer
 
     def _command_torques(
@@ -372,8 +371,8 @@ class TractionService:
         if self._optimal:
             speed = self._wanted_speed / settings.rover.wheel.radius
             angles, rates = self._suspension_angles, self._wheel_rates
-            motion = WheelMotion(rates, rows.wheel_speeds, angles, speed)
-            torques = self._slip.correct(torques, motion, duration, self._stall_delay)
+            motion = WheelMotion(rates, rows.wheel_speeds, angles, speed, self._from_map)
+            torques = self._slip.correct(torques, motion, duration)
         torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)
         max_change = settings.gains.torque_rate * duration
         self._torques = limit_rate(torques, self._torques, max_change)
