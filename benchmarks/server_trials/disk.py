@@ -42,6 +42,7 @@ def copy_packages(folder: Path) -> Path:
     for name in PACKAGES:
         unwanted = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, folder / name, ignore=unwanted)
+    shutil.copy(ROOT / "package.xml", folder)  # by it the package knows a source checkout
     return folder
 
 
