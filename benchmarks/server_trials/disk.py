@@ -69,12 +69,13 @@ def start(checkout: Path, home: Path, prepare: Callable[[], None]) -> Start:
     )
     try:
         assert server.stderr is not None
+        line = ""
         for line in server.stderr:
             warnings += [line.strip()] if "[WARN]" in line else []
             if "ready for rover" in line:
                 return Start(time.perf_counter() - began, tuple(warnings))
             assert time.perf_counter() - began < START_TIME, "the server does not start"
-        raise AssertionError(f"the server has ended with {server.wait()}")
+        raise AssertionError(f"the server has ended with {server.wait()}: {line}")
     finally:
         server.terminate()
         server.wait(10.0)
