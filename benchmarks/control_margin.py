@@ -28,6 +28,7 @@ from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
+from rover_planner.simulator.second_try import SecondTry
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 from support.reference_drives import drive_ground, drive_path, unlimited
@@ -41,9 +42,7 @@ START, END = -1.2, 1.2
 """x of the body's origin at the start and at the end of a drive [m]."""
 LOOK_AHEAD = 0.5
 """Look-ahead distance of the path follower [m]."""
-PROGRESS, STUCK_TIME = 0.01, 25.0
-"""A rover that gets less than PROGRESS [m] farther within STUCK_TIME [s] is stuck."""
-MAX_DURATION = 3.0 * (END - START) / SPEED
+MAX_DURATION = 5.0 * (END - START) / SPEED
 """Time after which a rover that still moves has failed [s]."""
 MAX_TILT, MAX_OFFSET = 1.2, 1.0
 """Tilt [rad] and distance from the path [m] from which a rover is lost."""
@@ -102,6 +101,8 @@ class Drive:
     """x of the body's origin at the end [m]."""
     duration: float
     """Duration [s]."""
+    retries: int
+    """How often the rover backed off and tried again."""
 
 
 def draw_case(rng: np.random.Generator) -> Case:
@@ -177,22 +178,19 @@ def drive(case: Case, source: str = MAP) -> Drive:
     if source == MAP:
         service.take_terrain(ground)
     path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
-    follower = PathFollower(path, LOOK_AHEAD)
-    farthest, since = START, 0.0
+    follower = SecondTry(PathFollower(path, LOOK_AHEAD))
     while plant.time < MAX_DURATION and plant.pose[0] < END:
         now, pose = plant.time, plant.pose
-        if pose[0] > farthest + PROGRESS:
-            farthest, since = pose[0], now
-        lost = plant.tilt > MAX_TILT or abs(pose[1]) > MAX_OFFSET
-        if lost or now - since > STUCK_TIME:
+        steering = follower.steer(pose[[0, 1, 3]], SPEED, now)
+        if follower.given_up or plant.tilt > MAX_TILT or abs(pose[1]) > MAX_OFFSET:
             break
         service.take_joints(plant.joint_positions, plant.joint_velocities, now)
         service.take_attitude(*plant.attitude, plant.body_rates, now)
-        service.take_command(*follower.steer(pose[[0, 1, 3]], SPEED), now)
+        service.take_command(*steering, now)
         service.take_odometry(pose, 0.0, now)
         plant.step(service.update(now).torques, PERIOD)
     end = float(plant.pose[0])
-    return Drive(end >= END, end, plant.time)
+    return Drive(end >= END, end, plant.time, follower.retries)
 
 
 def _place_rover(case: Case) -> tuple[Terrain, MujocoRover]:

@@ -31,7 +31,7 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission_options import MissionOptions
 from rover_planner.nodes.programs import read_words
 from rover_planner.ros.disk import init_ros
-from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, service_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.shell.exit_codes import (
     EXIT_BAD_INPUT,
@@ -80,7 +80,9 @@ class MissionPlanner(Node):
         self._path_publisher = self.create_publisher(Path, "path", topic_qos())
         self.create_subscription(Odometry, "odometry", self._take_odometry, sensor_qos())
         self._map_publisher = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self._client = self.create_client(GetPlan, f"{SERVER}/can_traverse")
+        self._client = self.create_client(
+            GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
+        )
         self.create_subscription(
             DiagnosticArray, f"{SERVER}/verdict", self._take_verdict, result_qos()
         )

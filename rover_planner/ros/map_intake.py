@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
+from msg_adapters.errors import MessageError
 from rover_planner.ros.refusals import INPUT_ERRORS
 
 WAIT = 0.02
@@ -113,6 +114,21 @@ class MapIntake(Generic[Map]):
         if number < self._newest_cloud:
             return
         try:
-            self._ready = self._prepare(deserialize_message(cloud, PointCloud2))
+            self._ready = self._prepare(read_cloud(cloud))
         except INPUT_ERRORS as error:
             self._refuse(str(error))
+
+
+def read_cloud(cloud: bytes) -> PointCloud2:
+    """Return the message of a serialised cloud.
+
+    Raises:
+        MessageError: The bytes are no PointCloud2.
+    """
+    try:
+        return deserialize_message(cloud, PointCloud2)
+    except Exception as error:  # RMWError, of a module that differs between distributions
+        raise MessageError(
+            f"{len(cloud)} bytes were received that are no PointCloud2; the publisher or the "
+            f"connection is damaged: {error}"
+        ) from None

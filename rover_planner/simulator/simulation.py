@@ -15,6 +15,7 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.plant import Plant, PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
+from rover_planner.simulator.second_try import MAX_TRIES, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
@@ -124,16 +125,20 @@ class Simulation:
         self.settings = settings
         self.plant = make_plant(settings)
         self._rng = np.random.default_rng(settings.seed)
-        self._follower: PathFollower | None = None
+        self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
         self.steering = (0.0, 0.0)
         """Speed [m/s] and yaw rate [rad/s] set by path or command."""
 
     def take_path(self, poses: Floats) -> None:
-        """Follow a path of poses (n, 3), x, y [m], yaw [rad], from now on."""
+        """Follow a path of poses (n, 3), x, y [m], yaw [rad], from now on.
+
+        A rover that a controller's torques drive tries again where it stands still.
+        """
         wheels = self.settings.rover.suspension.wheels
-        self._follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]))
+        follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]))
+        self._follower = SecondTry(follower, MAX_TRIES if self.settings.follow_commands else 1)
 
     def take_speeds(self, speed: float, yaw_rate: float, now: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] from time `now` [s]; ends path following."""
@@ -167,7 +172,7 @@ class Simulation:
     def _steer(self, now: float) -> tuple[float, float]:
         if self._follower is not None:
             pose = self.plant.pose()
-            wanted = self._follower.steer(pose, self.settings.speed)
+            wanted = self._follower.steer(pose, self.settings.speed, now)
             if self._follower.has_arrived(pose):
                 self._follower = None
             return wanted

@@ -14,6 +14,7 @@ from rover_planner.simulator.mujoco_plant import MujocoPlant
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
+from rover_planner.simulator.second_try import SecondTry
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
 
@@ -148,6 +149,43 @@ def test_a_path_is_followed_to_its_end():
     assert follower.has_arrived(pose)
     assert pose[:2] == pytest.approx([2.0, 0.0], abs=0.15)
     assert farthest < 0.12
+
+
+def drive_against_a_wall(follower, wall, duration):
+    """Return the positions along x of a rover that a wall stops `wall(attempt)` m ahead."""
+    x, attempt, track = 0.0, 0, []
+    for step in range(int(duration / 0.1)):
+        speed, _ = follower.steer(np.array([x, 0.0, 0.0]), 0.1, 0.1 * step)
+        attempt += bool(track) and speed < 0.0 <= track[-1][1]
+        x = min(x + 0.1 * speed, max(wall(attempt), x + min(0.1 * speed, 0.0)))
+        track.append((x, speed))
+    return np.array(track)
+
+
+def straight_follower(**arguments):
+    return SecondTry(PathFollower(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), 0.4), **arguments)
+
+
+def test_a_rover_that_stands_still_backs_off_and_tries_again():
+    follower = straight_follower()
+    track = drive_against_a_wall(follower, lambda attempt: 0.5 if attempt < 2 else 9.0, 90.0)
+    assert follower.retries == 2 and not follower.given_up
+    assert follower.has_arrived(np.array([*track[-1, :1], 0.0, 0.0]))
+
+
+def test_after_three_attempts_a_rover_stands_still_for_good():
+    follower = straight_follower()
+    track = drive_against_a_wall(follower, lambda attempt: 0.5, 120.0)
+    assert follower.given_up and follower.retries == 2
+    assert not track[-1, 1]
+    assert track[:, 0].max() == pytest.approx(0.5)
+
+
+def test_a_rover_with_one_attempt_never_backs_off():
+    follower = straight_follower(max_tries=1)
+    track = drive_against_a_wall(follower, lambda attempt: 0.5, 60.0)
+    assert not follower.retries and not follower.given_up
+    assert (track[:, 1] > 0.0).all()
 
 
 def look(ground, **changes):

@@ -26,7 +26,13 @@ from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_physics.terrain.grid import Terrain
-from rover_planner.ros.qos import map_subscriptions_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import (
+    map_subscriptions_qos,
+    result_qos,
+    sensor_qos,
+    service_qos,
+    topic_qos,
+)
 from rover_planner.viewer.live.live_state import LiveValues
 
 SERVER, CONTROLLER = "/traverse_server", "/traction_controller"
@@ -80,7 +86,9 @@ class LiveListener(Node):
         self._verdict: LiveVerdict | None = None
         self._estimated: set[str] = set()
         self._first_time: float | None = None
-        self._planner = self.create_client(GetPlan, f"{SERVER}/can_traverse")
+        self._planner = self.create_client(
+            GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
+        )
         self._subscribe_to_rover()
         self._subscribe_to_server()
         self._subscribe_to_controller()

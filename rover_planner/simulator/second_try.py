@@ -1,0 +1,89 @@
+"""Path following that backs off and tries again where the rover stands still."""
+
+import math
+
+from rover_physics.numerics.arrays import Floats
+from rover_planner.simulator.path_follower import PathFollower
+
+PROGRESS = 0.01
+"""Way [m] that counts as progress."""
+STUCK_TIME = 12.0
+"""Time without progress [s] after which the rover stands still. The traction controller stops
+pushing before that (`stall_time`), and pushes again after it was told to reverse."""
+BACK_DISTANCE, BACK_TIME = 0.12, 6.0
+"""The rover backs off by this way [m], but no longer than this time [s]."""
+MAX_TRIES = 3
+"""Attempts at one place."""
+NEW_PLACE = 0.3
+"""Way along the path [m] after which the attempts are counted anew."""
+NO_PLACE = (math.inf, math.inf)
+
+
+class SecondTry:
+    """Follows a path; where the rover stands still it backs off and tries again.
+
+    A wheel that has wedged at a face, or slips there, often climbs it from another position.
+    """
+
+    def __init__(self, follower: PathFollower, max_tries: int = MAX_TRIES):
+        """Follow the path of a follower, with so many attempts at one place.
+
+        With one attempt, a rover that stands still goes on trying.
+        """
+        self._follower, self._max_tries = follower, max_tries
+        self._place, self._since = NO_PLACE, 0.0
+        self._tries, self._counted_from = 1, 0.0
+        self._back_from, self._back_until = NO_PLACE, -math.inf
+        self.retries = 0
+        """How often the rover has backed off."""
+
+    @property
+    def given_up(self) -> bool:
+        """Whether the rover stood still in its last attempt."""
+        return self._tries > self._max_tries > 1
+
+    def has_arrived(self, pose: Floats) -> bool:
+        """Return whether a pose (3,) is at the end of the path."""
+        return self._follower.has_arrived(pose)
+
+    def steer(self, pose: Floats, speed: float, now: float) -> tuple[float, float]:
+        """Return speed [m/s] and yaw rate [rad/s] at a pose (3,) and time `now` [s].
+
+        Zeros at the end of the path and after the last attempt.
+        """
+        wanted = self._follower.steer(pose, speed)
+        if self._backs_off(pose, now):
+            return -speed, 0.0
+        self._note_progress(pose, now)
+        if wanted[0] != 0.0 and now - self._since > STUCK_TIME:
+            self._try_again(pose, now)
+        return (0.0, 0.0) if self.given_up else wanted
+
+    def _try_again(self, pose: Floats, now: float) -> None:
+        """Begin to back off, unless this was the last attempt."""
+        self._tries += 1
+        self._since = now
+        if self._tries <= self._max_tries:
+            self.retries += 1
+            self._back_from, self._back_until = _place_of(pose), now + BACK_TIME
+
+    def _backs_off(self, pose: Floats, now: float) -> bool:
+        """Return whether the rover still backs off; at the end, count its time anew."""
+        if now >= self._back_until:
+            return False
+        if math.dist(_place_of(pose), self._back_from) < BACK_DISTANCE:
+            return True
+        self._back_until = -math.inf
+        self._place, self._since = _place_of(pose), now
+        return False
+
+    def _note_progress(self, pose: Floats, now: float) -> None:
+        """Note where the rover is if it has moved."""
+        if math.dist(_place_of(pose), self._place) > PROGRESS:
+            self._place, self._since = _place_of(pose), now
+        if self._follower.driven > self._counted_from + NEW_PLACE:
+            self._counted_from, self._tries = self._follower.driven, 1
+
+
+def _place_of(pose: Floats) -> tuple[float, float]:
+    return float(pose[0]), float(pose[1])
