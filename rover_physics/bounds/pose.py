@@ -14,7 +14,7 @@ Robotics 37(5), 2020.
 import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
-from rover_physics.contact.settling import GroundSlope, write_gap_rates
+from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
 from rover_physics.contact.wheel import find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place

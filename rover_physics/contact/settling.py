@@ -5,15 +5,15 @@ conditions are zero gaps of the wheels. This is the closure of the paper's eqs (
 without the assumption of small angles.
 """
 
-from enum import IntEnum
-
 import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
+from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
+from rover_physics.contact.recovery import close_in_turns
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
-from rover_physics.rover.linkage import place, rocker_sign
+from rover_physics.rover.linkage import place
 from rover_physics.status import ContactStatus, PoseStatus
 
 GAP_TOLERANCE = 3e-5
@@ -27,7 +27,8 @@ QUICK_ATTEMPTS = 5
 NOTES_HOLD = 1e-2
 """Largest gap [wheel radii] at which the samples noted by the last full scan are reused. So small
 a step brings no other circle near the ground."""
-RECOVERIES = 6
+TURNS = 8
+RECOVERIES = 4
 """Attempts with exact searches after the quick attempts have failed."""
 RELAXATION_STEPS = 120
 """Largest number of relaxation steps per attempt."""
@@ -39,15 +40,6 @@ RELAXATION = 0.3
 """Fraction of a gap that a relaxation step closes."""
 TURNED_OVER = 1.45
 """Roll or pitch [rad] above which the search stops: the rover is on its end or side."""
-
-
-class GroundSlope(IntEnum):
-    """Slope of the ground that the derivatives of the gaps assume."""
-
-    LEVEL = 0
-    """Level ground under each wheel."""
-    SLOPED = 1
-    """The slope at the contact."""
 
 
 @kernel
@@ -95,15 +87,13 @@ def settle_from(model, work):
     for attempt in range(RECOVERIES):
         if worst <= GAP_TOLERANCE or np.isnan(worst) or status != ContactStatus.IN_CONTACT:
             break
-        _find_contacts(model, work, SearchScope.EXACT)
-        if attempt > 0:
-            relaxed = RELAXED * radius * RELAXED_FURTHER ** (attempt - 1)
-            last = attempt == RECOVERIES - 1
-            _relax(model, work, relaxed, SearchScope.EXACT if last else SearchScope.QUICK)
-        _newton(model, work, SearchScope.EXACT)
-        status, worst = _find_contacts(model, work, SearchScope.EXACT)
+        scope = SearchScope.QUICK if attempt < 2 else SearchScope.EXACT
+        closed = RELAXED * radius * RELAXED_FURTHER**attempt
+        close_in_turns(model, work, scope, TURNS, closed)
         if _has_turned_over(work.q):
             return PoseStatus.NOT_SETTLED
+        _newton(model, work, scope)
+        status, worst = _find_contacts(model, work, SearchScope.EXACT)
     if status != ContactStatus.IN_CONTACT:
         return _refuse(status)
     if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
@@ -214,55 +204,3 @@ def _find_step(linkage, work, ground_is):
     for i in range(6):
         work.step[i, 0] = work.contacts.gap[i]
     return solve_in_place(work.J, work.step, 6, 1)
-
-
-@kernel
-def write_gap_rates(linkage, placement, contacts, ground_is, J):
-    """Write the derivatives of the gaps by q into J (6, 6) [m/m or m/rad].
-
-    Args:
-        linkage: LINKAGE.
-        placement: PLACEMENT at q.
-        contacts: CONTACTS with points and normals.
-        ground_is: A GroundSlope.
-        J: (6, 6), row per wheel, column per element of q; written.
-    """
-    J[:, :] = 0.0
-    R, origin = placement.R, placement.origin
-    point, normal = contacts.point, contacts.normal
-    length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
-    body_x = R[0, 0], R[1, 0], R[2, 0]
-    body_y = R[0, 1], R[1, 1], R[2, 1]
-    level_y = -(R[1, 0] / length), R[0, 0] / length, 0.0
-    slope = 0.0, 0.0
-    for i in range(6):
-        side = i // 3
-        if ground_is == GroundSlope.SLOPED:
-            slope = normal[i, 0], normal[i, 1]
-        arm = _arm_from(origin, point[i])
-        J[i, 0] = 1.0
-        J[i, 1] = _gap_rate(body_x, arm, slope)
-        J[i, 2] = _gap_rate(level_y, arm, slope)
-        arm = _arm_from(placement.rocker_pivots[side], point[i])
-        J[i, 3] = rocker_sign(side) * _gap_rate(body_y, arm, slope)
-        if linkage.on_bogie[i]:
-            arm = _arm_from(placement.bogie_pivots[side], point[i])
-            J[i, 4 + side] = _gap_rate(body_y, arm, slope)
-
-
-@kernel
-def _arm_from(pivot, point):
-    """Return the vector (x, y, z) [m] from a pivot (3,) to a point (3,)."""
-    return point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
-
-
-@kernel
-def _gap_rate(axis, arm, slope):
-    """Return the change of the gap at the end of `arm` per rotation about an axis [m/rad].
-
-    `axis` and `arm` are (x, y, z), `slope` the (x, y) of the contact normal.
-    """
-    ax, ay, az = axis
-    dx, dy, dz = arm
-    nx, ny = slope
-    return nx * (ay * dz - az * dy) + ny * (az * dx - ax * dz) + (ax * dy - ay * dx)

@@ -90,6 +90,8 @@ WORK = record_type(
     ("search", TORQUE_SEARCH),  # the chosen forces
     ("J", float, (6, 6)),  # derivatives of the gaps by q
     ("step", float, (6, 1)),  # Newton step
+    ("lifts", float, (6, 6)),  # changes of q, one column for each wheel, that raise this wheel
+    ("start", float, (6,)),  # q before a lift
     ("corners", float, (CORNERS, 3)),  # support polygon [m]
     ("centre", float, (3,)),  # centre of mass [m]
     ("force", float, (3,)),  # net force without that of the ground [N]

@@ -1,0 +1,114 @@
+"""Settling wheel by wheel, where Newton's method fails: at edges, faces and in narrow hollows.
+
+A lift of a wheel is a change of the configuration that raises this wheel by one metre and leaves
+the heights of the others as they are, to first order. The gap of the wheel is a continuous
+function of its lift, negative far down and positive far up. So a root always exists, and
+bracketing finds it whatever the shape of the ground. The wheels are closed in turns, because a
+lift shifts the other wheels sideways.
+"""
+
+import numpy as np
+
+from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
+from rover_physics.contact.wheel import find_contact
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.rover.linkage import place
+
+TRIALS = 14
+"""Largest number of looks at the ground for one wheel in a turn."""
+CLOSER = 0.1
+"""A turn closes each gap to this share of the largest one."""
+MAX_TURN = 0.3
+"""Largest change of an angle in one trial [rad]."""
+
+
+@kernel
+def close_in_turns(model, work, scope, turns, closed):
+    """Close the gaps wheel by wheel until none exceeds `closed` [m], in at most so many turns.
+
+    Args:
+        model: As for `settle`.
+        work: As for `settle`; placement and contacts belong to `work.q`, before and after.
+        scope: SearchScope of the looks.
+        turns: Largest number of turns.
+        closed: Gap at which a wheel counts as closed [m].
+
+    Returns:
+        The largest absolute gap [m], NaN over unknown ground.
+    """
+    worst = _find_worst(model, work, scope)
+    for _ in range(turns):
+        if not worst > closed:
+            break
+        write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.LEVEL, work.J)
+        work.lifts[:, :] = 0.0
+        for wheel in range(6):
+            work.lifts[wheel, wheel] = 1.0
+        if not solve_in_place(work.J, work.lifts, 6, 6):
+            break
+        wanted = max(0.5 * closed, CLOSER * worst)
+        for wheel in range(6):
+            _close(model, work, wheel, scope, wanted)
+        worst = _find_worst(model, work, scope)
+    return worst
+
+
+@kernel
+def _find_worst(model, work, scope):
+    worst = 0.0
+    for wheel in range(6):
+        find_contact(model, work, wheel, scope)
+        gap = abs(work.contacts.gap[wheel])
+        if gap > worst or gap != gap:
+            worst = gap
+        if worst != worst:
+            break
+    return worst
+
+
+@kernel
+def _close(model, work, wheel, scope, wanted):
+    """Lift or lower one wheel until its gap is at most `wanted` [m], or nearly so at a jump."""
+    gaps, start, q = work.contacts.gap, work.start, work.q
+    find_contact(model, work, wheel, scope)
+    gap = gaps[wheel]
+    if not abs(gap) > wanted:
+        return
+    largest = 0.0
+    for i in range(6):
+        start[i] = q[i]
+        largest = max(largest, abs(work.lifts[i, wheel]) if i > 0 else 0.0)
+    longest = MAX_TURN / largest if largest > 0.0 else np.inf
+    low, high, low_gap, high_gap = 0.0, 0.0, gap, gap
+    lift = 0.0
+    step = -gap
+    bracketed, last = False, 0
+    for _ in range(TRIALS):
+        if bracketed:
+            share = low_gap / (low_gap - high_gap)
+            lift = low + min(max(share, 0.02), 0.98) * (high - low)
+        else:
+            step = min(max(step, -longest), longest)
+            lift += step
+        for i in range(6):
+            q[i] = start[i] + lift * work.lifts[i, wheel]
+        place(model.linkage, work.pose, q, work.placement)
+        find_contact(model, work, wheel, scope)
+        gap = gaps[wheel]
+        if not abs(gap) > wanted:
+            return
+        if gap < 0.0:
+            if not bracketed and step < 0.0:
+                bracketed = True
+            elif bracketed and last < 0:
+                high_gap *= 0.5
+            low, low_gap, last = lift, gap, -1
+        else:
+            if not bracketed and step > 0.0:
+                bracketed = True
+            elif bracketed and last > 0:
+                low_gap *= 0.5
+            high, high_gap, last = lift, gap, 1
+        if not bracketed:
+            step = 2.0 * step if abs(2.0 * step) > abs(gap) else -gap
