@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from rover_physics.contact.contact_record import CIRCLE_REACH
 from rover_physics.numerics.kernels import kernel
-from rover_physics.terrain.ground import look_up, look_up_cell
+from rover_physics.terrain.ground import look_up_cell
 
 REFINEMENTS = 9
 """Largest number of trials of a search."""
@@ -12,10 +11,6 @@ GAP_PRECISION = 1e-5
 """Largest error of a circle's smallest gap [wheel radii]."""
 TURN_TOLERANCE = 3e-3
 """Error of the contact angle [rad] at which a search stops."""
-BESIDE_REACH = 5e-3
-"""Gap above the nearest circle [wheel radii] up to which a circle is searched between samples."""
-BESIDE_SHARE = 0.8
-"""Fraction of the circle's own rise: where the gap grows less, the ground is not a plane."""
 
 
 @kernel
@@ -99,84 +94,11 @@ def search_circle(model, work, circle, turn):
 
 
 @kernel
-def refine_from(model, work, wheel, m, turn):
-    """Search circle m near `turn`, keep the result if it is nearer, and return its gap [m]."""
+def refine_contact(model, work, wheel):
+    """Search along the wheel from its last contact; the gap is NaN over unknown ground."""
     contacts = work.contacts
-    gap, turn, slope = search_circle(model, work, (wheel, model.samples.laterals[m]), turn)
-    if gap < contacts.circle_gap[wheel, m]:
-        contacts.circle_gap[wheel, m] = gap
-        contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m] = turn
-        contacts.circle_slope[wheel, m, 0], contacts.circle_slope[wheel, m, 1] = slope
-    return gap
-
-
-@kernel
-def refine_circle(model, work, wheel, m):
-    """Search circle m again from its nearest point; the gap is NaN if none is found."""
-    contacts = work.contacts
-    turn = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
-    contacts.circle_gap[wheel, m] = np.inf
-    refine_from(model, work, wheel, m, turn)
-    if contacts.circle_gap[wheel, m] == np.inf:
-        contacts.circle_gap[wheel, m] = np.nan
-
-
-@kernel
-def refine_others(model, work, wheel):
-    """Search the circles with samples whose gap is close to the smallest one."""
-    samples, contacts = model.samples, work.contacts
-    reach = contacts.noted_gap[wheel] + CIRCLE_REACH * samples.radius
-    nearest = contacts.nearest[wheel]
-    s0, c0 = contacts.circle_sine[wheel, nearest], contacts.circle_cosine[wheel, nearest]
-    for m in range(samples.circles):
-        if m != nearest:
-            contacts.circle_gap[wheel, m] = np.inf
-        if contacts.first_gap[wheel, m] <= reach:
-            k = contacts.first_row[wheel, m]
-            s, c = samples.sines[k], samples.cosines[k]
-            lower = m == nearest and contacts.first_gap[wheel, m] < contacts.circle_gap[wheel, m]
-            if abs(s * c0 - c * s0) < samples.spacing_sine and not lower:
-                s, c = s0, c0
-            if m != nearest or s != s0:
-                refine_from(model, work, wheel, m, (s, c))
-        if contacts.second_gap[wheel, m] <= reach:
-            k = contacts.second_row[wheel, m]
-            s, c = samples.sines[k], samples.cosines[k]
-            refine_from(model, work, wheel, m, (s, c))
-        if contacts.circle_gap[wheel, m] < contacts.circle_gap[wheel, contacts.nearest[wheel]]:
-            contacts.nearest[wheel] = m
-    reach = contacts.circle_gap[wheel, contacts.nearest[wheel]] + BESIDE_REACH * samples.radius
-    for m in range(samples.circles):
-        if contacts.circle_gap[wheel, m] <= reach:
-            _look_beside(model, work, wheel, m)
-            if contacts.circle_gap[wheel, m] < contacts.circle_gap[wheel, contacts.nearest[wheel]]:
-                contacts.nearest[wheel] = m
-
-
-@kernel
-def _look_beside(model, work, wheel, m):
-    """Search circle m also from halfway between samples if the ground is nearer there.
-
-    Over a plane, the gap grows with the rise of the circle on both sides of the contact. If it
-    grows less, the wheel bridges a hollow and may be nearer to the hollow's other side.
-    """
-    ground, samples = model.ground, model.samples
-    placement, contacts = work.placement, work.contacts
-    R, forward, up = placement.R, placement.forward, placement.up
-    centres, radius, across = placement.centres, samples.radius, samples.laterals[m]
-    gap, s0, c0 = (
-        contacts.circle_gap[wheel, m], contacts.circle_sine[wheel, m],
-        contacts.circle_cosine[wheel, m],
-    )  # fmt: skip
-    limit = gap + BESIDE_SHARE * radius * (1.0 - samples.beside_cosine)
-    z = centres[wheel, 2] + across * R[2, 1]
-    for side in range(-1, 2, 2):
-        turn = side * samples.beside_sine
-        s, c = s0 * samples.beside_cosine + c0 * turn, c0 * samples.beside_cosine - s0 * turn
-        lowest = z - radius * c * up[2]
-        if c < 0.0 or lowest - contacts.block_max[wheel] >= limit:
-            continue
-        x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
-        y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
-        if lowest - look_up(ground, x, y)[0] < limit:
-            refine_from(model, work, wheel, m, (s, c))
+    turn = contacts.sine[wheel], contacts.cosine[wheel]
+    gap, turn, slope = search_circle(model, work, (wheel, contacts.across[wheel]), turn)
+    contacts.gap[wheel] = gap if gap < np.inf else np.nan
+    contacts.sine[wheel], contacts.cosine[wheel] = turn
+    contacts.slope[wheel, 0], contacts.slope[wheel, 1] = slope

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.contact.wheel_samples import MAX_CIRCLES
 from rover_physics.numerics.records import new_record, record_type
 
 
@@ -19,18 +18,13 @@ class SearchScope(IntEnum):
     NEAR = 2
     """No samples; the last contact is refined."""
     FULL = 3
-    """All samples; each circle that comes near is refined."""
-    AGAIN = 4
-    """No samples; the circles that FULL found near are refined."""
-    EXACT = 5
-    """All samples; each one that may be near is refined."""
+    """All ground below the wheel, starting from the last contact."""
+    WHOLE = 4
+    """QUICK, then FULL."""
 
 
-CIRCLE_REACH = 2e-2
-"""Gap above the smallest one [wheel radii] up to which another circle is refined."""
-FAR_ROW = -9
-"""Row number that marks "no sample noted"; it is far from every real row."""
-
+NOTICED = 1e-4
+"""Difference of gaps [wheel radii] up to which a contact elsewhere is not taken."""
 CONTACTS = record_type(
     ("gap", float, (6,)),  # smallest vertical gap, negative inside the ground [m]
     ("sine", float, (6,)),  # sine of the contact angle
@@ -39,24 +33,35 @@ CONTACTS = record_type(
     ("normal", float, (6, 3)),  # contact normal scaled to z = 1, map frame
     ("held_height", float, (6,)),  # height [m] of the centre of a wheel held on a face, else NaN
     ("held_angle", float, (6,)),  # contact angle [rad] of a wheel held on a face, else NaN
-    ("nearest", np.int64, (6,)),  # index of the circle with the smallest gap
-    ("circle_gap", float, (6, MAX_CIRCLES)),  # smallest gap of each circle [m]
-    ("circle_sine", float, (6, MAX_CIRCLES)),  # sine of the contact angle at that gap
-    ("circle_cosine", float, (6, MAX_CIRCLES)),  # cosine of the contact angle at that gap
-    ("circle_slope", float, (6, MAX_CIRCLES, 2)),  # slope of the ground there along x and y
-    (
-        "block_max",
-        float,
-        (6,),
-    ),  # highest ground below the wheel [m], infinite where some is unknown
+    ("across", float, (6,)),  # distance of the contact from the wheel's middle plane [m]
+    ("inside", np.int64, (6,)),  # 1 if the contact is a peak of the ground between the rims
+    ("slope", float, (6, 2)),  # slope of the ground at the contact along x and y
     ("noted_gap", float, (6,)),  # smallest gap of the last scan [m]
-    ("noted_circle", np.int64, (6,)),  # circle of noted_gap
-    ("first_gap", float, (6, MAX_CIRCLES)),  # smallest gap of each circle in the last scan [m]
-    ("first_row", np.int64, (6, MAX_CIRCLES)),  # sample row of first_gap
-    ("second_gap", float, (6, MAX_CIRCLES)),  # smallest gap away from first_row [m]
-    ("second_row", np.int64, (6, MAX_CIRCLES)),  # sample row of second_gap
+    ("noted_circle", np.int64, (6,)),  # its circle: 0 right rim, 1 middle, 2 left rim
+    ("noted_row", np.int64, (6,)),  # its row of samples
 )
 """Contacts of the six wheels, and notes of the search; written by `find_contact`."""
+
+CELL_SEARCH = record_type(
+    ("cell", float),  # size of a cell [m]
+    ("radius", float),  # radius of the wheel [cells]
+    ("half_width", float),  # half its width, as seen from above [cells]
+    ("x", float),  # place of its centre [cells]
+    ("y", float),
+    ("z", float),  # height of its centre [m]
+    ("ahead_x", float),  # its heading
+    ("ahead_y", float),
+    ("sine", float),  # of the camber
+    ("cosine", float),
+    ("tangent", float),
+    ("best", float),  # largest intrusion of the ground so far [cells]
+    ("best_s", float),  # its place along the heading [cells]
+    ("best_t", float),  # its place to the left [cells]
+    ("crossing", float, (2,)),  # largest intrusion where edges cross the right and left rim [cells]
+    ("crossing_s", float, (2,)),  # its place along the heading [cells]
+    ("found", np.int64),  # 1 if the search has found it
+)
+"""Work space of `look_everywhere`."""
 
 
 def new_contacts() -> Any:

@@ -9,6 +9,7 @@ lift shifts the other wheels sideways.
 
 import numpy as np
 
+from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
 from rover_physics.contact.wheel import find_contact
 from rover_physics.numerics.kernels import kernel
@@ -24,20 +25,19 @@ MAX_TURN = 0.3
 
 
 @kernel
-def close_in_turns(model, work, scope, turns, closed):
+def close_in_turns(model, work, turns, closed):
     """Close the gaps wheel by wheel until none exceeds `closed` [m], in at most so many turns.
 
     Args:
         model: As for `settle`.
         work: As for `settle`; placement and contacts belong to `work.q`, before and after.
-        scope: SearchScope of the looks.
         turns: Largest number of turns.
         closed: Gap at which a wheel counts as closed [m].
 
     Returns:
         The largest absolute gap [m], NaN over unknown ground.
     """
-    worst = _find_worst(model, work, scope)
+    worst = _find_worst(model, work)
     for _ in range(turns):
         if not worst > closed:
             break
@@ -49,16 +49,16 @@ def close_in_turns(model, work, scope, turns, closed):
             break
         wanted = max(0.5 * closed, CLOSER * worst)
         for wheel in range(6):
-            _close(model, work, wheel, scope, wanted)
-        worst = _find_worst(model, work, scope)
+            _close(model, work, wheel, wanted)
+        worst = _find_worst(model, work)
     return worst
 
 
 @kernel
-def _find_worst(model, work, scope):
+def _find_worst(model, work):
     worst = 0.0
     for wheel in range(6):
-        find_contact(model, work, wheel, scope)
+        find_contact(model, work, wheel, SearchScope.WHOLE)
         gap = abs(work.contacts.gap[wheel])
         if gap > worst or gap != gap:
             worst = gap
@@ -68,10 +68,10 @@ def _find_worst(model, work, scope):
 
 
 @kernel
-def _close(model, work, wheel, scope, wanted):
+def _close(model, work, wheel, wanted):
     """Lift or lower one wheel until its gap is at most `wanted` [m], or nearly so at a jump."""
     gaps, start, q = work.contacts.gap, work.start, work.q
-    find_contact(model, work, wheel, scope)
+    find_contact(model, work, wheel, SearchScope.WHOLE)
     gap = gaps[wheel]
     if not abs(gap) > wanted:
         return
@@ -94,7 +94,7 @@ def _close(model, work, wheel, scope, wanted):
         for i in range(6):
             q[i] = start[i] + lift * work.lifts[i, wheel]
         place(model.linkage, work.pose, q, work.placement)
-        find_contact(model, work, wheel, scope)
+        find_contact(model, work, wheel, SearchScope.WHOLE)
         gap = gaps[wheel]
         if not abs(gap) > wanted:
             return

@@ -79,27 +79,25 @@ def settle_from(model, work):
         return _refuse(status)
     worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
-        scope = SearchScope.AGAIN if worst <= NOTES_HOLD * radius else SearchScope.FULL
         _newton(model, work, SearchScope.NEAR)
-        status, worst = _find_contacts(model, work, scope)
+        status, worst = _find_contacts(model, work, SearchScope.FULL)
         if worst <= GAP_TOLERANCE or np.isnan(worst):
             break
     for attempt in range(RECOVERIES):
         if worst <= GAP_TOLERANCE or np.isnan(worst) or status != ContactStatus.IN_CONTACT:
             break
-        scope = SearchScope.QUICK if attempt < 2 else SearchScope.EXACT
         closed = RELAXED * radius * RELAXED_FURTHER**attempt
-        close_in_turns(model, work, scope, TURNS, closed)
+        close_in_turns(model, work, TURNS, closed)
         if _has_turned_over(work.q):
             return PoseStatus.NOT_SETTLED
-        _newton(model, work, scope)
-        status, worst = _find_contacts(model, work, SearchScope.EXACT)
+        _newton(model, work, SearchScope.WHOLE)
+        status, worst = _find_contacts(model, work, SearchScope.WHOLE)
     if status != ContactStatus.IN_CONTACT:
         return _refuse(status)
     if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
         return PoseStatus.NOT_SETTLED
     for wheel in range(6):
-        blend_contact(model.samples, work, wheel)
+        blend_contact(model, work, wheel)
     return PoseStatus.SETTLED
 
 
@@ -156,22 +154,6 @@ def _newton(model, work, scope):
             return improved
         worst = improved
     return worst
-
-
-@kernel
-def _relax(model, work, relaxed, scope):
-    """Lower or raise the wheels by a fraction of their gaps until none exceeds `relaxed` [m].
-
-    This is slow but does not cycle. A wheel without an equilibrium at the foot of a step rises to
-    its top, as a real wheel would.
-    """
-    for _ in range(RELAXATION_STEPS):
-        _descend(model, work, RELAXATION)
-        place(model.linkage, work.pose, work.q, work.placement)
-        status, worst = _find_contacts(model, work, scope)
-        if not worst > relaxed or _has_turned_over(work.q):
-            break
-    _find_contacts(model, work, SearchScope.EXACT)
 
 
 @kernel

@@ -9,34 +9,41 @@ wheel has a positive angle.
 
 import numpy as np
 
-from rover_physics.contact.circle_search import refine_circle, refine_others
+from rover_physics.contact.cell_search import look_everywhere
+from rover_physics.contact.circle_search import (
+    refine_contact,
+    search_circle,
+)
 from rover_physics.contact.contact_record import SearchScope
-from rover_physics.contact.rim_scan import scan_rim
+from rover_physics.contact.rim_scan import find_tops, scan_rims
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
-from rover_physics.terrain.ground import height_inside
+from rover_physics.terrain.ground import height_inside, look_up
 
 COMPLIANCE = 2e-3
 """Deformation of real wheels and ground [wheel radii]. Circles whose gaps differ by less share the
 load, so on a plane a wheel touches in its middle, not at a random edge."""
+CIRCLE_REACH = 2e-2
+"""Gap above the smallest one [wheel radii], at the contact angle, up to which another circle is
+searched for its share."""
 
 
 @kernel
 def find_contact(model, work, wheel, scope):
     """Find the contact of a wheel and write it into row `wheel` of the contacts.
 
-    FULL and AGAIN require QUICK or NEAR at the same placement before; AGAIN also requires FULL at
-    a placement that differs little. Samples over unknown ground or off the map are skipped; the
-    gap is NaN if no sample is left.
+    FULL requires QUICK or NEAR at the same placement before. Ground that is unknown or off the map
+    is skipped; the gap is NaN if none is left.
 
     Args:
         model: A record with `ground` GROUND and `samples` WHEEL_SAMPLES.
-        work: A record with `placement` PLACEMENT, written by `place`, and `contacts` CONTACTS.
+        work: A record with `placement` PLACEMENT, written by `place`, `contacts` CONTACTS, and
+            `cells` CELL_SEARCH.
         wheel: Index of the wheel.
         scope: A SearchScope.
 
     Returns:
-        The worst ContactStatus of the samples.
+        The worst ContactStatus of the ground below the wheel.
     """
     contacts = work.contacts
     status = ContactStatus.IN_CONTACT
@@ -45,18 +52,22 @@ def find_contact(model, work, wheel, scope):
         return status
     if scope == SearchScope.COARSE and _guess(model, work, wheel):
         return status
-    if scope != SearchScope.NEAR and scope != SearchScope.AGAIN:
-        status = scan_rim(model, work, wheel, scope)
+    if scope != SearchScope.NEAR and scope != SearchScope.FULL:
+        status = scan_rims(model, work, wheel, scope)
         if contacts.noted_gap[wheel] == np.inf:
             contacts.gap[wheel] = np.nan
             return status
-        if scope == SearchScope.COARSE or scope == SearchScope.QUICK:
-            _take_sample(model.samples, contacts, wheel)
-    if scope == SearchScope.QUICK or scope == SearchScope.NEAR:
-        refine_circle(model, work, wheel, contacts.nearest[wheel])
-    elif scope == SearchScope.FULL or scope == SearchScope.AGAIN:
-        refine_others(model, work, wheel)
-    _write_contact(model.samples, work, wheel)
+        _take_sample(model.samples, contacts, wheel)
+        if scope == SearchScope.COARSE:
+            _write_contact(work, wheel, model.samples)
+            return status
+    if scope != SearchScope.FULL:
+        refine_contact(model, work, wheel)
+    if scope == SearchScope.FULL or scope == SearchScope.WHOLE:
+        below = look_everywhere(model, work, wheel, find_tops(model, work, wheel))
+        if status == ContactStatus.IN_CONTACT:
+            status = below
+    _write_contact(work, wheel, model.samples)
     return status
 
 
@@ -89,6 +100,7 @@ def _guess(model, work, wheel):
     if total != total:
         return False
     work.contacts.gap[wheel] = centres[wheel, 2] + nearest
+    work.contacts.across[wheel], work.contacts.inside[wheel] = 0.0, 0
     write_point(samples, work, wheel, (samples.sines[row], samples.cosines[row]), 0.0)
     return True
 
@@ -96,25 +108,24 @@ def _guess(model, work, wheel):
 @kernel
 def _take_sample(samples, contacts, wheel):
     """Take the nearest sample as the contact."""
-    m = contacts.noted_circle[wheel]
-    k = contacts.first_row[wheel, m]
-    contacts.nearest[wheel] = m
-    contacts.circle_gap[wheel, m] = contacts.noted_gap[wheel]
-    contacts.circle_sine[wheel, m] = samples.sines[k]
-    contacts.circle_cosine[wheel, m] = samples.cosines[k]
-    contacts.circle_slope[wheel, m, :] = 0.0
+    rim = contacts.noted_circle[wheel]
+    k = contacts.noted_row[wheel]
+    contacts.across[wheel], contacts.inside[wheel] = (rim - 1) * samples.half_width, 0
+    contacts.gap[wheel] = contacts.noted_gap[wheel]
+    contacts.sine[wheel], contacts.cosine[wheel] = samples.sines[k], samples.cosines[k]
+    contacts.slope[wheel, 0] = contacts.slope[wheel, 1] = 0.0
 
 
 @kernel
-def _write_contact(samples, work, wheel):
-    """Write gap, point and normal of a wheel on its nearest circle."""
+def _write_contact(work, wheel, samples):
+    """Write point and normal of a wheel's contact.
+
+    A peak between the rims pushes along the wheel's radius, whatever the slopes at its sides.
+    """
     contacts = work.contacts
-    m = contacts.nearest[wheel]
-    contacts.gap[wheel] = contacts.circle_gap[wheel, m]
-    turn = contacts.circle_sine[wheel, m], contacts.circle_cosine[wheel, m]
-    write_point(samples, work, wheel, turn, samples.laterals[m])
-    slope = contacts.circle_slope[wheel, m]
-    write_normal(work, wheel, turn, (slope[0], slope[1]))
+    turn = contacts.sine[wheel], contacts.cosine[wheel]
+    write_point(samples, work, wheel, turn, contacts.across[wheel])
+    write_normal(work, wheel, turn, (contacts.slope[wheel, 0], contacts.slope[wheel, 1]))
 
 
 @kernel
@@ -129,30 +140,51 @@ def _hold(work, wheel):
 
 
 @kernel
-def blend_contact(samples, work, wheel):
+def blend_contact(model, work, wheel):
     """Replace the contact of `wheel` by the weighted mean of the circles that share the load.
 
     The weight of a circle falls linearly from 1 at the smallest gap to 0 at COMPLIANCE radii above
-    it. A held wheel gets the angle of its face. `find_contact` must have run with FULL, AGAIN or
-    EXACT before.
+    it. A peak between the rims counts as a circle. A held wheel gets the angle of its face.
     """
-    contacts = work.contacts
+    samples, contacts = model.samples, work.contacts
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
         s, c = np.sin(contacts.held_angle[wheel]), np.cos(contacts.held_angle[wheel])
         write_point(samples, work, wheel, (s, c), 0.0)
         return
     allowance = COMPLIANCE * samples.radius
-    total, sine_sum, cosine_sum, lateral_sum = 0.0, 0.0, 0.0, 0.0
+    reach = contacts.gap[wheel] + CIRCLE_REACH * samples.radius
+    total, sine_sum, cosine_sum, across_sum = 0.0, 0.0, 0.0, 0.0
+    turn = contacts.sine[wheel], contacts.cosine[wheel]
+    if contacts.inside[wheel]:
+        total, sine_sum, cosine_sum, across_sum = 1.0, turn[0], turn[1], contacts.across[wheel]
     for m in range(samples.circles):
-        weight = 1.0 - (contacts.circle_gap[wheel, m] - contacts.gap[wheel]) / allowance
+        across = samples.laterals[m]
+        if not _gap_at(model, work, (wheel, across), turn) < reach:
+            continue
+        gap, (s, c), _ = search_circle(model, work, (wheel, across), turn)
+        weight = min(1.0 - (gap - contacts.gap[wheel]) / allowance, 1.0)
         if weight > 0.0:
             total += weight
-            sine_sum += weight * contacts.circle_sine[wheel, m]
-            cosine_sum += weight * contacts.circle_cosine[wheel, m]
-            lateral_sum += weight * samples.laterals[m]
-    length = np.sqrt(sine_sum * sine_sum + cosine_sum * cosine_sum)
-    turn = sine_sum / length, cosine_sum / length
-    write_point(samples, work, wheel, turn, lateral_sum / total)
+            sine_sum += weight * s
+            cosine_sum += weight * c
+            across_sum += weight * across
+    if total > 0.0:
+        length = np.sqrt(sine_sum * sine_sum + cosine_sum * cosine_sum)
+        turn = sine_sum / length, cosine_sum / length
+        write_point(samples, work, wheel, turn, across_sum / total)
+
+
+@kernel
+def _gap_at(model, work, circle, turn):
+    """Return the gap [m] of a circle (wheel, place across [m]) at an angle (sine, cosine)."""
+    ground, placement, radius = model.ground, work.placement, model.samples.radius
+    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    wheel, across = circle
+    s, c = turn
+    x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
+    y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
+    z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+    return z - look_up(ground, x, y)[0]
 
 
 @kernel

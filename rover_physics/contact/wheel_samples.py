@@ -9,6 +9,8 @@ from rover_physics.rover.model import Rover
 
 MAX_ANGLES, MAX_CIRCLES = 49, 9
 """Largest numbers of angles and circles, which fix the sizes of the records."""
+RIMS = 3
+"""Scanned circles: both rims and the middle one."""
 WHEEL_SAMPLES = record_type(
     ("radius", float),  # wheel radius [m]
     ("reach", float),  # largest horizontal distance of a sample from the wheel's centre [m]

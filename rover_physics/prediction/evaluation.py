@@ -6,7 +6,7 @@ import numpy as np
 from numba import prange
 
 from rover_physics.contact.clearance import belly_clearance
-from rover_physics.contact.contact_record import CONTACTS
+from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS
 from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
@@ -86,6 +86,7 @@ WORK = record_type(
     ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie angle [rad]
     ("placement", PLACEMENT),  # positions of the parts at q
     ("contacts", CONTACTS),  # wheel contacts
+    ("cells", CELL_SEARCH),  # search between the rims of a wheel
     ("balance", BALANCE),  # forces as linear functions of the torques
     ("search", TORQUE_SEARCH),  # the chosen forces
     ("J", float, (6, 6)),  # derivatives of the gaps by q
