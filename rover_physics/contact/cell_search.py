@@ -13,6 +13,7 @@ from numba import int64
 
 from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import NOTICED
+from rover_physics.contact.tracking import keep_contact, take_circle
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import elevation_of, is_cell_on_map
@@ -57,7 +58,7 @@ def look_everywhere(model, work, wheel, tops):
     _begin(model, work, wheel)
     status = _look_at_vertices(model.ground, search, tops)
     if search.found:
-        _take_peak(search, contacts, wheel)
+        _take_peak(model.ground, search, contacts, wheel)
     for side in range(2):
         if search.crossing[side] > -np.inf:
             _search_rim(model, work, wheel, side)
@@ -65,17 +66,18 @@ def look_everywhere(model, work, wheel, tops):
 
 
 @kernel
-def _take_peak(search, contacts, wheel):
+def _take_peak(ground, search, contacts, wheel):
     """Take the best point between the rims as the contact."""
-    s, radius = search.best_s, search.radius
+    keep_contact(contacts, wheel)
+    s, t, radius, cell = search.best_s, search.best_t, search.radius, search.cell
     q = np.sqrt(max(radius * radius - s * s, 0.0))
-    contacts.gap[wheel], contacts.inside[wheel] = -search.best * search.cell, 1
-    contacts.across[wheel] = (search.best_t / search.cosine - search.tangent * q) * search.cell
+    contacts.gap[wheel], contacts.inside[wheel] = -search.best * cell, 1
+    contacts.across[wheel] = (t / search.cosine - search.tangent * q) * cell
     contacts.sine[wheel], contacts.cosine[wheel] = s / radius, q / radius
-    # The wheel's own slope there: the ground touches along the wheel's radius.
-    slope = s / (max(q, 0.05 * radius) * search.cosine)
-    contacts.slope[wheel, 0] = slope * search.ahead_x - search.tangent * search.ahead_y
-    contacts.slope[wheel, 1] = slope * search.ahead_y + search.tangent * search.ahead_x
+    peak = contacts.peak[wheel]
+    peak[0] = (search.x + s * search.ahead_x - t * search.ahead_y) * cell + ground.x0
+    peak[1] = (search.y + s * search.ahead_y + t * search.ahead_x) * cell + ground.y0
+    peak[2] = search.z + (search.best + search.tangent * t - q / search.cosine) * cell
 
 
 @kernel
@@ -84,12 +86,15 @@ def _search_rim(model, work, wheel, side):
     contacts, search, samples = work.contacts, work.cells, model.samples
     s = search.crossing_s[side] / search.radius
     across = (2 * side - 1) * samples.half_width
+    on_it = contacts.across[wheel] == across and not contacts.inside[wheel]
+    if on_it and abs(s - contacts.sine[wheel]) * search.radius < 1.0:
+        return  # the contact was found from here
     turn = s, np.sqrt(max(1.0 - s * s, 0.0))
     gap, turn, slope = search_circle(model, work, (wheel, across), turn)
     if gap < contacts.gap[wheel] - NOTICED * samples.radius:
-        contacts.gap[wheel], contacts.across[wheel], contacts.inside[wheel] = gap, across, 0
-        contacts.sine[wheel], contacts.cosine[wheel] = turn
-        contacts.slope[wheel, 0], contacts.slope[wheel, 1] = slope
+        keep_contact(contacts, wheel)
+        contacts.across[wheel] = across
+        take_circle(contacts, wheel, (gap, turn, slope))
 
 
 @kernel

@@ -91,14 +91,3 @@ def search_circle(model, work, circle, turn):
             inverse = 1.0 / np.sqrt(s * s + c * c)
             s, c = s * inverse, c * inverse
     return best, (best_s, best_c), (best_x, best_y)
-
-
-@kernel
-def refine_contact(model, work, wheel):
-    """Search along the wheel from its last contact; the gap is NaN over unknown ground."""
-    contacts = work.contacts
-    turn = contacts.sine[wheel], contacts.cosine[wheel]
-    gap, turn, slope = search_circle(model, work, (wheel, contacts.across[wheel]), turn)
-    contacts.gap[wheel] = gap if gap < np.inf else np.nan
-    contacts.sine[wheel], contacts.cosine[wheel] = turn
-    contacts.slope[wheel, 0], contacts.slope[wheel, 1] = slope

@@ -16,7 +16,7 @@ class SearchScope(IntEnum):
     QUICK = 1
     """All samples; the nearest is refined."""
     NEAR = 2
-    """No samples; the last contact is refined."""
+    """No samples; the last contact and the kept ones are refined, and the nearest is taken."""
     FULL = 3
     """All ground below the wheel, starting from the last contact."""
     WHOLE = 4
@@ -25,6 +25,9 @@ class SearchScope(IntEnum):
 
 NOTICED = 1e-4
 """Difference of gaps [wheel radii] up to which a contact elsewhere is not taken."""
+KEPT = 4
+"""Earlier contacts of a wheel that are looked at again."""
+
 CONTACTS = record_type(
     ("gap", float, (6,)),  # smallest vertical gap, negative inside the ground [m]
     ("sine", float, (6,)),  # sine of the contact angle
@@ -36,6 +39,12 @@ CONTACTS = record_type(
     ("across", float, (6,)),  # distance of the contact from the wheel's middle plane [m]
     ("inside", np.int64, (6,)),  # 1 if the contact is a peak of the ground between the rims
     ("slope", float, (6, 2)),  # slope of the ground at the contact along x and y
+    ("peak", float, (6, 3)),  # point of the ground that touches [m], if the contact is inside
+    ("kept", np.int64, (6,)),  # number of contacts kept since the last QUICK
+    ("kept_across", float, (6, KEPT)),  # `across` of the kept contacts; new ones replace old ones
+    ("kept_inside", np.int64, (6, KEPT)),  # `inside` of the kept contacts
+    ("kept_turn", float, (6, KEPT, 2)),  # their sine and cosine
+    ("kept_peak", float, (6, KEPT, 3)),  # their `peak`
     ("noted_gap", float, (6,)),  # smallest gap of the last scan [m]
     ("noted_circle", np.int64, (6,)),  # its circle: 0 right rim, 1 middle, 2 left rim
     ("noted_row", np.int64, (6,)),  # its row of samples

@@ -16,8 +16,10 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.rover.linkage import place
 
-TRIALS = 14
-"""Largest number of looks at the ground for one wheel in a turn."""
+TRIALS = 12
+"""Largest number of lifts of one wheel between two looks."""
+LOOKS = 4
+"""Largest number of looks at all ground below one wheel in a turn."""
 CLOSER = 0.1
 """A turn closes each gap to this share of the largest one."""
 MAX_TURN = 0.3
@@ -72,43 +74,59 @@ def _close(model, work, wheel, wanted):
     """Lift or lower one wheel until its gap is at most `wanted` [m], or nearly so at a jump."""
     gaps, start, q = work.contacts.gap, work.start, work.q
     find_contact(model, work, wheel, SearchScope.WHOLE)
-    gap = gaps[wheel]
-    if not abs(gap) > wanted:
+    if not abs(gaps[wheel]) > wanted:
         return
     largest = 0.0
+    for i in range(1, 6):
+        largest = max(largest, abs(work.lifts[i, wheel]))
+    longest = MAX_TURN / largest if largest > 0.0 else np.inf
     for i in range(6):
         start[i] = q[i]
-        largest = max(largest, abs(work.lifts[i, wheel]) if i > 0 else 0.0)
-    longest = MAX_TURN / largest if largest > 0.0 else np.inf
-    low, high, low_gap, high_gap = 0.0, 0.0, gap, gap
     lift = 0.0
-    step = -gap
-    bracketed, last = False, 0
+    for _ in range(LOOKS):
+        lift = _follow_to_ground(model, work, wheel, (lift, longest, 0.5 * wanted))
+        find_contact(model, work, wheel, SearchScope.FULL)
+        if not abs(gaps[wheel]) > wanted:
+            return
+
+
+@kernel
+def _follow_to_ground(model, work, wheel, search):
+    """Find the lift at which the followed contacts of a wheel touch, by bracketing; return it [m].
+
+    `search` is the lift to start from, the longest step [m], and the gap that is closed enough [m].
+    """
+    gaps = work.contacts.gap
+    lift, longest, wanted = search
+    low, high, low_gap, high_gap = -np.inf, np.inf, -np.inf, np.inf
+    step, last = -gaps[wheel], 0
     for _ in range(TRIALS):
-        if bracketed:
+        gap = gaps[wheel]
+        if not abs(gap) > wanted:
+            break
+        if gap < 0.0:
+            if last < 0:
+                high_gap *= 0.5  # the Illinois variant of false position
+            low, low_gap, last = lift, gap, -1
+        else:
+            if last > 0:
+                low_gap *= 0.5
+            high, high_gap, last = lift, gap, 1
+        if low > -np.inf and high < np.inf:
             share = low_gap / (low_gap - high_gap)
             lift = low + min(max(share, 0.02), 0.98) * (high - low)
         else:
+            step = 2.0 * step if step * gap < 0.0 and 2.0 * abs(step) > abs(gap) else -gap
             step = min(max(step, -longest), longest)
             lift += step
-        for i in range(6):
-            q[i] = start[i] + lift * work.lifts[i, wheel]
-        place(model.linkage, work.pose, q, work.placement)
-        find_contact(model, work, wheel, SearchScope.WHOLE)
-        gap = gaps[wheel]
-        if not abs(gap) > wanted:
-            return
-        if gap < 0.0:
-            if not bracketed and step < 0.0:
-                bracketed = True
-            elif bracketed and last < 0:
-                high_gap *= 0.5
-            low, low_gap, last = lift, gap, -1
-        else:
-            if not bracketed and step > 0.0:
-                bracketed = True
-            elif bracketed and last > 0:
-                low_gap *= 0.5
-            high, high_gap, last = lift, gap, 1
-        if not bracketed:
-            step = 2.0 * step if abs(2.0 * step) > abs(gap) else -gap
+        _lift_to(model, work, wheel, lift)
+    return lift
+
+
+@kernel
+def _lift_to(model, work, wheel, lift):
+    """Lift a wheel by `lift` [m] from `work.start`, and follow its contacts."""
+    for i in range(6):
+        work.q[i] = work.start[i] + lift * work.lifts[i, wheel]
+    place(model.linkage, work.pose, work.q, work.placement)
+    find_contact(model, work, wheel, SearchScope.NEAR)

@@ -62,6 +62,7 @@ def settle(model, work):
     status, worst = _find_contacts(model, work, SearchScope.COARSE)
     if np.isnan(worst):
         return _refuse(status)
+    _lower_to_ground(work)
     _descend(model, work, 1.0)
     return settle_from(model, work)
 
@@ -159,6 +160,18 @@ def _newton(model, work, scope):
 @kernel
 def _has_turned_over(q):
     return abs(q[1]) > TURNED_OVER or abs(q[2]) > TURNED_OVER
+
+
+@kernel
+def _lower_to_ground(work):
+    """Move the rover by the mean gap, so that only the differences of the gaps turn its parts."""
+    gap = work.contacts.gap
+    mean = 0.0
+    for wheel in range(6):
+        mean += gap[wheel] / 6.0
+    work.q[0] -= mean
+    for wheel in range(6):
+        gap[wheel] -= mean
 
 
 @kernel

@@ -10,12 +10,10 @@ wheel has a positive angle.
 import numpy as np
 
 from rover_physics.contact.cell_search import look_everywhere
-from rover_physics.contact.circle_search import (
-    refine_contact,
-    search_circle,
-)
+from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.rim_scan import find_tops, scan_rims
+from rover_physics.contact.tracking import follow_contact, look_at_kept
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import height_inside, look_up
@@ -23,6 +21,8 @@ from rover_physics.terrain.ground import height_inside, look_up
 COMPLIANCE = 2e-3
 """Deformation of real wheels and ground [wheel radii]. Circles whose gaps differ by less share the
 load, so on a plane a wheel touches in its middle, not at a random edge."""
+LEAST_RISE = 0.02
+"""Least vertical part of a contact normal, so that a wheel at a wall has finite derivatives."""
 CIRCLE_REACH = 2e-2
 """Gap above the smallest one [wheel radii], at the contact angle, up to which another circle is
 searched for its share."""
@@ -52,17 +52,17 @@ def find_contact(model, work, wheel, scope):
         return status
     if scope == SearchScope.COARSE and _guess(model, work, wheel):
         return status
-    if scope != SearchScope.NEAR and scope != SearchScope.FULL:
+    lost = scope == SearchScope.NEAR and not follow_contact(model, work, wheel)
+    if lost or (scope != SearchScope.NEAR and scope != SearchScope.FULL):
         status = scan_rims(model, work, wheel, scope)
         if contacts.noted_gap[wheel] == np.inf:
             contacts.gap[wheel] = np.nan
             return status
         _take_sample(model.samples, contacts, wheel)
-        if scope == SearchScope.COARSE:
-            _write_contact(work, wheel, model.samples)
-            return status
-    if scope != SearchScope.FULL:
-        refine_contact(model, work, wheel)
+        if scope != SearchScope.COARSE:
+            follow_contact(model, work, wheel)
+    if scope == SearchScope.NEAR:
+        look_at_kept(model, work, wheel)
     if scope == SearchScope.FULL or scope == SearchScope.WHOLE:
         below = look_everywhere(model, work, wheel, find_tops(model, work, wheel))
         if status == ContactStatus.IN_CONTACT:
@@ -125,7 +125,22 @@ def _write_contact(work, wheel, samples):
     contacts = work.contacts
     turn = contacts.sine[wheel], contacts.cosine[wheel]
     write_point(samples, work, wheel, turn, contacts.across[wheel])
-    write_normal(work, wheel, turn, (contacts.slope[wheel, 0], contacts.slope[wheel, 1]))
+    if contacts.inside[wheel]:
+        _write_radial_normal(work, wheel, turn)
+    else:
+        write_normal(work, wheel, turn, (contacts.slope[wheel, 0], contacts.slope[wheel, 1]))
+
+
+@kernel
+def _write_radial_normal(work, wheel, turn):
+    """Write the wheel's radius as the contact normal, scaled to z = 1."""
+    placement, normal = work.placement, work.contacts.normal
+    forward, up = placement.forward, placement.up
+    s, c = turn
+    z = max(c * up[2], LEAST_RISE)
+    normal[wheel, 0] = (-s * forward[0] + c * up[0]) / z
+    normal[wheel, 1] = (-s * forward[1] + c * up[1]) / z
+    normal[wheel, 2] = 1.0
 
 
 @kernel
@@ -221,7 +236,7 @@ def write_normal(work, wheel, turn, slope):
     radial_z = c * up[2]
     along_radius = radial_z - slope_x * radial_x - slope_y * radial_y
     along_axis = R[2, 1] - slope_x * R[0, 1] - slope_y * R[1, 1]
-    z = max(along_radius * radial_z + along_axis * R[2, 1], 0.02 * along_radius)
+    z = max(along_radius * radial_z + along_axis * R[2, 1], LEAST_RISE * along_radius)
     normal[wheel, 0] = (along_radius * radial_x + along_axis * R[0, 1]) / z
     normal[wheel, 1] = (along_radius * radial_y + along_axis * R[1, 1]) / z
     normal[wheel, 2] = 1.0

@@ -1,0 +1,100 @@
+"""Contacts that are followed while the rover moves: on a circle of the wheel, or on the ground.
+
+On a rim the nearest point moves with the wheel, so its circle is searched again. Between the rims
+a peak or ridge of the ground touches: its point is fixed to the ground. The point slides along a
+ridge when the wheel moves, but the gap depends on that in second order only.
+"""
+
+import numpy as np
+
+from rover_physics.contact.circle_search import search_circle
+from rover_physics.contact.contact_record import KEPT
+from rover_physics.numerics.kernels import kernel
+
+
+@kernel
+def follow_contact(model, work, wheel):
+    """Write where the last contact of a wheel is now; the gap is NaN over unknown ground.
+
+    Returns False, and writes nothing, if its point of the ground is no longer below the wheel.
+    """
+    contacts = work.contacts
+    if contacts.inside[wheel]:
+        return _write_peak(model, work, wheel, contacts.peak[wheel])
+    turn = contacts.sine[wheel], contacts.cosine[wheel]
+    gap, turn, slope = search_circle(model, work, (wheel, contacts.across[wheel]), turn)
+    take_circle(contacts, wheel, (gap if gap < np.inf else np.nan, turn, slope))
+    return True
+
+
+@kernel
+def take_circle(contacts, wheel, found):
+    """Write what `search_circle` has found into row `wheel` of the contacts."""
+    gap, turn, slope = found
+    contacts.gap[wheel], contacts.inside[wheel] = gap, 0
+    contacts.sine[wheel], contacts.cosine[wheel] = turn
+    contacts.slope[wheel, 0], contacts.slope[wheel, 1] = slope
+
+
+@kernel
+def find_gap_above(model, work, wheel, point):
+    """Return the gap [m] of a wheel above a point (3,) of the ground, and s, t, q of the point.
+
+    s is along the wheel's heading, t to the left, q = sqrt(R^2 - s^2) [m].
+    """
+    placement, radius = work.placement, model.samples.radius
+    forward, up, centres = placement.forward, placement.up, placement.centres
+    dx, dy = point[0] - centres[wheel, 0], point[1] - centres[wheel, 1]
+    s, t = dx * forward[0] + dy * forward[1], dy * forward[0] - dx * forward[1]
+    q = np.sqrt(max(radius * radius - s * s, 0.0))
+    gap = centres[wheel, 2] - point[2] + (placement.R[2, 1] * t - q) / up[2]
+    return gap, s, t, q
+
+
+@kernel
+def _write_peak(model, work, wheel, point):
+    """Take a point (3,) of the ground as the contact of a wheel; False if it is not below it."""
+    contacts, placement, radius = work.contacts, work.placement, model.samples.radius
+    gap, s, t, q = find_gap_above(model, work, wheel, point)
+    if not q > 0.0:
+        return False
+    contacts.gap[wheel], contacts.inside[wheel] = gap, 1
+    contacts.sine[wheel], contacts.cosine[wheel] = min(max(s / radius, -1.0), 1.0), q / radius
+    contacts.across[wheel] = (t - placement.R[2, 1] * q) / placement.up[2]
+    for k in range(3):
+        contacts.peak[wheel, k] = point[k]
+    return True
+
+
+@kernel
+def keep_contact(contacts, wheel):
+    """Keep the contact of a wheel, to be looked at again after another one was found."""
+    row = contacts.kept[wheel] % KEPT
+    contacts.kept_across[wheel, row] = contacts.across[wheel]
+    contacts.kept_inside[wheel, row] = contacts.inside[wheel]
+    contacts.kept_turn[wheel, row, 0] = contacts.sine[wheel]
+    contacts.kept_turn[wheel, row, 1] = contacts.cosine[wheel]
+    for k in range(3):
+        contacts.kept_peak[wheel, row, k] = contacts.peak[wheel, k]
+    contacts.kept[wheel] += 1
+
+
+@kernel
+def look_at_kept(model, work, wheel):
+    """Take the nearest of the kept contacts if it is nearer than the contact."""
+    contacts = work.contacts
+    for row in range(min(contacts.kept[wheel], KEPT)):
+        if contacts.kept_inside[wheel, row]:
+            peak = contacts.kept_peak[wheel, row]
+            gap, _, _, _ = find_gap_above(model, work, wheel, peak)
+            if gap < contacts.gap[wheel]:
+                _write_peak(model, work, wheel, peak)
+            continue
+        across = contacts.kept_across[wheel, row]
+        turn = contacts.kept_turn[wheel, row, 0], contacts.kept_turn[wheel, row, 1]
+        gap, turn, slope = search_circle(model, work, (wheel, across), turn)
+        if gap < np.inf:
+            contacts.kept_turn[wheel, row, 0], contacts.kept_turn[wheel, row, 1] = turn
+        if gap < contacts.gap[wheel]:
+            contacts.across[wheel] = across
+            take_circle(contacts, wheel, (gap, turn, slope))
