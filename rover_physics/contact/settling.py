@@ -24,6 +24,8 @@ MAX_NEWTON_STEPS = 20
 """Largest number of Newton steps."""
 QUICK_ATTEMPTS = 5
 """Newton's method runs up to this often with searches near the last contacts."""
+PROMISING = 2.0
+"""Share of the last attempt's largest gap above which another quick attempt is not promising."""
 NOTES_HOLD = 1e-2
 """Largest gap [wheel radii] at which the samples noted by the last full scan are reused. So small
 a step brings no other circle near the ground."""
@@ -80,9 +82,10 @@ def settle_from(model, work):
         return _refuse(status)
     worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
+        before = worst
         _newton(model, work, SearchScope.NEAR)
         status, worst = _find_contacts(model, work, SearchScope.FULL)
-        if worst <= GAP_TOLERANCE or np.isnan(worst):
+        if worst <= GAP_TOLERANCE or np.isnan(worst) or worst > PROMISING * before:
             break
     for attempt in range(RECOVERIES):
         if worst <= GAP_TOLERANCE or np.isnan(worst) or status != ContactStatus.IN_CONTACT:

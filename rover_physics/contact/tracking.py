@@ -86,8 +86,8 @@ def look_at_kept(model, work, wheel):
     for row in range(min(contacts.kept[wheel], KEPT)):
         if contacts.kept_inside[wheel, row]:
             peak = contacts.kept_peak[wheel, row]
-            gap, _, _, _ = find_gap_above(model, work, wheel, peak)
-            if gap < contacts.gap[wheel]:
+            gap, _, _, q = find_gap_above(model, work, wheel, peak)
+            if q > 0.0 and gap < contacts.gap[wheel]:
                 _write_peak(model, work, wheel, peak)
             continue
         across = contacts.kept_across[wheel, row]

@@ -13,7 +13,7 @@ from rover_physics.contact.cell_search import look_everywhere
 from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.rim_scan import find_tops, scan_rims
-from rover_physics.contact.tracking import follow_contact, look_at_kept
+from rover_physics.contact.tracking import follow_contact, keep_contact, look_at_kept
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import height_inside, look_up
@@ -53,6 +53,10 @@ def find_contact(model, work, wheel, scope):
     if scope == SearchScope.COARSE and _guess(model, work, wheel):
         return status
     lost = scope == SearchScope.NEAR and not follow_contact(model, work, wheel)
+    if lost:
+        keep_contact(contacts, wheel)
+    elif scope == SearchScope.QUICK:
+        contacts.kept[wheel] = 0
     if lost or (scope != SearchScope.NEAR and scope != SearchScope.FULL):
         status = scan_rims(model, work, wheel, scope)
         if contacts.noted_gap[wheel] == np.inf:
