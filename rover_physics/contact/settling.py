@@ -34,7 +34,9 @@ RECOVERIES = 4
 """Attempts with exact searches after the quick attempts have failed."""
 RELAXATION_STEPS = 120
 """Largest number of relaxation steps per attempt."""
-RELAXED = 0.003
+FINAL_ATTEMPTS = 5
+"""Newton's method runs up to so often, less one, after each recovery."""
+RELAXED = 0.1
 """Largest gap [wheel radii] at which relaxation ends and Newton's method starts."""
 RELAXED_FURTHER = 0.25
 """Factor on RELAXED after each failed attempt: a wheel wedged at a face has small gaps."""
@@ -94,8 +96,12 @@ def settle_from(model, work):
         close_in_turns(model, work, TURNS, closed)
         if _has_turned_over(work.q):
             return PoseStatus.NOT_SETTLED
-        _newton(model, work, SearchScope.WHOLE)
-        status, worst = _find_contacts(model, work, SearchScope.WHOLE)
+        _find_contacts(model, work, SearchScope.QUICK)
+        for _ in range(FINAL_ATTEMPTS):
+            status, worst = _find_contacts(model, work, SearchScope.FULL)
+            if worst <= GAP_TOLERANCE or np.isnan(worst):
+                break
+            _newton(model, work, SearchScope.NEAR)
     if status != ContactStatus.IN_CONTACT:
         return _refuse(status)
     if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
