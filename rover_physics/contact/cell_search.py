@@ -12,7 +12,7 @@ import numpy as np
 from numba import int64
 
 from rover_physics.contact.circle_search import search_circle
-from rover_physics.contact.contact_record import NOTICED
+from rover_physics.contact.contact_record import CROSSINGS, NOTICED
 from rover_physics.contact.tracking import keep_contact, take_circle
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
@@ -28,7 +28,7 @@ INTERIOR_STEPS = 5
 PROMISE = 0.75
 """A cell is left if so many times the gain of the first full Newton step, which is half of it for a
 parabola, does not suffice."""
-RIM_STEPS = 3
+RIM_STEPS = 2
 """Steps for the place where an edge crosses a rim."""
 MIN_COSINE = 0.3
 """Cosine of the contact angle below which no bound is tried."""
@@ -59,9 +59,9 @@ def look_everywhere(model, work, wheel, tops):
     status = _look_at_vertices(model.ground, search, tops)
     if search.found:
         _take_peak(model.ground, search, contacts, wheel)
-    for side in range(2):
-        if search.crossing[side] > -np.inf:
-            _search_rim(model, work, wheel, side)
+    for k in range(min(search.crossings, CROSSINGS)):
+        if search.crossing[k] > -contacts.gap[wheel] / search.cell:
+            _search_rim(model, work, wheel, k)
     return status
 
 
@@ -81,11 +81,11 @@ def _take_peak(ground, search, contacts, wheel):
 
 
 @kernel
-def _search_rim(model, work, wheel, side):
-    """Search a rim, 0 right or 1 left, from its best crossing, and take it if it is nearer."""
+def _search_rim(model, work, wheel, k):
+    """Search a rim from crossing k, and take what is found if it is nearer."""
     contacts, search, samples = work.contacts, work.cells, model.samples
-    s = search.crossing_s[side] / search.radius
-    across = (2 * side - 1) * samples.half_width
+    s = search.crossing_s[k] / search.radius
+    across = search.crossing_rim[k] * samples.half_width
     on_it = contacts.across[wheel] == across and not contacts.inside[wheel]
     if on_it and abs(s - contacts.sine[wheel]) * search.radius < 1.0:
         return  # the contact was found from here
@@ -114,8 +114,7 @@ def _begin(model, work, wheel):
     search.cosine, search.sine = placement.up[2], placement.R[2, 1]
     search.tangent = search.sine / search.cosine
     search.half_width = samples.half_width * scale * search.cosine
-    search.found = 0
-    search.crossing[0] = search.crossing[1] = -np.inf
+    search.found = search.crossings = 0
     search.best = -work.contacts.gap[wheel] * scale + NOTICED * search.radius
 
 
@@ -227,7 +226,7 @@ def _look_around(ground, search, vertex, there):
     intrusion = base + q * inverse
     if intrusion > search.best and q > 0.0 and _is_below(search, s, t):
         _take(search, s, t, base)
-    steep = q < MIN_COSINE * R
+    steep, curl = q < MIN_COSINE * R, 0.5 * inverse / R
     fall = 0.0 if steep else s / q * inverse
     here = elevation_of(ground, i, j)
     for edge in range(4):
@@ -241,6 +240,9 @@ def _look_around(ground, search, vertex, there):
         if not is_cell_on_map(ground, j + dj, i + di):
             continue
         rise = (elevation_of(ground, i + di, j + dj) - here) * scale - search.tangent * along_t
+        # The end that comes nearer, by the wheel's parabola, owns the edge.
+        if rise - curl * along_s * (2.0 * s + along_s) > 0.0:
+            continue
         if not steep:
             # The wheel bends at least as at its bottom, so a parabola is above the intrusion.
             gain, bend = rise - fall * along_s, along_s * along_s * inverse / R
@@ -290,14 +292,15 @@ def _look_along_edge(search, start, along):
 
 @kernel
 def _note_crossing(search, s, rim, base):
-    """Note the crossing of a rim with the largest intrusion, if the rim may come near there."""
+    """Note where an edge crosses a rim, -1 right or 1 left, if the rim may come near there."""
     R = search.radius
     q = np.sqrt(R * R - s * s)
-    intrusion = base + q / search.cosine
-    side = (rim + 1) // 2
-    bend = BEND * R * R / (max(q, 0.2 * R) ** 3 * search.cosine)
-    if intrusion + bend > search.best and intrusion > search.crossing[side]:
-        search.crossing[side], search.crossing_s[side] = intrusion, s
+    bend = BEND * R * R / max(q, 0.2 * R) ** 3
+    most = base + (q + bend) / search.cosine
+    if most > search.best:
+        k = search.crossings % CROSSINGS
+        search.crossing[k], search.crossing_s[k], search.crossing_rim[k] = most, s, rim
+        search.crossings += 1
 
 
 @kernel

@@ -36,7 +36,7 @@ RELAXATION_STEPS = 120
 """Largest number of relaxation steps per attempt."""
 FINAL_ATTEMPTS = 5
 """Newton's method runs up to so often, less one, after each recovery."""
-RELAXED = 0.1
+RELAXED = 0.05
 """Largest gap [wheel radii] at which relaxation ends and Newton's method starts."""
 RELAXED_FURTHER = 0.25
 """Factor on RELAXED after each failed attempt: a wheel wedged at a face has small gaps."""

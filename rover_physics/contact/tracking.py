@@ -38,29 +38,32 @@ def take_circle(contacts, wheel, found):
 
 @kernel
 def find_gap_above(model, work, wheel, point):
-    """Return the gap [m] of a wheel above a point (3,) of the ground, and s, t, q of the point.
+    """Return the gap [m] of a wheel above a point (3,) of the ground, infinite beside the wheel.
 
-    s is along the wheel's heading, t to the left, q = sqrt(R^2 - s^2) [m].
+    Further: the place of the point along the wheel's heading, its place across the wheel, and the
+    distance of the contact from the axle in the wheel's up direction [m].
     """
     placement, radius = work.placement, model.samples.radius
     forward, up, centres = placement.forward, placement.up, placement.centres
     dx, dy = point[0] - centres[wheel, 0], point[1] - centres[wheel, 1]
     s, t = dx * forward[0] + dy * forward[1], dy * forward[0] - dx * forward[1]
     q = np.sqrt(max(radius * radius - s * s, 0.0))
-    gap = centres[wheel, 2] - point[2] + (placement.R[2, 1] * t - q) / up[2]
-    return gap, s, t, q
+    across = (t - placement.R[2, 1] * q) / up[2]
+    if not (q > 0.0 and abs(across) <= model.samples.half_width):
+        return np.inf, s, across, q
+    return centres[wheel, 2] - point[2] + (placement.R[2, 1] * t - q) / up[2], s, across, q
 
 
 @kernel
 def _write_peak(model, work, wheel, point):
     """Take a point (3,) of the ground as the contact of a wheel; False if it is not below it."""
-    contacts, placement, radius = work.contacts, work.placement, model.samples.radius
-    gap, s, t, q = find_gap_above(model, work, wheel, point)
-    if not q > 0.0:
+    contacts, radius = work.contacts, model.samples.radius
+    gap, s, across, q = find_gap_above(model, work, wheel, point)
+    if not gap < np.inf:
         return False
     contacts.gap[wheel], contacts.inside[wheel] = gap, 1
     contacts.sine[wheel], contacts.cosine[wheel] = min(max(s / radius, -1.0), 1.0), q / radius
-    contacts.across[wheel] = (t - placement.R[2, 1] * q) / placement.up[2]
+    contacts.across[wheel] = across
     for k in range(3):
         contacts.peak[wheel, k] = point[k]
     return True
@@ -86,8 +89,8 @@ def look_at_kept(model, work, wheel):
     for row in range(min(contacts.kept[wheel], KEPT)):
         if contacts.kept_inside[wheel, row]:
             peak = contacts.kept_peak[wheel, row]
-            gap, _, _, q = find_gap_above(model, work, wheel, peak)
-            if q > 0.0 and gap < contacts.gap[wheel]:
+            gap, _, _, _ = find_gap_above(model, work, wheel, peak)
+            if gap < contacts.gap[wheel]:
                 _write_peak(model, work, wheel, peak)
             continue
         across = contacts.kept_across[wheel, row]
