@@ -28,8 +28,15 @@ INTERIOR_STEPS = 5
 PROMISE = 0.75
 """A cell is left if so many times the gain of the first full Newton step, which is half of it for a
 parabola, does not suffice."""
+BESIDE_SHARE = 0.8
+"""Share of the rise of the wheel: where the gap grows less, the ground is not a plane, and the rim
+may touch elsewhere."""
 RIM_STEPS = 2
 """Steps for the place where an edge crosses a rim."""
+RIM_BEND = 0.3
+"""The same for a rim, which may cross a twisted cell along its diagonal."""
+GENTLE = 0.8
+"""Share of the radius up to which the wheel is close to a parabola."""
 MIN_COSINE = 0.3
 """Cosine of the contact angle below which no bound is tried."""
 LEAST_UPRIGHT = 0.1
@@ -60,8 +67,7 @@ def look_everywhere(model, work, wheel, tops):
     if search.found:
         _take_peak(model.ground, search, contacts, wheel)
     for k in range(min(search.crossings, CROSSINGS)):
-        if search.crossing[k] > -contacts.gap[wheel] / search.cell:
-            _search_rim(model, work, wheel, k)
+        _search_rim(model, work, wheel, k)
     return status
 
 
@@ -86,10 +92,14 @@ def _search_rim(model, work, wheel, k):
     contacts, search, samples = work.contacts, work.cells, model.samples
     s = search.crossing_s[k] / search.radius
     across = search.crossing_rim[k] * samples.half_width
-    on_it = contacts.across[wheel] == across and not contacts.inside[wheel]
-    if on_it and abs(s - contacts.sine[wheel]) * search.radius < 1.0:
-        return  # the contact was found from here
-    turn = s, np.sqrt(max(1.0 - s * s, 0.0))
+    c = np.sqrt(max(1.0 - s * s, 0.0))
+    if contacts.across[wheel] == across and not contacts.inside[wheel]:
+        # From a contact on a plane the gap grows with the rise of the wheel.
+        rise = 1.0 - (s * contacts.sine[wheel] + c * contacts.cosine[wheel])
+        fall = -contacts.gap[wheel] / search.cell - search.crossing[k]
+        if fall >= BESIDE_SHARE * search.radius * rise:
+            return
+    turn = s, c
     gap, turn, slope = search_circle(model, work, (wheel, across), turn)
     if gap < contacts.gap[wheel] - NOTICED * samples.radius:
         keep_contact(contacts, wheel)
@@ -226,7 +236,10 @@ def _look_around(ground, search, vertex, there):
     intrusion = base + q * inverse
     if intrusion > search.best and q > 0.0 and _is_below(search, s, t):
         _take(search, s, t, base)
-    steep, curl = q < MIN_COSINE * R, 0.5 * inverse / R
+    steep, curl, gentle_s = q < MIN_COSINE * R, 0.5 * inverse / R, GENTLE * R
+    lean = search.sine * q
+    is_below = abs(t - lean) <= search.half_width
+    rim_bend = 0.0 if steep else RIM_BEND * R * R / (q * q * q) * inverse
     fall = 0.0 if steep else s / q * inverse
     here = elevation_of(ground, i, j)
     for edge in range(4):
@@ -241,7 +254,8 @@ def _look_around(ground, search, vertex, there):
             continue
         rise = (elevation_of(ground, i + di, j + dj) - here) * scale - search.tangent * along_t
         # The end that comes nearer, by the wheel's parabola, owns the edge.
-        if rise - curl * along_s * (2.0 * s + along_s) > 0.0:
+        gentle = abs(s) < gentle_s and abs(s + along_s) < gentle_s
+        if gentle and rise - curl * along_s * (2.0 * s + along_s) > 0.0:
             continue
         if not steep:
             # The wheel bends at least as at its bottom, so a parabola is above the intrusion.
@@ -250,7 +264,10 @@ def _look_around(ground, search, vertex, there):
                 gain -= 0.5 * bend
             elif gain > 0.0:
                 gain *= 0.5 * gain / bend
-            if not intrusion + max(gain, 0.0) > search.best:
+            most = intrusion + max(gain, 0.0)
+            if is_below != (abs(t + along_t - lean) <= search.half_width):
+                most += rim_bend
+            if not most > search.best:
                 continue
         _look_along_edge(search, (s, t, base), (along_s, along_t, rise))
     _look_into_cells(ground, search, i, j)
@@ -295,11 +312,11 @@ def _note_crossing(search, s, rim, base):
     """Note where an edge crosses a rim, -1 right or 1 left, if the rim may come near there."""
     R = search.radius
     q = np.sqrt(R * R - s * s)
-    bend = BEND * R * R / max(q, 0.2 * R) ** 3
-    most = base + (q + bend) / search.cosine
-    if most > search.best:
+    bend = RIM_BEND * R * R / max(q, 0.2 * R) ** 3
+    intrusion = base + q / search.cosine
+    if intrusion + bend / search.cosine > search.best:
         k = search.crossings % CROSSINGS
-        search.crossing[k], search.crossing_s[k], search.crossing_rim[k] = most, s, rim
+        search.crossing[k], search.crossing_s[k], search.crossing_rim[k] = intrusion, s, rim
         search.crossings += 1
 
 
@@ -313,6 +330,7 @@ def _look_into_cells(ground, search, i, j):
     here = elevation_of(ground, i, j)
     x, y = j - search.x, i - search.y
     s, curl = x * ex + y * ey, 0.5 / (search.radius * search.cosine)
+    gentle = abs(s) < GENTLE * search.radius
     for cell in range(4):
         row, column = i - cell // 2, j - cell % 2
         if row < 0 or column < 0 or row > ground.rows - 2 or column > ground.columns - 2:
@@ -331,7 +349,7 @@ def _look_into_cells(ground, search, i, j):
         above -= search.tangent * di * ex
         across += search.tangent * (dj * ey - di * ex)
         bend = curl * s * s
-        if (
+        if gentle and (
             beside - curl * s_beside * s_beside > -bend
             or above - curl * s_above * s_above > -bend
             or across - curl * s_across * s_across > -bend
