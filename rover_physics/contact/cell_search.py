@@ -23,7 +23,7 @@ BEND = 0.19
 with a margin for a circle."""
 STEEP = 0.64
 """(s / R)^2 beyond which the wheel's curvature is too large for that estimate."""
-INTERIOR_STEPS = 5
+INTERIOR_STEPS = 8
 """Newton steps in a cell."""
 PROMISE = 0.75
 """A cell is left if so many times the gain of the first full Newton step, which is half of it for a
@@ -31,6 +31,8 @@ parabola, does not suffice."""
 BESIDE_SHARE = 0.8
 """Share of the rise of the wheel: where the gap grows less, the ground is not a plane, and the rim
 may touch elsewhere."""
+STEEPEST = 0.9999
+"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
 RIM_STEPS = 2
 """Steps for the place where an edge crosses a rim."""
 RIM_BEND = 0.3
@@ -92,14 +94,7 @@ def _search_rim(model, work, wheel, k):
     contacts, search, samples = work.contacts, work.cells, model.samples
     s = search.crossing_s[k] / search.radius
     across = search.crossing_rim[k] * samples.half_width
-    c = np.sqrt(max(1.0 - s * s, 0.0))
-    if contacts.across[wheel] == across and not contacts.inside[wheel]:
-        # From a contact on a plane the gap grows with the rise of the wheel.
-        rise = 1.0 - (s * contacts.sine[wheel] + c * contacts.cosine[wheel])
-        fall = -contacts.gap[wheel] / search.cell - search.crossing[k]
-        if fall >= BESIDE_SHARE * search.radius * rise:
-            return
-    turn = s, c
+    turn = s, np.sqrt(max(1.0 - s * s, 0.0))
     gap, turn, slope = search_circle(model, work, (wheel, across), turn)
     if gap < contacts.gap[wheel] - NOTICED * samples.radius:
         keep_contact(contacts, wheel)
@@ -125,6 +120,11 @@ def _begin(model, work, wheel):
     search.tangent = search.sine / search.cosine
     search.half_width = samples.half_width * scale * search.cosine
     search.found = search.crossings = 0
+    contacts, search.rim = work.contacts, 0
+    if not contacts.inside[wheel] and contacts.across[wheel] != 0.0:
+        search.rim = 1 if contacts.across[wheel] > 0.0 else -1
+    search.contact_s = contacts.sine[wheel] * search.radius
+    search.contact_q = contacts.cosine[wheel] * search.radius
     search.best = -work.contacts.gap[wheel] * scale + NOTICED * search.radius
 
 
@@ -254,6 +254,9 @@ def _look_around(ground, search, vertex, there):
             continue
         rise = (elevation_of(ground, i + di, j + dj) - here) * scale - search.tangent * along_t
         # The end that comes nearer, by the wheel's parabola, owns the edge.
+        crosses = is_below != (abs(t + along_t - lean) <= search.half_width)
+        if crosses and steep:
+            _cross_rim(search, (s, t, base), (along_s, along_t, rise))
         gentle = abs(s) < gentle_s and abs(s + along_s) < gentle_s
         if gentle and rise - curl * along_s * (2.0 * s + along_s) > 0.0:
             continue
@@ -265,8 +268,8 @@ def _look_around(ground, search, vertex, there):
             elif gain > 0.0:
                 gain *= 0.5 * gain / bend
             most = intrusion + max(gain, 0.0)
-            if is_below != (abs(t + along_t - lean) <= search.half_width):
-                most += rim_bend
+            if crosses and most + rim_bend > search.best:
+                _cross_rim(search, (s, t, base), (along_s, along_t, rise))
             if not most > search.best:
                 continue
         _look_along_edge(search, (s, t, base), (along_s, along_t, rise))
@@ -295,29 +298,40 @@ def _look_along_edge(search, start, along):
         if share > 0.0:
             _take(search, best_s, best_t, base + share * rise)
         return
-    # The best place is beyond a rim: the nearest place below the wheel is on the rim.
-    if not abs(along_t) > LEVEL:
-        return
-    side = 1.0 if best_t > search.sine * R else -1.0
-    for _ in range(RIM_STEPS):
-        at = s + share * along_s
-        lean = search.sine * np.sqrt(max(R * R - at * at, 0.0))
-        share = (side * search.half_width + lean - t) / along_t
-    if share >= 0.0 and share <= 1.0 and abs(s + share * along_s) < R:
-        _note_crossing(search, s + share * along_s, int64(side), base + share * rise)
 
 
 @kernel
-def _note_crossing(search, s, rim, base):
-    """Note where an edge crosses a rim, -1 right or 1 left, if the rim may come near there."""
-    R = search.radius
-    q = np.sqrt(R * R - s * s)
-    bend = RIM_BEND * R * R / max(q, 0.2 * R) ** 3
-    intrusion = base + q / search.cosine
-    if intrusion + bend / search.cosine > search.best:
-        k = search.crossings % CROSSINGS
-        search.crossing[k], search.crossing_s[k], search.crossing_rim[k] = intrusion, s, rim
-        search.crossings += 1
+def _cross_rim(search, start, along):
+    """Note where an edge crosses a rim, if the rim may come near there.
+
+    `start` and `along` are as for `_look_along_edge`.
+    """
+    s, t, base = start
+    along_s, along_t, rise = along
+    R, inverse = search.radius, 1.0 / search.cosine
+    if not abs(along_t) > LEVEL:
+        return
+    side = 1.0 if t + 0.5 * along_t > search.sine * R * 0.5 else -1.0
+    q, share = R, 0.5
+    for _ in range(RIM_STEPS):
+        at = s + share * along_s
+        q = np.sqrt(max(R * R - at * at, 0.0))
+        share = (side * search.half_width + search.sine * q - t) / along_t
+    if not (share >= 0.0 and share <= 1.0 and q > 0.0):
+        return
+    at = s + share * along_s
+    intrusion = base + share * rise + q * inverse
+    bend = RIM_BEND * R * R / max(q, 0.2 * R) ** 3 * inverse
+    if not intrusion + bend > search.best:
+        return
+    if side == search.rim:
+        # From a contact on a plane the gap grows with the rise of the wheel.
+        lift = R - (at * search.contact_s + q * search.contact_q) / R
+        if search.best - intrusion >= BESIDE_SHARE * lift:
+            return
+    k = search.crossings % CROSSINGS
+    search.crossing_s[k], search.crossing_rim[k] = at, int64(side)
+    search.crossings += 1
 
 
 @kernel
@@ -362,6 +376,21 @@ def _look_into_cells(ground, search, i, j):
 
 
 @kernel
+def _climb_line(search, line, rise):
+    """Return the place, 0 to 1, of the largest intrusion along a line across a cell.
+
+    `line` is s at its start and the change of s along it, `rise` the change of the intrusion
+    without the wheel's dome.
+    """
+    s, along_s = line
+    if not abs(along_s) > LEVEL:
+        return 1.0 if rise > 0.0 else 0.0
+    steep = rise * search.cosine / along_s
+    place = (search.radius * steep / np.sqrt(1.0 + steep * steep) - s) / along_s
+    return min(max(place, 0.0), 1.0)
+
+
+@kernel
 def _look_into_cell(search, corner, shape):
     """Find the stationary intrusion in a cell by Newton's method, and keep it if it is inside.
 
@@ -377,7 +406,7 @@ def _look_into_cell(search, corner, shape):
     u, v = 0.5, 0.5
     for step in range(INTERIOR_STEPS):
         s = (dx + u) * ex + (dy + v) * ey
-        s = min(max(s, -0.98 * R), 0.98 * R)
+        s = min(max(s, -STEEPEST * R), STEEPEST * R)
         q = np.sqrt(R * R - s * s)
         fall = s / q * inverse
         bend = R * R / (q * q * q) * inverse
@@ -386,10 +415,15 @@ def _look_into_cell(search, corner, shape):
         cross = d - bend * ex * ey
         determinant = bend * bend * ex * ex * ey * ey - cross * cross
         if not determinant > 0.0:
-            return
+            if abs(s) < GENTLE * R:
+                return
+            # Across the cell the ground is straight in both directions: climb along each in turn.
+            u = _climb_line(search, (dx * ex + (dy + v) * ey, ex), b + d * v + tangent * ey)
+            v = _climb_line(search, ((dx + u) * ex + dy * ey, ey), c + d * u - tangent * ex)
+            continue
         step_u = (-bend * ey * ey * slope_u - cross * slope_v) / determinant
         step_v = (-bend * ex * ex * slope_v - cross * slope_u) / determinant
-        if step == 0:
+        if step == 0 and abs(s) < GENTLE * R:
             t = (dy + v) * ex - (dx + u) * ey
             here = a + b * u + c * v + d * u * v - tangent * t + q * inverse
             if here - PROMISE * (slope_u * step_u + slope_v * step_v) < search.best:
