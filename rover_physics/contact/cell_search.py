@@ -24,15 +24,14 @@ with a margin for a circle."""
 STEEP = 0.64
 """(s / R)^2 beyond which the wheel's curvature is too large for that estimate."""
 INTERIOR_STEPS = 8
-"""Newton steps in a cell."""
-PROMISE = 0.75
-"""A cell is left if so many times the gain of the first full Newton step, which is half of it for a
-parabola, does not suffice."""
+"""Largest number of steps of the search inside a cell."""
+FLAT_RATE = 3e-3
+"""Change of the intrusion along the heading at which that search stops."""
+STEEPEST = 0.9999
+"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
 BESIDE_SHARE = 0.8
 """Share of the rise of the wheel: where the gap grows less, the ground is not a plane, and the rim
 may touch elsewhere."""
-STEEPEST = 0.9999
-"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
 RIM_STEPS = 2
 """Steps for the place where an edge crosses a rim."""
 RIM_BEND = 0.3
@@ -69,7 +68,8 @@ def look_everywhere(model, work, wheel, tops):
     if search.found:
         _take_peak(model.ground, search, contacts, wheel)
     for k in range(min(search.crossings, CROSSINGS)):
-        _search_rim(model, work, wheel, k)
+        if not _is_covered(search, k):
+            _search_rim(model, work, wheel, k)
     return status
 
 
@@ -89,17 +89,36 @@ def _take_peak(ground, search, contacts, wheel):
 
 
 @kernel
+def _is_covered(search, k):
+    """Return whether crossing k is as far below the last peak of its rim as on a plane."""
+    R, side = search.radius, (search.crossing_rim[k] + 1) // 2
+    s = search.crossing_s[k]
+    q = np.sqrt(max(R * R - s * s, 0.0))
+    # From a contact on a plane the gap grows with the rise of the wheel.
+    rise = R - (s * search.peak_s[side] + q * search.peak_q[side]) / R
+    return search.peak[side] - search.crossing[k] >= BESIDE_SHARE * rise
+
+
+@kernel
 def _search_rim(model, work, wheel, k):
     """Search a rim from crossing k, and take what is found if it is nearer."""
     contacts, search, samples = work.contacts, work.cells, model.samples
-    s = search.crossing_s[k] / search.radius
-    across = search.crossing_rim[k] * samples.half_width
+    rim, s = search.crossing_rim[k], search.crossing_s[k] / search.radius
+    across = rim * samples.half_width
     turn = s, np.sqrt(max(1.0 - s * s, 0.0))
     gap, turn, slope = search_circle(model, work, (wheel, across), turn)
+    _note_peak(search, (rim + 1) // 2, gap, turn)
     if gap < contacts.gap[wheel] - NOTICED * samples.radius:
         keep_contact(contacts, wheel)
         contacts.across[wheel] = across
         take_circle(contacts, wheel, (gap, turn, slope))
+
+
+@kernel
+def _note_peak(search, side, gap, turn):
+    """Note the peak of a rim, 0 right or 1 left, by its gap [m] and angle (sine, cosine)."""
+    search.peak[side] = -gap / search.cell
+    search.peak_s[side], search.peak_q[side] = turn[0] * search.radius, turn[1] * search.radius
 
 
 @kernel
@@ -120,11 +139,12 @@ def _begin(model, work, wheel):
     search.tangent = search.sine / search.cosine
     search.half_width = samples.half_width * scale * search.cosine
     search.found = search.crossings = 0
-    contacts, search.rim = work.contacts, 0
+    contacts = work.contacts
+    search.peak[0] = search.peak[1] = -np.inf
     if not contacts.inside[wheel] and contacts.across[wheel] != 0.0:
-        search.rim = 1 if contacts.across[wheel] > 0.0 else -1
-    search.contact_s = contacts.sine[wheel] * search.radius
-    search.contact_q = contacts.cosine[wheel] * search.radius
+        turn = contacts.sine[wheel], contacts.cosine[wheel]
+        side = 1 if contacts.across[wheel] > 0.0 else 0
+        _note_peak(search, side, contacts.gap[wheel], turn)
     search.best = -work.contacts.gap[wheel] * scale + NOTICED * search.radius
 
 
@@ -324,13 +344,9 @@ def _cross_rim(search, start, along):
     bend = RIM_BEND * R * R / max(q, 0.2 * R) ** 3 * inverse
     if not intrusion + bend > search.best:
         return
-    if side == search.rim:
-        # From a contact on a plane the gap grows with the rise of the wheel.
-        lift = R - (at * search.contact_s + q * search.contact_q) / R
-        if search.best - intrusion >= BESIDE_SHARE * lift:
-            return
     k = search.crossings % CROSSINGS
     search.crossing_s[k], search.crossing_rim[k] = at, int64(side)
+    search.crossing[k] = intrusion
     search.crossings += 1
 
 
@@ -372,70 +388,63 @@ def _look_into_cells(ground, search, i, j):
         a = elevation_of(ground, row, column)
         b = (elevation_of(ground, row, column + 1) - a) * scale
         c = (elevation_of(ground, row + 1, column) - a) * scale
-        _look_into_cell(search, (row, column), ((a - search.z) * scale, b, c, twist))
-
-
-@kernel
-def _climb_line(search, line, rise):
-    """Return the place, 0 to 1, of the largest intrusion along a line across a cell.
-
-    `line` is s at its start and the change of s along it, `rise` the change of the intrusion
-    without the wheel's dome.
-    """
-    s, along_s = line
-    if not abs(along_s) > LEVEL:
-        return 1.0 if rise > 0.0 else 0.0
-    steep = rise * search.cosine / along_s
-    place = (search.radius * steep / np.sqrt(1.0 + steep * steep) - s) / along_s
-    return min(max(place, 0.0), 1.0)
+        dx, dy = column - search.x, row - search.y
+        corner = dx * ex + dy * ey, dy * ex - dx * ey
+        _look_into_cell(search, corner, ((a - search.z) * scale, b, c, twist))
 
 
 @kernel
 def _look_into_cell(search, corner, shape):
-    """Find the stationary intrusion in a cell by Newton's method, and keep it if it is inside.
+    """Search a twisted cell for a peak of the intrusion in its inside.
+
+    Across the wheel the ground bends down, so for each s there is a best t in closed form. What is
+    left is a quadratic function of s plus the wheel's dome; its largest value is bracketed.
 
     Args:
         search: CELL_SEARCH.
-        corner: Row and column of the cell.
-        shape: (a, b, c, d) of the ground a + b u + c v + d u v above the wheel's centre.
+        corner: s and t of the cell's corner [cells].
+        shape: (a, b, c, d) of the ground a + b u + c v + d u v above the wheel's centre, u and v
+            along the cell's sides from the corner [cells].
     """
-    ex, ey, R = search.ahead_x, search.ahead_y, search.radius
-    tangent, inverse = search.tangent, 1.0 / search.cosine
+    ex, ey, R, inverse = search.ahead_x, search.ahead_y, search.radius, 1.0 / search.cosine
+    s0, t0 = corner
     a, b, c, d = shape
-    dx, dy = corner[1] - search.x, corner[0] - search.y
-    u, v = 0.5, 0.5
-    for step in range(INTERIOR_STEPS):
-        s = (dx + u) * ex + (dy + v) * ey
-        s = min(max(s, -STEEPEST * R), STEEPEST * R)
-        q = np.sqrt(R * R - s * s)
-        fall = s / q * inverse
-        bend = R * R / (q * q * q) * inverse
-        slope_u = b + d * v - fall * ex + tangent * ey
-        slope_v = c + d * u - fall * ey - tangent * ex
-        cross = d - bend * ex * ey
-        determinant = bend * bend * ex * ex * ey * ey - cross * cross
-        if not determinant > 0.0:
-            if abs(s) < GENTLE * R:
-                return
-            # Across the cell the ground is straight in both directions: climb along each in turn.
-            u = _climb_line(search, (dx * ex + (dy + v) * ey, ex), b + d * v + tangent * ey)
-            v = _climb_line(search, ((dx + u) * ex + dy * ey, ey), c + d * u - tangent * ex)
-            continue
-        step_u = (-bend * ey * ey * slope_u - cross * slope_v) / determinant
-        step_v = (-bend * ex * ex * slope_v - cross * slope_u) / determinant
-        if step == 0 and abs(s) < GENTLE * R:
-            t = (dy + v) * ex - (dx + u) * ey
-            here = a + b * u + c * v + d * u * v - tangent * t + q * inverse
-            if here - PROMISE * (slope_u * step_u + slope_v * step_v) < search.best:
-                return
-        u = min(max(u - step_u, -0.5), 1.5)
-        v = min(max(v - step_v, -0.5), 1.5)
-        if abs(step_u) + abs(step_v) < 1e-4:
+    sag, skew = d * ex * ey, d * (ex * ex - ey * ey)
+    slope_s, slope_t = b * ex + c * ey, c * ex - b * ey - search.tangent
+    half = 0.5 / sag
+    bend = 0.5 * d * d * half
+    rise = slope_s + slope_t * skew * half
+    base = a - search.tangent * t0 + 0.5 * slope_t * slope_t * half
+    level = base - rise * s0 + bend * s0 * s0
+    rise -= 2.0 * bend * s0
+    # The wheel bends at least as at its bottom.
+    rest = inverse / R - 2.0 * bend
+    if rest > 0.0 and level + R * inverse + 0.5 * rise * rise / rest <= search.best:
+        return
+    low = max(s0 + min(ex, 0.0) + min(ey, 0.0), -STEEPEST * R)
+    high = min(s0 + max(ex, 0.0) + max(ey, 0.0), STEEPEST * R)
+    if not low < high:
+        return
+    low_rate = rise + 2.0 * bend * low - low / np.sqrt(R * R - low * low) * inverse
+    high_rate = rise + 2.0 * bend * high - high / np.sqrt(R * R - high * high) * inverse
+    if not (low_rate > 0.0 and high_rate < 0.0):
+        return
+    s = low
+    for _ in range(INTERIOR_STEPS):
+        s = (low * high_rate - high * low_rate) / (high_rate - low_rate)
+        s = min(max(s, low + 0.05 * (high - low)), high - 0.05 * (high - low))
+        rate = rise + 2.0 * bend * s - s / np.sqrt(R * R - s * s) * inverse
+        if abs(rate) < FLAT_RATE:
             break
+        if rate > 0.0:
+            low, low_rate = s, rate
+        else:
+            high, high_rate = s, rate
+    along = s - s0
+    aside = (slope_t + skew * along) * half
+    u, v = ex * along - ey * aside, ey * along + ex * aside
     if not (u >= 0.0 and u <= 1.0 and v >= 0.0 and v <= 1.0):
         return
-    s, t = (dx + u) * ex + (dy + v) * ey, (dy + v) * ex - (dx + u) * ey
-    if not abs(s) < R:
-        return
-    if _is_below(search, s, t):
-        _take(search, s, t, a + b * u + c * v + d * u * v - tangent * t)
+    if _is_below(search, s, t0 + aside):
+        ground = a + b * u + c * v + d * u * v
+        _take(search, s, t0 + aside, ground - search.tangent * (t0 + aside))

@@ -68,10 +68,11 @@ CELL_SEARCH = record_type(
     ("best", float),  # largest intrusion of the ground so far [cells]
     ("best_s", float),  # its place along the heading [cells]
     ("best_t", float),  # its place to the left [cells]
-    ("rim", np.int64),  # rim of the contact so far: -1 right, 1 left, 0 between them
-    ("contact_s", float),  # its place along the heading [cells]
-    ("contact_q", float),  # its distance from the axle, in the wheel's up direction [cells]
+    ("peak", float, (2,)),  # largest intrusion found on the right and left rim [cells]
+    ("peak_s", float, (2,)),  # its place along the heading [cells]
+    ("peak_q", float, (2,)),  # its distance from the axle, in the wheel's up direction [cells]
     ("crossings", np.int64),  # number of places where edges cross a rim that may come near
+    ("crossing", float, (CROSSINGS,)),  # intrusions there [cells]
     ("crossing_s", float, (CROSSINGS,)),  # their places along the heading [cells]
     ("crossing_rim", np.int64, (CROSSINGS,)),  # -1 on the right rim, 1 on the left one
     ("found", np.int64),  # 1 if the search has found it
