@@ -16,7 +16,7 @@ from rover_physics.contact.contact_record import CROSSINGS, NOTICED
 from rover_physics.contact.tracking import keep_contact, take_circle
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
-from rover_physics.terrain.ground import elevation_of, is_cell_on_map
+from rover_physics.terrain.ground import elevation_of, is_cell_on_map, look_up_cell
 
 BEND = 0.19
 """Intrusion of an edge above that of its ends, over the curvature of the wheel: 1/8 for a parabola,
@@ -27,6 +27,10 @@ INTERIOR_STEPS = 8
 """Largest number of steps of the search inside a cell."""
 FLAT_RATE = 3e-3
 """Change of the intrusion along the heading at which that search stops."""
+LEAST_CHANGE = 0.3
+"""Lower bound of the derivative in that search, where the ground bends almost as the wheel does."""
+BEYOND = 0.3
+"""Distance from a crossing at which the search of a rim begins [cells]."""
 STEEPEST = 0.9999
 """Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
 BESIDE_SHARE = 0.8
@@ -34,8 +38,8 @@ BESIDE_SHARE = 0.8
 may touch elsewhere."""
 RIM_STEPS = 2
 """Steps for the place where an edge crosses a rim."""
-RIM_BEND = 0.3
-"""The same for a rim, which may cross a twisted cell along its diagonal."""
+RIM_BEND = 0.14
+"""The same for a rim that crosses a cell in parallel to a side; aslant it is up to two times as long."""
 GENTLE = 0.8
 """Share of the radius up to which the wheel is close to a parabola."""
 MIN_COSINE = 0.3
@@ -68,7 +72,7 @@ def look_everywhere(model, work, wheel, tops):
     if search.found:
         _take_peak(model.ground, search, contacts, wheel)
     for k in range(min(search.crossings, CROSSINGS)):
-        if not _is_covered(search, k):
+        if not _is_covered(model.ground, search, k):
             _search_rim(model, work, wheel, k)
     return status
 
@@ -89,25 +93,51 @@ def _take_peak(ground, search, contacts, wheel):
 
 
 @kernel
-def _is_covered(search, k):
-    """Return whether crossing k is as far below the last peak of its rim as on a plane."""
-    R, side = search.radius, (search.crossing_rim[k] + 1) // 2
-    s = search.crossing_s[k]
-    q = np.sqrt(max(R * R - s * s, 0.0))
+def _is_covered(ground, search, k):
+    """Return whether a rim is as far from the ground beyond crossing k as over a plane.
+
+    Beyond means: as seen from the last peak of this rim.
+    """
+    R, rim = search.radius, search.crossing_rim[k]
+    side = (rim + 1) // 2
+    if search.peak[side] == -np.inf:
+        return False
+    s = _step_beyond(search, k)
+    q = np.sqrt(R * R - s * s)
+    t = rim * search.half_width + search.sine * q
+    x = search.x + s * search.ahead_x - t * search.ahead_y
+    y = search.y + s * search.ahead_y + t * search.ahead_x
+    height = (look_up_cell(ground, x, y)[0] - search.z) / search.cell
+    intrusion = height + q / search.cosine - search.tangent * t
     # From a contact on a plane the gap grows with the rise of the wheel.
     rise = R - (s * search.peak_s[side] + q * search.peak_q[side]) / R
-    return search.peak[side] - search.crossing[k] >= BESIDE_SHARE * rise
+    return search.peak[side] - intrusion >= BESIDE_SHARE * rise
+
+
+@kernel
+def _step_beyond(search, k):
+    """Return s a little beyond crossing k, as seen from the last peak of its rim."""
+    side = (search.crossing_rim[k] + 1) // 2
+    s = search.crossing_s[k]
+    if search.peak[side] > -np.inf:
+        s += BEYOND if s > search.peak_s[side] else -BEYOND
+    most = STEEPEST * search.radius
+    return min(max(s, -most), most)
 
 
 @kernel
 def _search_rim(model, work, wheel, k):
-    """Search a rim from crossing k, and take what is found if it is nearer."""
+    """Search a rim from crossing k, and take what is found if it is nearer.
+
+    The search begins in the cell beyond the crossing, as seen from the last peak of this rim.
+    """
     contacts, search, samples = work.contacts, work.cells, model.samples
-    rim, s = search.crossing_rim[k], search.crossing_s[k] / search.radius
+    rim = search.crossing_rim[k]
+    side, s = (rim + 1) // 2, _step_beyond(search, k) / search.radius
     across = rim * samples.half_width
     turn = s, np.sqrt(max(1.0 - s * s, 0.0))
     gap, turn, slope = search_circle(model, work, (wheel, across), turn)
-    _note_peak(search, (rim + 1) // 2, gap, turn)
+    _note_peak(search, side, gap, turn)
     if gap < contacts.gap[wheel] - NOTICED * samples.radius:
         keep_contact(contacts, wheel)
         contacts.across[wheel] = across
@@ -259,7 +289,9 @@ def _look_around(ground, search, vertex, there):
     steep, curl, gentle_s = q < MIN_COSINE * R, 0.5 * inverse / R, GENTLE * R
     lean = search.sine * q
     is_below = abs(t - lean) <= search.half_width
-    rim_bend = 0.0 if steep else RIM_BEND * R * R / (q * q * q) * inverse
+    rim_bend = 0.0
+    if not steep:
+        rim_bend = RIM_BEND * R * R / (q * q * q * max(ex * ex, ey * ey)) * inverse
     fall = 0.0 if steep else s / q * inverse
     here = elevation_of(ground, i, j)
     for edge in range(4):
@@ -341,12 +373,12 @@ def _cross_rim(search, start, along):
         return
     at = s + share * along_s
     intrusion = base + share * rise + q * inverse
-    bend = RIM_BEND * R * R / max(q, 0.2 * R) ** 3 * inverse
+    side_on = max(search.ahead_x * search.ahead_x, search.ahead_y * search.ahead_y)
+    bend = RIM_BEND * R * R / (max(q, 0.2 * R) ** 3 * side_on) * inverse
     if not intrusion + bend > search.best:
         return
     k = search.crossings % CROSSINGS
     search.crossing_s[k], search.crossing_rim[k] = at, int64(side)
-    search.crossing[k] = intrusion
     search.crossings += 1
 
 
@@ -425,21 +457,50 @@ def _look_into_cell(search, corner, shape):
     high = min(s0 + max(ex, 0.0) + max(ey, 0.0), STEEPEST * R)
     if not low < high:
         return
+    if rest > 0.0:
+        _look_on_line(search, (s0, t0), shape, (rise, bend, low, high))
+        return
+    # Only where the wheel bends more than the ground there are peaks: on its steep sides.
+    q = (0.5 * R * R * inverse / bend) ** (1.0 / 3.0)
+    inflection = np.sqrt(max(R * R - q * q, 0.0))
+    if high > inflection:
+        _look_on_line(search, (s0, t0), shape, (rise, bend, max(low, inflection), high))
+    if low < -inflection:
+        _look_on_line(search, (s0, t0), shape, (rise, bend, low, min(high, -inflection)))
+
+
+@kernel
+def _look_on_line(search, corner, shape, line):
+    """Find the peak on the line of best t in a cell, and keep it if it is in the cell.
+
+    Args:
+        search: CELL_SEARCH.
+        corner, shape: As for `_look_into_cell`.
+        line: Slope and half the second derivative of the ground along the line, and the least and
+            largest s.
+    """
+    ex, ey, R, inverse = search.ahead_x, search.ahead_y, search.radius, 1.0 / search.cosine
+    s0, t0 = corner
+    a, b, c, d = shape
+    rise, bend, low, high = line
     low_rate = rise + 2.0 * bend * low - low / np.sqrt(R * R - low * low) * inverse
     high_rate = rise + 2.0 * bend * high - high / np.sqrt(R * R - high * high) * inverse
     if not (low_rate > 0.0 and high_rate < 0.0):
         return
-    s = low
+    # The unknown is the wheel's slope s / q, which makes steep contacts well-behaved.
+    gain, cosine = 2.0 * bend * search.cosine, search.cosine
+    s = 0.5 * (low + high)
+    slope = s / np.sqrt(R * R - s * s)
     for _ in range(INTERIOR_STEPS):
-        s = (low * high_rate - high * low_rate) / (high_rate - low_rate)
-        s = min(max(s, low + 0.05 * (high - low)), high - 0.05 * (high - low))
-        rate = rise + 2.0 * bend * s - s / np.sqrt(R * R - s * s) * inverse
-        if abs(rate) < FLAT_RATE:
+        inverse_length = 1.0 / np.sqrt(1.0 + slope * slope)
+        s = R * slope * inverse_length
+        error = rise * cosine + gain * s - slope
+        if abs(error) < FLAT_RATE:
             break
-        if rate > 0.0:
-            low, low_rate = s, rate
-        else:
-            high, high_rate = s, rate
+        change = 1.0 - gain * R * inverse_length * inverse_length * inverse_length
+        slope += error / max(change, LEAST_CHANGE)
+    half = 0.5 / (d * ex * ey)
+    slope_t, skew = c * ex - b * ey - search.tangent, d * (ex * ex - ey * ey)
     along = s - s0
     aside = (slope_t + skew * along) * half
     u, v = ex * along - ey * aside, ey * along + ex * aside
