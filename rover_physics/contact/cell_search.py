@@ -30,7 +30,7 @@ FLAT_RATE = 3e-3
 LEAST_CHANGE = 0.3
 """Lower bound of the derivative in that search, where the ground bends almost as the wheel does."""
 BEYOND = 0.3
-"""Distance from a crossing at which the search of a rim begins [cells]."""
+"""Distance from a crossing, to both sides, at which a rim is looked at [cells]."""
 STEEPEST = 0.9999
 """Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
 BESIDE_SHARE = 0.8
@@ -72,8 +72,10 @@ def look_everywhere(model, work, wheel, tops):
     if search.found:
         _take_peak(model.ground, search, contacts, wheel)
     for k in range(min(search.crossings, CROSSINGS)):
-        if not _is_covered(model.ground, search, k):
-            _search_rim(model, work, wheel, k)
+        for beyond in (-BEYOND, BEYOND):
+            rim, s = search.crossing_rim[k], search.crossing_s[k] + beyond
+            if abs(s) < search.radius and not _is_covered(model.ground, search, rim, s):
+                _search_rim(model, work, wheel, rim, s)
     return status
 
 
@@ -93,16 +95,14 @@ def _take_peak(ground, search, contacts, wheel):
 
 
 @kernel
-def _is_covered(ground, search, k):
-    """Return whether a rim is as far from the ground beyond crossing k as over a plane.
+def _is_covered(ground, search, rim, s):
+    """Return whether a rim, -1 right or 1 left, is as far from the ground as over a plane.
 
-    Beyond means: as seen from the last peak of this rim.
+    `s` is a place on the rim; the plane is that of the last peak of this rim.
     """
-    R, rim = search.radius, search.crossing_rim[k]
-    side = (rim + 1) // 2
+    R, side = search.radius, (rim + 1) // 2
     if search.peak[side] == -np.inf:
         return False
-    s = _step_beyond(search, k)
     q = np.sqrt(R * R - s * s)
     t = rim * search.half_width + search.sine * q
     x = search.x + s * search.ahead_x - t * search.ahead_y
@@ -115,29 +115,16 @@ def _is_covered(ground, search, k):
 
 
 @kernel
-def _step_beyond(search, k):
-    """Return s a little beyond crossing k, as seen from the last peak of its rim."""
-    side = (search.crossing_rim[k] + 1) // 2
-    s = search.crossing_s[k]
-    if search.peak[side] > -np.inf:
-        s += BEYOND if s > search.peak_s[side] else -BEYOND
-    most = STEEPEST * search.radius
-    return min(max(s, -most), most)
-
-
-@kernel
-def _search_rim(model, work, wheel, k):
-    """Search a rim from crossing k, and take what is found if it is nearer.
-
-    The search begins in the cell beyond the crossing, as seen from the last peak of this rim.
-    """
+def _search_rim(model, work, wheel, rim, s):
+    """Search a rim, -1 right or 1 left, from s [cells], and take what is found if it is nearer."""
     contacts, search, samples = work.contacts, work.cells, model.samples
-    rim = search.crossing_rim[k]
-    side, s = (rim + 1) // 2, _step_beyond(search, k) / search.radius
     across = rim * samples.half_width
-    turn = s, np.sqrt(max(1.0 - s * s, 0.0))
+    sine = s / search.radius
+    turn = sine, np.sqrt(1.0 - sine * sine)
     gap, turn, slope = search_circle(model, work, (wheel, across), turn)
-    _note_peak(search, side, gap, turn)
+    if not gap < np.inf:
+        return
+    _note_peak(search, (rim + 1) // 2, gap, turn)
     if gap < contacts.gap[wheel] - NOTICED * samples.radius:
         keep_contact(contacts, wheel)
         contacts.across[wheel] = across
