@@ -29,12 +29,12 @@ def scan_rims(model, work, wheel, scope):
         The worst ContactStatus of the samples.
     """
     if scope == SearchScope.COARSE:
-        return _scan_carefully(model, work, wheel, scope)
+        return scan_carefully(model, work, wheel, scope)
     rear, front = find_tops(model, work, wheel)
     if rear < np.inf and front < np.inf:
         _scan_inside(model, work, wheel, (rear, front))
         return ContactStatus.IN_CONTACT
-    return _scan_carefully(model, work, wheel, scope)
+    return scan_carefully(model, work, wheel, scope)
 
 
 @kernel
@@ -121,7 +121,7 @@ def _scan_inside(model, work, wheel, tops):
 
 
 @kernel
-def _scan_carefully(model, work, wheel, scope):
+def scan_carefully(model, work, wheel, scope):
     """Sample circles that may be over unknown ground or off the map.
 
     COARSE visits every other sample of the middle circle. Returns the worst ContactStatus.

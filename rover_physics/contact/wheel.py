@@ -12,7 +12,7 @@ import numpy as np
 from rover_physics.contact.cell_search import look_everywhere
 from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import SearchScope
-from rover_physics.contact.rim_scan import find_tops, scan_rims
+from rover_physics.contact.rim_scan import find_tops, scan_carefully, scan_rims
 from rover_physics.contact.tracking import follow_contact, keep_contact, look_at_kept
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
@@ -68,7 +68,10 @@ def find_contact(model, work, wheel, scope):
     if scope == SearchScope.NEAR:
         look_at_kept(model, work, wheel)
     if scope == SearchScope.FULL or scope == SearchScope.WHOLE:
-        below = look_everywhere(model, work, wheel, find_tops(model, work, wheel))
+        rear, front = find_tops(model, work, wheel)
+        if scope == SearchScope.FULL and not (rear < np.inf and front < np.inf):
+            status = scan_carefully(model, work, wheel, scope)
+        below = look_everywhere(model, work, wheel, (rear, front))
         if status == ContactStatus.IN_CONTACT:
             status = below
     _write_contact(work, wheel, model.samples)
