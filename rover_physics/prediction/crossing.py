@@ -35,7 +35,8 @@ CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""
 
-Evaluate = Callable[[np.ndarray, np.ndarray], Any]
+Evaluate = Callable[..., Any]
+"""Function of poses (k, 3) and `held` (default NONE_HELD) that returns RESULTs (k,)."""
 _NUMBERS = RESULT.itemsize // 8
 
 
@@ -70,6 +71,10 @@ class Crossings:
             select_results(self.results, rows),
         )
 
+    def in_order(self) -> "Crossings":
+        """Return the poses in path order; a stretch that ends at a waypoint comes before the next."""
+        return self.select(np.lexsort((self.waypoint, self.place)))
+
     def between(self, first: int, end: int) -> "Crossings":
         """Return the poses from waypoint `first` up to `end`; places count from `first`."""
         rows = slice(*np.searchsorted(self.place, (first, end)))
@@ -80,6 +85,10 @@ class Crossings:
             self.poses[rows],
             self.results[rows],
         )
+
+    def moved(self, waypoints: int) -> "Crossings":
+        """Return the poses as they lie behind that many further waypoints."""
+        return replace(self, place=self.place + waypoints, waypoint=self.waypoint + waypoints)
 
     def reversed(self, waypoints: int) -> "Crossings":
         """Return the poses as they lie on the reversed path of that many waypoints."""
@@ -207,8 +216,7 @@ def find_crossings(
     found = known.rows
     kept = (found.results["status"] != PoseStatus.NOT_SETTLED) | found.climbing
     kept[: len(rows)] = False
-    between = np.flatnonzero(kept)
-    return found.select(between[np.argsort(found.place[between], kind="stable")])
+    return found.select(np.flatnonzero(kept)).in_order()
 
 
 _NOTHING = Crossings(

@@ -170,3 +170,37 @@ def add_up(poses, results, speed, sums):
 @exact_kernel
 def _power(result):
     return result.power if result.status == PoseStatus.SETTLED else 0.0
+
+
+@exact_kernel
+def find_remaining_jumps(path, between, limits, ends):
+    """Find the neighbours on a path whose contacts jump at one place; return their number.
+
+    Args:
+        path: PathPoints of the waypoints.
+        between: PathPoints of the poses in between, no wheel held.
+        limits: JumpLimits.
+        ends: (>= n + m, 2) pairs of neighbours, written: waypoint i as i, pose j in between as
+            n + j.
+    """
+    n, m = path.place.size, between.place.size
+    count, last, j = 0, 0, 0
+    for k in range(1, n + m):
+        waypoint = k - j
+        if j < m and between.place[j] < waypoint:
+            here = n + j
+            j += 1
+        else:
+            here = waypoint
+        a = path.results[last] if last < n else between.results[last - n]
+        b = path.results[here] if here < n else between.results[here - n]
+        if _jumps(a, b, limits.height):
+            apart = 0.0
+            if last < n and here < n:
+                apart = _distance(path.poses[last], path.poses[here])
+            searched = last >= n or here >= n or apart > 0.0
+            if searched and apart <= limits.max_spacing:
+                ends[count, 0], ends[count, 1] = last, here
+                count += 1
+        last = here
+    return count

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.crossing import Crossings, find_crossings
+from rover_physics.prediction.crossing import Crossings, Evaluate, find_crossings
 from rover_physics.prediction.drops import find_falls
 from rover_physics.prediction.evaluation import NONE_HELD, RESULT, effort, evaluate
 from rover_physics.prediction.packed_model import PackedModel, pack_model
@@ -69,42 +70,84 @@ def sweep_paths(
     Raises:
         PoseError, ModelError, SoilError: As `sweep_path`.
     """
+    return [swept.prediction for swept in sweep_in_full(rover, terrain, paths, options)]
+
+
+@dataclass(frozen=True, eq=False)
+class SweptPath:
+    """A prediction along a path with the results that it is made of."""
+
+    path: np.ndarray
+    """(k, 3) all poses of the path; the rest is about the first n of them."""
+    prediction: PathPrediction
+    """The prediction."""
+    results: Any
+    """(n,) RESULT of each waypoint."""
+    crossings: Crossings
+    """Poses between the waypoints."""
+
+    def cut(self, waypoints: int) -> "SweptPath":
+        """Return what is about the first waypoints."""
+        crossings = self.crossings.select(self.crossings.waypoint < waypoints)
+        prediction = self.prediction.cut(waypoints)
+        return SweptPath(self.path, prediction, self.results[:waypoints], crossings)
+
+
+@quiet
+def sweep_in_full(
+    rover: Rover, terrain: Terrain, paths: Sequence[ArrayLike], options: SweepOptions
+) -> list[SweptPath]:
+    """Sweep several paths and keep the results; arguments and errors as `sweep_paths`."""
     model = pack_model(rover, terrain, options)
-    return _sweep(rover, terrain, model, [check_poses(poses) for poses in paths])
+    if not paths:
+        return []
+    checked = [check_poses(poses) for poses in paths]
+    ends = np.cumsum([len(poses) for poses in checked])
+    poses, radius, evaluate_at = np.concatenate(checked), rover.wheel.radius, evaluator(model)
+    with limit_threads(effort(model.settings, len(poses))):  # set once, not per round
+        results = evaluate_at(poses)
+        crossings = find_crossings(
+            terrain, radius, poses, results, evaluate_at, direction_of(model), joined_paths(ends)
+        )
+    swept = []
+    for first, end in zip([0, *ends[:-1]], ends, strict=True):
+        check_interruption()
+        part = crossings.between(first, end) if len(paths) > 1 else crossings
+        swept.append(make_prediction(model, poses[first:end], results[first:end], part)[0])
+    return swept
 
 
-def _sweep(
-    rover: Rover, terrain: Terrain, model: PackedModel, paths: Sequence[np.ndarray]
-) -> list[PathPrediction]:
+def joined_paths(ends: np.ndarray) -> np.ndarray:
+    """Return (n - 1,) False where a path ends and the next begins.
+
+    `ends` (k,) are the numbers of waypoints up to the end of each path.
+    """
+    joined = np.ones(ends[-1] - 1, bool)
+    joined[ends[:-1] - 1] = False
+    return joined
+
+
+def evaluator(model: PackedModel) -> Evaluate:
+    """Return the function that evaluates a model at poses, as `find_crossings` takes it."""
+
     def evaluate_at(at: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
         with sweep_lock:
             return evaluate(model.records, at, held)
 
-    if not paths:
-        return []
-    ends = np.cumsum([len(poses) for poses in paths])
-    poses = np.concatenate(paths)
-    joined = np.ones(len(poses) - 1, bool)
-    joined[ends[:-1] - 1] = False
-    radius, direction = rover.wheel.radius, float(model.settings["direction"])
-    with limit_threads(effort(model.settings, len(poses))):  # set once, not per round
-        results = evaluate_at(poses)
-        crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
-    predictions = []
-    for first, end in zip([0, *ends[:-1]], ends, strict=True):
-        check_interruption()
-        part = crossings.between(first, end) if len(paths) > 1 else crossings
-        predictions.append(
-            _predict(model.settings, radius, poses[first:end], results[first:end], part)
-        )
-    return predictions
+    return evaluate_at
 
 
-def _predict(
-    settings: Any, radius: float, poses: np.ndarray, results: np.ndarray, crossings: Crossings
-) -> PathPrediction:
-    """Return the prediction of one path from its results and crossings."""
-    falls = find_falls(radius, poses, results, crossings, float(settings["direction"]))
+def direction_of(model: PackedModel) -> float:
+    """Return 1.0 if the rover drives forwards, -1.0 if backwards."""
+    return float(model.settings["direction"])
+
+
+def make_prediction(
+    model: PackedModel, poses: np.ndarray, results: Any, crossings: Crossings
+) -> tuple[SweptPath, int]:
+    """Return the prediction of one path from its results, and `Falls.decided`."""
+    settings, radius = model.settings, float(model.record.linkage.radius)
+    falls = find_falls(radius, poses, results, crossings, direction_of(model))
     between = _collect(
         crossings.poses,
         crossings.results,
@@ -114,7 +157,7 @@ def _predict(
         between=None,
         waypoint=crossings.waypoint,
     )
-    return _collect(
+    prediction = _collect(
         poses,
         results,
         settings,
@@ -123,6 +166,7 @@ def _predict(
         between=between,
         waypoint=np.arange(len(poses)),
     )
+    return SweptPath(poses, prediction, results, crossings), falls.decided
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:

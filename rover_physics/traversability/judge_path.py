@@ -10,7 +10,7 @@ from rover_physics.names import EQUAL
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_paths
+from rover_physics.prediction.sweep import sweep_in_full
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -115,11 +115,12 @@ def _judge_under_policy(
     """Judge several paths under the policy of the options."""
     check_sigmas(sigmas)
     judged = []
-    for prediction in sweep_paths(rover, terrain, paths, options):
+    for swept in sweep_in_full(rover, terrain, paths, options):
         check_interruption()
+        prediction = swept.prediction
         verdict = judge(rover, prediction)
         if verdict.code != "wheel_drop":
-            verdict = ask_for_ways_out(rover, terrain, prediction, verdict, options)
+            verdict = ask_for_ways_out(rover, terrain, swept, verdict, options)
         bounds = bound_path(rover, terrain, prediction, options, sigmas)
         if bounds is not None:
             verdict = judge_bounds(rover, prediction, bounds, verdict)
