@@ -1,5 +1,6 @@
 """Verdict on a prediction: whether each waypoint keeps the safety limits, and if not, why."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -163,11 +164,20 @@ def name_margin(verdict: Verdict, physical: Verdict, margin: float) -> Verdict:
         physical: The verdict on the same path without one.
         margin: The control margin.
     """
+    waypoints = [
+        i
+        for i, code in enumerate(verdict.codes)
+        if code and code not in MARGIN_CODES and not physical.codes[i]
+    ]
+    return name_margin_at(verdict, waypoints, margin)
+
+
+def name_margin_at(verdict: Verdict, waypoints: Sequence[int], margin: float) -> Verdict:
+    """Return a verdict that names the control margin as the reason of some waypoints' refusals."""
     codes, reasons = list(verdict.codes), list(verdict.reasons)
-    for i, code in enumerate(codes):
-        if code and code not in MARGIN_CODES and not physical.codes[i]:
-            codes[i] = "torque"
-            reasons[i] = f"no torques within their limit less control margin {margin:g}"
+    for i in waypoints:
+        codes[i] = "torque"
+        reasons[i] = f"no torques within their limit less control margin {margin:g}"
     return _with_refusals(verdict, codes, reasons)
 
 
