@@ -39,6 +39,9 @@ class Falls:
     """(n, 6) largest drop of each wheel at a waypoint or on the way to it [m]."""
     decided: int
     """Number of waypoints, from the first, whose falls no later pose of the path can change."""
+    restart: int
+    """Last of these waypoints from which the falls can be found without those before it; 0 if
+    there is none."""
 
 
 def find_falls(
@@ -82,16 +85,21 @@ def _find_falls(radius, direction, poses, results, between):
             _find_steep(angle[k], result.friction, steep[k])
         last = here
     first_open = _find_first_open(distance, radius, angle, steep)
+    flat = np.empty(n + m, np.bool_)
+    for k in range(n + m):
+        flat[k] = not np.any(steep[k])
     _keep_short_runs(distance, radius, steep)
     _extend_to_edges(steep, angle, distance, radius, turning)
     fallen, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
     _measure_drops(radius, height, steps, turning, fallen)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
-    decided = 0
+    decided, restart = 0, 0
     for k in range(n + m):
         i = order[k]
         if i < n and k < first_open:
             decided += 1
+            if flat[k] and not np.any(turning[k]) and not np.any(fallen[k] > 0.0):
+                restart = i
         owner = i if i < n else between.waypoint[i - n]
         for wheel in range(6):
             drops[owner, wheel] = max(drops[owner, wheel], fallen[k, wheel])
@@ -99,7 +107,7 @@ def _find_falls(radius, direction, poses, results, between):
                 at_waypoints[i, wheel] = steep[k, wheel]
             else:
                 at_between[i - n, wheel] = steep[k, wheel]
-    return at_waypoints, at_between, drops, decided
+    return at_waypoints, at_between, drops, decided, restart
 
 
 @exact_kernel

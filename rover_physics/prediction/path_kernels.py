@@ -141,17 +141,18 @@ def _jumps(here, there, height_jump):
 
 
 @exact_kernel
-def add_up(poses, results, speed, sums):
-    """Write distance [m], time [s] and energy [J] since the first waypoint into sums (3, n).
+def add_up(poses, results, speed, start, sums):
+    """Write distance [m], time [s] and energy [J] into sums (3, n); return those at the last pose.
 
     Args:
         poses: (n, 3) x, y [m] and yaw [rad].
         results: (n,) RESULT of each pose. Time and energy are NaN where it is not settled, and
             the climb between two poses counts only if both are settled.
         speed: Speed along the ground [m/s].
+        start: Distance, time and energy at the first pose.
         sums: (3, n), written.
     """
-    distance, time, energy = 0.0, 0.0, 0.0
+    distance, time, energy = start
     for i in range(results.size):
         settled = results[i].status == PoseStatus.SETTLED
         if i > 0:
@@ -165,6 +166,7 @@ def add_up(poses, results, speed, sums):
         sums[0, i] = distance
         sums[1, i] = time if settled else np.nan
         sums[2, i] = energy if settled else np.nan
+    return distance, time, energy
 
 
 @exact_kernel

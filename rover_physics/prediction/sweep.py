@@ -15,7 +15,7 @@ from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, Evaluate, find_crossings
-from rover_physics.prediction.drops import find_falls
+from rover_physics.prediction.drops import Falls, find_falls
 from rover_physics.prediction.evaluation import NONE_HELD, RESULT, effort, evaluate
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import add_up
@@ -26,6 +26,10 @@ from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
+
+Sums = tuple[float, float, float]
+"""Distance [m], time [s] and energy [J] since the start of a path."""
+NO_SUMS = (0.0, 0.0, 0.0)
 
 sweep_lock = threading.Lock()  # some of Numba's threading layers allow one caller only
 
@@ -143,9 +147,16 @@ def direction_of(model: PackedModel) -> float:
 
 
 def make_prediction(
-    model: PackedModel, poses: np.ndarray, results: Any, crossings: Crossings
-) -> tuple[SweptPath, int]:
-    """Return the prediction of one path from its results, and `Falls.decided`."""
+    model: PackedModel,
+    poses: np.ndarray,
+    results: Any,
+    crossings: Crossings,
+    start: Sums = NO_SUMS,
+) -> tuple[SweptPath, Falls]:
+    """Return the prediction of one path from its results, and its falls.
+
+    Distance, time and energy at the first pose are `start`.
+    """
     settings, radius = model.settings, float(model.record.linkage.radius)
     falls = find_falls(radius, poses, results, crossings, direction_of(model))
     between = _collect(
@@ -154,6 +165,7 @@ def make_prediction(
         settings,
         wheel_drop=np.zeros((len(crossings.poses), 6)),
         falling=falls.between,
+        start=NO_SUMS,
         between=None,
         waypoint=crossings.waypoint,
     )
@@ -163,10 +175,11 @@ def make_prediction(
         settings,
         wheel_drop=falls.drops,
         falling=falls.at_waypoints,
+        start=start,
         between=between,
         waypoint=np.arange(len(poses)),
     )
-    return SweptPath(poses, prediction, results, crossings), falls.decided
+    return SweptPath(poses, prediction, results, crossings), falls
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:
@@ -191,14 +204,22 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     return array
 
 
-def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any) -> PathPrediction:
+def sum_up(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> Sums:
+    """Return distance [m], time [s] and energy [J] at the last pose from those at the first."""
+    path, sums = (view_read_only(poses), view_read_only(results)), np.empty((3, len(poses)))
+    return add_up(*path, model.settings["speed"], start, sums)
+
+
+def _collect(
+    poses: np.ndarray, results: np.ndarray, settings: Any, start: Sums, **more: Any
+) -> PathPrediction:
     same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
     q, settled = results["q"], results["status"] == PoseStatus.SETTLED
     position = np.empty((len(poses), 3))
     position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
     position[~settled] = np.nan
     sums = np.empty((3, len(poses)))
-    add_up(view_read_only(poses), view_read_only(results), settings["speed"], sums)
+    add_up(view_read_only(poses), view_read_only(results), settings["speed"], start, sums)
     distance, time, energy = sums
     return PathPrediction(
         poses=poses,

@@ -152,7 +152,7 @@ class _StartedPath:
         complete = end == len(self.poses)
         if not (complete or self._suspicious or len(crossings.place)):
             return
-        swept, decided = make_prediction(
+        swept, falls = make_prediction(
             self._model, self.poses[:end], self.results[:end], crossings
         )
         drop = swept.prediction.wheel_drop.max(initial=0.0)
@@ -162,7 +162,7 @@ class _StartedPath:
         failure = verdict.first_failure
         if complete and failure < 0:
             self.judged = swept, verdict
-        elif 0 <= failure and (complete or failure < decided):
+        elif 0 <= failure and (complete or failure < falls.decided):
             swept = swept.cut(failure + 1)
             self.judged = swept, judge(self._rover, swept.prediction)
 

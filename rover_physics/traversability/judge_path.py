@@ -16,7 +16,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import judge_bounds
-from rover_physics.traversability.entrapment import ask_for_ways_out
+from rover_physics.traversability.entrapment import ask_for_ways_out, course_of
 from rover_physics.traversability.first_failure import sweep_until_failure
 from rover_physics.traversability.verdict import (
     MARGIN_CODES,
@@ -94,72 +94,77 @@ def judge_paths(
     refused = [k for k, (_, verdict) in enumerate(judged) if not verdict.traversable]
     if options.kept_margin == 0.0 or not refused:
         return judged
-    weigh = _weigh_first_failures if stop_at_failure else _weigh_margin
-    weighed = weigh([paths[k] for k in refused], [judged[k] for k in refused], options, judge_with)
-    for k, one in zip(refused, weighed, strict=True):
-        judged[k] = one
+    if stop_at_failure:
+        for k in refused:
+            judged[k] = _weigh_first_failure(paths[k], judged[k], options, judge_with)
+        return judged
+
+    def judge_others(rows: Sequence[int], others: SweepOptions) -> list[Verdict]:
+        return [found for _, found in judge_with([paths[refused[k]] for k in rows], others, False)]
+
+    weighed = weigh_margin([judged[k][1] for k in refused], options, judge_others)
+    for k, verdict in zip(refused, weighed, strict=True):
+        judged[k] = judged[k][0], verdict
     return judged
 
 
-def _weigh_margin(
-    paths: Sequence[ArrayLike], judged: Sequence[Judged], options: SweepOptions, judge_with: Judge
-) -> list[Judged]:
-    """Return refused paths without refusals of what equal torques pass, and name the margin.
+def weigh_margin(
+    verdicts: Sequence[Verdict],
+    options: SweepOptions,
+    judge_others: Callable[[Sequence[int], SweepOptions], list[Verdict]],
+) -> list[Verdict]:
+    """Return verdicts without refusals of what equal torques pass, and name the margin.
 
     A waypoint that breaks its limits only less the margin may be refused as a lifting wheel,
     because no torques were found; the reason is the margin nevertheless.
+
+    Args:
+        verdicts: The verdicts on refused paths.
+        options: The options they were judged with.
+        judge_others: Judges some of the paths, by their indices, with other options.
     """
-    equal = judge_with(paths, replace(options, policy=EQUAL), False)
-    weighed = [
-        (prediction, forgive(verdict, other))
-        for (prediction, verdict), (_, other) in zip(judged, equal, strict=True)
-    ]
+    equal = judge_others(range(len(verdicts)), replace(options, policy=EQUAL))
+    weighed = [forgive(one, other) for one, other in zip(verdicts, equal, strict=True)]
     named = {"", *MARGIN_CODES}
-    unnamed = [k for k, (_, verdict) in enumerate(weighed) if not set(verdict.codes) <= named]
-    without = replace(options, control_margin=0.0)
-    physical = judge_with([paths[k] for k in unnamed], without, False)
-    for k, (_, other) in zip(unnamed, physical, strict=True):
-        prediction, verdict = weighed[k]
-        weighed[k] = prediction, name_margin(verdict, other, options.control_margin)
-    return weighed
-
-
-def _weigh_first_failures(
-    paths: Sequence[ArrayLike], judged: Sequence[Judged], options: SweepOptions, judge_with: Judge
-) -> list[Judged]:
-    """Return refused paths as `_weigh_margin`, judged in full only where that is needed."""
-    equal = judge_with(paths, replace(options, policy=EQUAL), True)
-    weighed = []
-    for path, (prediction, verdict), (_, other) in zip(paths, judged, equal, strict=True):
-        first = _weigh_first_failure(path, verdict, other, options, judge_with)
-        if first is not None:
-            weighed.append((prediction, first))
-            continue
-        full = judge_with([path], options, False)
-        passes = full[0][1].traversable
-        weighed += full if passes else _weigh_margin([path], full, options, judge_with)
+    unnamed = [k for k, verdict in enumerate(weighed) if not set(verdict.codes) <= named]
+    physical = judge_others(unnamed, replace(options, control_margin=0.0)) if unnamed else []
+    for k, other in zip(unnamed, physical, strict=True):
+        weighed[k] = name_margin(weighed[k], other, options.control_margin)
     return weighed
 
 
 def _weigh_first_failure(
-    path: ArrayLike, verdict: Verdict, equal: Verdict, options: SweepOptions, judge_with: Judge
-) -> Verdict | None:
-    """Return the weighed verdict up to the first failure; None if the whole path is needed.
+    path: ArrayLike, judged: Judged, options: SweepOptions, judge_with: Judge
+) -> Judged:
+    """Return a refused path as `weigh_margin` would, from verdicts that end at the first failure.
 
-    It is not needed if the path fails at the same waypoint with equal torques and, unless the
-    reason names the margin already, not before it without margin.
+    They suffice if the path fails at the same waypoint with equal torques and, unless the reason
+    names the margin already, not before it without margin. Else the path is judged in full.
     """
-    at = verdict.first_failure
-    if equal.first_failure != at:
-        return None
-    if verdict.code in MARGIN_CODES:
-        return verdict
-    physical = judge_with([path], replace(options, control_margin=0.0), True)[0][1]
-    if physical.first_failure == at:
-        return verdict
-    if 0 <= physical.first_failure < at:
-        return None
-    return name_margin_at(verdict, [at], options.control_margin)
+    prediction, verdict = judged
+    at, kept = verdict.first_failure, options.control_margin
+    equal = judge_with([path], replace(options, policy=EQUAL), True)[0][1]
+    if equal.first_failure == at:
+        if verdict.code in MARGIN_CODES:
+            return judged
+        physical = judge_with([path], replace(options, control_margin=0.0), True)[0][1]
+        if physical.first_failure == at:
+            return judged
+        if not 0 <= physical.first_failure < at:
+            return prediction, name_margin_at(verdict, [at], kept)
+    return _judge_and_weigh(path, options, judge_with)
+
+
+def _judge_and_weigh(path: ArrayLike, options: SweepOptions, judge_with: Judge) -> Judged:
+    """Judge one path in full and weigh its margin."""
+    prediction, verdict = judge_with([path], options, False)[0]
+    if verdict.traversable:
+        return prediction, verdict
+
+    def judge_others(rows: Sequence[int], others: SweepOptions) -> list[Verdict]:
+        return [judge_with([path], others, False)[0][1] for _ in rows]
+
+    return prediction, weigh_margin([verdict], options, judge_others)[0]
 
 
 def _judge_under_policy(
@@ -180,7 +185,8 @@ def _judge_under_policy(
     for swept, verdict in swept_paths:
         check_interruption()
         if verdict.code != "wheel_drop":
-            verdict = ask_for_ways_out(rover, terrain, swept, verdict, options)
+            course = course_of(rover, terrain, swept, options)
+            verdict = ask_for_ways_out(rover, terrain, course, verdict, options)
         prediction = swept.prediction
         bounds = bound_path(rover, terrain, prediction, options, sigmas)
         if bounds is not None:

@@ -35,6 +35,19 @@ MARGIN_CODES = ("friction", "torque")
 """Codes of the limits that a control margin reduces; their reasons name it."""
 UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Codes of limits that do not count while a wheel rolls off an edge."""
+LOWEST = ("min_tip_over_ratio", "min_belly_clearance", "tip_over_ratio_bound", "belly_clearance_bound")
+"""Fields of a verdict that are the smallest value on the path."""
+LARGEST = (
+    "max_friction_utilisation",
+    "max_torque_saturation",
+    "max_tilt",
+    "max_wheel_drop",
+    "max_sinkage",
+    "friction_utilisation_bound",
+    "torque_saturation_bound",
+    "tilt_bound",
+)
+"""Fields of a verdict that are the largest value on the path."""
 _LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
 """Codes of limits that are lower bounds."""
 _PLACELESS = {
@@ -153,7 +166,7 @@ def forgive(verdict: Verdict, other: Verdict) -> Verdict:
     refused = [bool(code) for code in other.codes]
     codes = [code if keep else "" for code, keep in zip(verdict.codes, refused, strict=True)]
     reasons = [text if keep else "" for text, keep in zip(verdict.reasons, refused, strict=True)]
-    return _with_refusals(verdict, codes, reasons)
+    return with_refusals(verdict, codes, reasons)
 
 
 def name_margin(verdict: Verdict, physical: Verdict, margin: float) -> Verdict:
@@ -178,10 +191,12 @@ def name_margin_at(verdict: Verdict, waypoints: Sequence[int], margin: float) ->
     for i in waypoints:
         codes[i] = "torque"
         reasons[i] = f"no torques within their limit less control margin {margin:g}"
-    return _with_refusals(verdict, codes, reasons)
+    return with_refusals(verdict, codes, reasons)
 
 
-def _with_refusals(verdict: Verdict, codes: list[str], reasons: list[str]) -> Verdict:
+def with_refusals(
+    verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]
+) -> Verdict:
     """Return a verdict with other codes and reasons of its waypoints."""
     first = next((i for i, code in enumerate(codes) if code), -1)
     return replace(
