@@ -77,7 +77,7 @@ class NpzParts:
                 stream.close()
             with open(path, "wb", opener=open_without_waiting) as file:
                 late = _LateErrors(file)
-                with zipfile.ZipFile(late, "w") as archive:  # type: ignore[arg-type]
+                with zipfile.ZipFile(late, "w") as archive:  # type: ignore[call-overload]
                     for name, dtype in self._types.items():
                         archive.write(self._path_of(name), f"{name}.npy", method_for(dtype), 1)
                 late.raise_error()

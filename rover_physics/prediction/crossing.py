@@ -72,7 +72,7 @@ class Crossings:
         )
 
     def in_order(self) -> "Crossings":
-        """Return the poses in path order; a stretch that ends at a waypoint comes before the next."""
+        """Return the poses in path order; at a waypoint, the stretch that ends there is first."""
         return self.select(np.lexsort((self.waypoint, self.place)))
 
     def between(self, first: int, end: int) -> "Crossings":

@@ -129,7 +129,9 @@ def _find_first_open(distance, radius, angle, steep):
                 continue
             first = min(first, before + 1)
         k = before
-        while k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[before] - distance[k] <= radius:
+        while (
+            k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[before] - distance[k] <= radius
+        ):
             first = min(first, k)
             k -= 1
     return first

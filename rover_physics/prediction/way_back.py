@@ -34,8 +34,8 @@ def predict_way_back(
         waypoints: The waypoints of the way back, in the order of the way in.
 
     Returns:
-        The prediction, as a sweep over the reversed poses gives it apart from rounding. `power` and
-        `energy` are those of the way in.
+        The prediction, as a sweep over the reversed poses gives it, apart from rounding. `power`
+        and `energy` are those of the way in.
     """
     first, end = waypoints.start, waypoints.stop
     n = end - first

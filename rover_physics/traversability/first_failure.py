@@ -162,7 +162,7 @@ class _StartedPath:
         failure = verdict.first_failure
         if complete and failure < 0:
             self.judged = swept, verdict
-        elif 0 <= failure and (complete or failure < falls.decided):
+        elif failure >= 0 and (complete or failure < falls.decided):
             swept = swept.cut(failure + 1)
             self.judged = swept, judge(self._rover, swept.prediction)
 
@@ -171,7 +171,10 @@ def _limits_of(rover: Rover, model: PackedModel) -> SuspectLimits:
     limits, suspension = rover.limits, rover.suspension
     kept = 1.0 - float(model.settings.control_margin)
     return SuspectLimits(
-        *map(float, (*suspension.rocker_limits, *suspension.bogie_limits)),
+        least_rocker=float(suspension.rocker_limits[0]),
+        most_rocker=float(suspension.rocker_limits[1]),
+        least_bogie=float(suspension.bogie_limits[0]),
+        most_bogie=float(suspension.bogie_limits[1]),
         tilt=float(limits.tilt),
         tip_over_ratio=float(limits.tip_over_ratio),
         belly_clearance=float(limits.belly_clearance),
@@ -195,9 +198,7 @@ def _evaluate_block(model: PackedModel, paths: Sequence[_StartedPath], size: int
         path.evaluated, first = block.stop, end
 
 
-def _search_crossings(
-    terrain: Terrain, model: PackedModel, paths: Sequence[_StartedPath]
-) -> None:
+def _search_crossings(terrain: Terrain, model: PackedModel, paths: Sequence[_StartedPath]) -> None:
     """Search the crossings of the next stretches of all paths together."""
     stretches = [path.stretch() for path in paths]
     pairs = list(zip(paths, stretches, strict=True))
@@ -266,7 +267,7 @@ def _has_grip(result, limits):
 @exact_kernel
 def _may_fall(result, direction):
     """Return whether a contact is so far behind its wheel that the wheel may roll off an edge."""
+    steepest = 0.0
     for wheel in range(6):
-        if direction * result.contact_angle[wheel] < -MIN_ANGLE:
-            return True
-    return False
+        steepest = min(steepest, direction * result.contact_angle[wheel])
+    return steepest < -MIN_ANGLE

@@ -95,9 +95,7 @@ def find_torque_ranges(
         if result.status != PoseStatus.SETTLED or not _is_within(rover, model, result):
             continue
         feasible[i] = True
-        lowest[i], highest[i] = _find_extremes(
-            _describe_set(rover, model, work.balance, result)
-        )
+        lowest[i], highest[i] = _find_extremes(_describe_set(rover, model, work.balance, result))
     scale = model.record.linkage.radius * model.record.linkage.mass * model.record.linkage.gravity
     most = model.settings.allowed_torque  # Clarabel's tolerance is 1e-8
     lowest, highest = (np.clip(scale * ends, -most, most) for ends in (lowest, highest))

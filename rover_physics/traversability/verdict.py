@@ -35,7 +35,12 @@ MARGIN_CODES = ("friction", "torque")
 """Codes of the limits that a control margin reduces; their reasons name it."""
 UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Codes of limits that do not count while a wheel rolls off an edge."""
-LOWEST = ("min_tip_over_ratio", "min_belly_clearance", "tip_over_ratio_bound", "belly_clearance_bound")
+LOWEST = (
+    "min_tip_over_ratio",
+    "min_belly_clearance",
+    "tip_over_ratio_bound",
+    "belly_clearance_bound",
+)
 """Fields of a verdict that are the smallest value on the path."""
 LARGEST = (
     "max_friction_utilisation",
@@ -194,9 +199,7 @@ def name_margin_at(verdict: Verdict, waypoints: Sequence[int], margin: float) ->
     return with_refusals(verdict, codes, reasons)
 
 
-def with_refusals(
-    verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]
-) -> Verdict:
+def with_refusals(verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]) -> Verdict:
     """Return a verdict with other codes and reasons of its waypoints."""
     first = next((i for i, code in enumerate(codes) if code), -1)
     return replace(

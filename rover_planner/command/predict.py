@@ -132,9 +132,7 @@ def predict(
             found = None
             if classes:
                 progress("classify the waypoints")
-                found = classify_judged(
-                    model, ground, prediction, verdict, options, sigmas=sigmas
-                )
+                found = classify_judged(model, ground, prediction, verdict, options, sigmas=sigmas)
             write_prediction(
                 out, prediction, verdict, on_soil=on_soil, classes=found, ranges=find_ranges()
             )

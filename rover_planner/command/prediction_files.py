@@ -199,7 +199,9 @@ def write_prediction(
     arrays = _rows_of(prediction, on_soil)
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
     with _errors_of(path):
-        write_npz(path, arrays | _summary_of(verdict, prediction, classes, ranges), compressed=False)
+        write_npz(
+            path, arrays | _summary_of(verdict, prediction, classes, ranges), compressed=False
+        )
 
 
 @contextmanager

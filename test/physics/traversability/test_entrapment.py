@@ -185,7 +185,9 @@ def test_on_coulomb_ground_without_drops_nothing_more_is_swept(monkeypatch):
     for name in ("sweep_until_failure", "predict_way_back"):
         sweep = getattr(trap, name)
         monkeypatch.setattr(
-            trap, name, lambda *asked_for, sweep=sweep: asked.append(asked_for) or sweep(*asked_for)
+            trap,
+            name,
+            lambda *asked_for, sweep=sweep: asked.append(asked_for) or sweep(*asked_for),
         )
     assert verdict_in(CRATER, -5.0, 5.0).traversable
     assert verdict_in(edge(0.0), -2.0, 2.0, soil="dry_sand").traversable

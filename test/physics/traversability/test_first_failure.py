@@ -124,9 +124,7 @@ def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monk
         return call
 
     monkeypatch.setattr(first_failure, "evaluator", counting)
-    _, verdict = judge_path(
-        ROVER, replace(ground, elevation=unknown), poses, stop_at_failure=True
-    )
+    _, verdict = judge_path(ROVER, replace(ground, elevation=unknown), poses, stop_at_failure=True)
     assert verdict.first_failure == 0
     assert sum(evaluated) == first_failure.FIRST_BLOCK
 

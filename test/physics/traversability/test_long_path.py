@@ -104,7 +104,7 @@ def test_a_trap_at_the_end_of_a_long_path_is_found(monkeypatch):
     x, y = np.meshgrid(np.arange(-6.0, 6.001, 0.05), np.arange(-6.0, 6.001, 0.05))
     radius = np.hypot(x, y)
     bowl = Terrain(np.clip(radius - 1.5, 0.0, 1.0) * np.tan(0.35), 0.05, (-6.0, -6.0))
-    poses = line(0.0, 10.0)[: 250]
+    poses = line(0.0, 10.0)[:250]
     options = SweepOptions(soil="dry_sand")
     _, verdict = judge_path(ROVER, bowl, poses, options)
     _, found = judge_in_parts(bowl, poses, options)
