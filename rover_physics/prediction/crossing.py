@@ -121,6 +121,11 @@ def select_results(results: Any, rows: Any) -> Any:
     return _numbers(results)[rows].view(RESULT)[:, 0]
 
 
+def copy_results(results: Any, to: Any) -> None:
+    """Copy RESULTs (n,) into others."""
+    _numbers(to)[:] = _numbers(results)
+
+
 def join_results(parts: Sequence[Any]) -> Any:
     """Return the RESULTs of all parts, one after the other."""
     return np.concatenate([_numbers(part) for part in parts]).view(RESULT)[:, 0]

@@ -1,9 +1,10 @@
 """Sweeps of paths that end at the first failure: no pose is evaluated far beyond it.
 
-A path is swept in blocks, each twice as long as the one before. Rows that may break a limit are
-found by a kernel that errs on the safe side; only if there is one is the path so far judged.
+A path is swept in blocks, each longer than the one before. Rows that may break a limit are found
+by a kernel that errs on the safe side; only if there is one is the path so far judged.
 """
 
+import time
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -18,11 +19,12 @@ from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import (
     Crossings,
+    copy_results,
     find_crossings,
     join_crossings,
     join_results,
 )
-from rover_physics.prediction.drops import MIN_ANGLE
+from rover_physics.prediction.drops import MIN_ANGLE, find_falls
 from rover_physics.prediction.evaluation import effort, unwritten_results
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import (
@@ -41,6 +43,11 @@ from rover_physics.traversability.verdict import Verdict, judge
 
 FIRST_BLOCK = 32
 """Number of waypoints of a path that are evaluated first."""
+MIN_GROWTH, MAX_GROWTH = 2.0, 16.0
+"""Bounds of the length of a block over that of the block before."""
+BLOCK_TIME = 3e-3
+"""Time [s] that a block aims at, about ten times what a block costs beside its poses. What is
+found does not depend on the blocks."""
 
 
 class SuspectLimits(NamedTuple):
@@ -98,12 +105,14 @@ def sweep_until_failure(
     with limit_threads(effort(model.settings, sum(len(path.poses) for path in started))):
         while going:
             check_interruption()
+            began = time.perf_counter()
             _evaluate_block(model, going, block)
             _search_crossings(terrain, model, going)
             for path in going:
                 path.look_for_failure()
             going = [path for path in going if path.judged is None]
-            block *= 2
+            growth = BLOCK_TIME / max(time.perf_counter() - began, 1e-9)
+            block = round(block * min(max(growth, MIN_GROWTH), MAX_GROWTH))
     return [path.judged for path in started if path.judged is not None]
 
 
@@ -150,14 +159,15 @@ class _StartedPath:
         end, crossings = self.searched, join_crossings(self._crossings)
         self._crossings = [crossings]
         complete = end == len(self.poses)
-        if not (complete or self._suspicious or len(crossings.place)):
-            return
-        swept, falls = make_prediction(
-            self._model, self.poses[:end], self.results[:end], crossings
-        )
-        drop = swept.prediction.wheel_drop.max(initial=0.0)
-        if not (complete or self._suspicious or drop > self._rover.limits.wheel_drop):
-            return
+        here, results = self.poses[:end], self.results[:end]
+        if not (complete or self._suspicious):
+            if not len(crossings.place):
+                return
+            radius, direction = self._rover.wheel.radius, self._limits.direction
+            falls = find_falls(radius, here, results, crossings, direction)
+            if not falls.drops.max() > self._rover.limits.wheel_drop:
+                return
+        swept, falls = make_prediction(self._model, here, results, crossings)
         verdict = judge(self._rover, swept.prediction)
         failure = verdict.first_failure
         if complete and failure < 0:
@@ -194,7 +204,7 @@ def _evaluate_block(model: PackedModel, paths: Sequence[_StartedPath], size: int
     results, first = evaluator(model)(at), 0
     for path, block in zip(paths, blocks, strict=True):
         end = first + block.stop - block.start
-        path.results[block] = results[first:end]
+        copy_results(results[first:end], path.results[block])
         path.evaluated, first = block.stop, end
 
 
