@@ -39,7 +39,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.verdict import Verdict, find_first_failure, judge
 
 FIRST_BLOCK = 32
 """Number of waypoints of a path that are evaluated first."""
@@ -168,10 +168,9 @@ class _StartedPath:
             if not falls.drops.max() > self._rover.limits.wheel_drop:
                 return
         swept, falls = make_prediction(self._model, here, results, crossings)
-        verdict = judge(self._rover, swept.prediction)
-        failure = verdict.first_failure
+        failure = find_first_failure(self._rover, swept.prediction)
         if complete and failure < 0:
-            self.judged = swept, verdict
+            self.judged = swept, judge(self._rover, swept.prediction)
         elif failure >= 0 and (complete or failure < falls.decided):
             swept = swept.cut(failure + 1)
             self.judged = swept, judge(self._rover, swept.prediction)

@@ -161,6 +161,22 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
     )
 
 
+def find_first_failure(rover: Rover, prediction: PathPrediction) -> int:
+    """Return the first failure that `judge` finds, -1 if there is none, without the reasons."""
+    first = len(prediction.poses)
+    for part in (prediction, prediction.between):
+        if part is None or not len(part.poses):
+            continue
+        broken = part.status != PoseStatus.SETTLED
+        needed = _where_forces_count(part)
+        for check in check_limits(rover, part):
+            if check.breaks:
+                counts = needed if check.code in UNNEEDED_IN_A_FALL else True
+                broken = broken | (check.broken() & part.settled & counts)
+        first = min(first, int(part.waypoint[broken].min(initial=first)))
+    return first if first < len(prediction.poses) else -1
+
+
 def forgive(verdict: Verdict, other: Verdict) -> Verdict:
     """Return a verdict without its refusals of waypoints that another verdict does not refuse.
 
