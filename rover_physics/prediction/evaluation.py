@@ -103,12 +103,12 @@ WORK = record_type(
 
 def new_results(n: int) -> Any:
     """Return RESULTs (n,), all NaN with status 0."""
-    results = _unwritten_results(n)
+    results = unwritten_results(n)
     _clear(results)
     return results
 
 
-def _unwritten_results(n: int) -> Any:
+def unwritten_results(n: int) -> Any:
     """Return RESULTs (n,) of any content: the system provides their memory when it is written."""
     return np.empty((n, RESULT.itemsize // 8)).view(RESULT)[:, 0]
 
@@ -139,7 +139,7 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
         held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
             those that rest on the ground; (0, 6, 2) if none climbs.
     """
-    results = _unwritten_results(len(poses))
+    results = unwritten_results(len(poses))
     with limit_threads(effort(model["settings"][0], len(poses))) as threads:
         works = new_works(threads, len(poses))
         for part in slices(len(poses)):
