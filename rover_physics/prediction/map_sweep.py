@@ -9,14 +9,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.arrays import SingleFloats
-from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import freeze_fields
-from rover_physics.numerics.threads import limit_threads
+from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import effort, evaluate_pose, new_works, set_pose
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses, sweep_lock
@@ -127,13 +126,15 @@ def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pos
     n = len(poses)
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
     with sweep_lock, limit_threads(effort(model.settings, n)) as threads:
-        score_all(model.records, poses, new_works(threads, n), status, numbers)
+        works = new_works(threads, n)
+        sweep = model.records, poses, works, status, numbers
+        run_chunks(score_all, sweep, len(works), threads)
     return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
 
 
-@sweep_kernel
-def score_all(models, poses, works, status, numbers):
-    """Score the poses, one chunk per work space, in parallel.
+@kernel
+def score_all(models, poses, works, status, numbers, first, end):
+    """Score the poses of some chunks, one chunk per work space.
 
     Args:
         models: (1,) MODEL.
@@ -141,9 +142,11 @@ def score_all(models, poses, works, status, numbers):
         works: (chunks,) WORK.
         status: (n,) PoseStatus, written.
         numbers: (NUMBERS, n) scores in the order of `PoseScores`, written.
+        first: The first chunk.
+        end: The chunk after the last one.
     """
     n, chunks = poses.shape[0], works.size
-    for chunk in prange(chunks):
+    for chunk in range(first, end):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk])
             evaluate_pose(models[0], works[chunk], works[chunk].result)
