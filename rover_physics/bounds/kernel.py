@@ -110,7 +110,7 @@ def find_bounds(
     uncertain = shared_array_of(_pack_uncertain(model, ground))
     with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
-            sweep = uncertain, poses[part], nominal[part], works, bounds[part]
+            sweep = uncertain, (poses[part], nominal[part]), works, bounds[part]
             run_chunks(bound_poses, sweep, len(works), threads)
     return bounds
 
@@ -126,20 +126,19 @@ def _pack_uncertain(model: PackedModel, ground: UncertainGround) -> Any:
 
 
 @kernel
-def bound_poses(uncertains, poses, nominal, works, bounds, first, end):
+def bound_poses(uncertains, places, works, bounds, part):
     """Bound the poses of some chunks, one chunk per work space.
 
     Args:
         uncertains: (1,) UNCERTAIN.
-        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
-        nominal: (n,) NOMINAL.
+        places: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame, and (n,) NOMINAL.
         works: (chunks,) BOUNDS_WORK.
         bounds: (n,) BOUNDS, written.
-        first: The first chunk.
-        end: The chunk after the last one.
+        part: The first chunk and the one after the last.
     """
-    n, chunks = poses.shape[0], works.size
-    for chunk in range(first, end):
+    (poses, nominal), chunks = places, works.size
+    n = poses.shape[0]
+    for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk].rover)
             bounds[i].status = bound_pose(uncertains[0], nominal[i], works[chunk], bounds[i])

@@ -30,17 +30,17 @@ def run_chunks(sweep: Callable[..., Any], inputs: tuple, chunks: int, threads: i
     """Run the chunks of a sweep, each once.
 
     Args:
-        sweep: Kernel of a sweep. Its last two arguments are the first chunk and the end.
+        sweep: Kernel of a sweep. Its last argument is the first chunk and the one after the last.
         inputs: Its other arguments.
         chunks: Number of chunks.
         threads: Number of threads. They take one chunk after another, as poses cost differently.
     """
     if threads == 1 or chunks == 1:
-        sweep(*inputs, 0, chunks)
+        sweep(*inputs, (0, chunks))
         return
     pool = ThreadPoolExecutor(min(threads, chunks))
     try:
-        for done in [pool.submit(sweep, *inputs, k, k + 1) for k in range(chunks)]:
+        for done in [pool.submit(sweep, *inputs, (k, k + 1)) for k in range(chunks)]:
             done.result()
     finally:
         # An interrupted sweep ends with the chunks at work: they write into its arrays.

@@ -143,7 +143,7 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
         works = new_works(threads, len(poses))
         for part in slices(len(poses)):
             _clear(results[part])
-            sweep = model, poses[part], held[part], works, results[part]
+            sweep = model, (poses[part], held[part]), works, results[part]
             run_chunks(evaluate_poses, sweep, len(works), threads)
     return results
 
@@ -160,20 +160,19 @@ def effort(settings, poses: int) -> int:
 
 
 @kernel
-def evaluate_poses(models, poses, held, works, results, first, end):
+def evaluate_poses(models, places, works, results, part):
     """Evaluate the poses of some chunks into `results`, one chunk per work space.
 
     Args:
         models: (1,) MODEL.
-        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
-        held: As for `evaluate`.
+        places: `poses` and `held` of `evaluate`.
         works: (chunks,) WORK.
         results: (n,) RESULT, written.
-        first: The first chunk.
-        end: The chunk after the last one.
+        part: The first chunk and the one after the last.
     """
-    n, chunks = poses.shape[0], works.size
-    for chunk in range(first, end):
+    (poses, held), chunks = places, works.size
+    n = poses.shape[0]
+    for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk])
             hold_wheels(held, i, works[chunk].contacts)

@@ -127,26 +127,25 @@ def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pos
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
     with sweep_lock, limit_threads(effort(model.settings, n)) as threads:
         works = new_works(threads, n)
-        sweep = model.records, poses, works, status, numbers
+        sweep = model.records, poses, works, (status, numbers)
         run_chunks(score_all, sweep, len(works), threads)
     return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
 
 
 @kernel
-def score_all(models, poses, works, status, numbers, first, end):
+def score_all(models, poses, works, scores, part):
     """Score the poses of some chunks, one chunk per work space.
 
     Args:
         models: (1,) MODEL.
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         works: (chunks,) WORK.
-        status: (n,) PoseStatus, written.
-        numbers: (NUMBERS, n) scores in the order of `PoseScores`, written.
-        first: The first chunk.
-        end: The chunk after the last one.
+        scores: (n,) PoseStatus, and (NUMBERS, n) numbers in the order of `PoseScores`, written.
+        part: The first chunk and the one after the last.
     """
-    n, chunks = poses.shape[0], works.size
-    for chunk in range(first, end):
+    (status, numbers), chunks = scores, works.size
+    n = poses.shape[0]
+    for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk])
             evaluate_pose(models[0], works[chunk], works[chunk].result)
