@@ -79,7 +79,7 @@ class _PartCompiler(Compiler):
 
 
 class Kernel(CPUDispatcher):
-    """A compiled function, called from Python or as part of another kernel."""
+    """A compiled function, called from Python or as part of another kernel, but not of itself."""
 
     def __init__(self, function: Callable, options: dict[str, Any]):
         """Compile nothing yet; `options` are those of `numba.njit`."""
