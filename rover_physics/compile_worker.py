@@ -1,4 +1,4 @@
-"""The process that compiles kernels: `python -m rover_physics.compile_worker NICENESS FUNCTION...`.
+"""The process that compiles kernels: `-m rover_physics.compile_worker NICENESS FUNCTION...`.
 
 It calls functions, each named MODULE:NAME, writes the index of each when it begins, and ends when
 its standard input closes, which happens when the process that started it ends.

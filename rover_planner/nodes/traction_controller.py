@@ -29,6 +29,7 @@ from rover_physics.names import WHEEL_COUNT
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.traction_inputs import TractionInputs
 from rover_planner.nodes.traction_topics import TractionTopics, latched_qos
+from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
@@ -54,7 +55,6 @@ from rover_planner.traction.supervisor import (
 )
 from rover_planner.traction.traction_service import TractionService
 from rover_planner.traction.watchdog import Watchdog
-from rover_planner.warm_up import TRACTION, update_traction
 
 NODE_NAME = "traction_controller"
 DIAGNOSTICS_PERIOD = 1.0

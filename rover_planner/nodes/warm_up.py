@@ -1,4 +1,4 @@
-"""The kernels of the nodes beyond those of rover_physics, and all kernels in groups."""
+"""The kernels of the nodes beyond those of rover_physics, and the groups of all kernels."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from rover_planner.planning.candidates import generate_candidates
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
-CANDIDATES = (Step("candidate paths", "rover_planner.warm_up:plan_candidates"),)
+CANDIDATES = (Step("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
 """All that candidates of a question need."""
-TRACTION = (Step("traction controller", "rover_planner.warm_up:control_traction"),)
+TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
 """All that updates of the traction controller need."""
 GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES))
 """All kernels; groups have hardly any in common."""
