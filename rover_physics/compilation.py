@@ -1,6 +1,6 @@
 """Compiles kernels in processes of their own and loads what they have saved on disk.
 
-A compilation holds Python's interpreter lock for seconds and keeps some 200 MB. In another
+A compilation holds Python's interpreter lock for seconds and takes some 400 MB. In another
 process it holds nobody up, and several processes use several cores. Where nothing can be saved,
 kernels compile in the process that needs them.
 """

@@ -10,15 +10,12 @@ import os
 import sys
 import threading
 
-THRESHOLDS = 20_000, 50, 100
-"""Thresholds of Python's garbage collector: by default it takes a seventh of a compilation."""
-
 
 def main(niceness: str, *functions: str) -> None:
     """Call functions one after another."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     os.nice(int(niceness))
-    gc.set_threshold(*THRESHOLDS)
+    gc.disable()  # it would take a seventh of the time and save 120 MB of 420
     for index, function in enumerate(functions):
         print(index, flush=True)
         module, name = function.split(":")
