@@ -82,7 +82,9 @@ def test_a_late_subscriber_gets_the_state(ros, rover, controller):
     from benchmarks.driven_rover import DrivenRover
 
     late = ros.spin(DrivenRover(ros.context))
-    wait_until(lambda: late.state == "driving" and late.brakes[-1:] == [False], "the latched state")
+    wait_until(
+        lambda: late.state == "driving" and late.brakes[-1:] == [False], "the latched state"
+    )
 
 
 def test_a_stall_ends_the_push_and_is_reported(rover, start_controller):
