@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numba import prange
 
 from rover_physics.contact.clearance import belly_clearance
 from rover_physics.contact.contact_record import CONTACTS
@@ -19,9 +18,9 @@ from rover_physics.forces.torques import (
     take_equal_torques,
 )
 from rover_physics.numerics.interruption import slices
-from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
-from rover_physics.numerics.threads import limit_threads
+from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
 from rover_physics.status import PoseStatus, TorquePolicy
 from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
@@ -144,7 +143,8 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
         works = new_works(threads, len(poses))
         for part in slices(len(poses)):
             _clear(results[part])
-            evaluate_poses(model, poses[part], held[part], works, results[part])
+            sweep = model, (poses[part], held[part]), works, results[part]
+            run_chunks(evaluate_poses, sweep, len(works), threads)
     return results
 
 
@@ -159,19 +159,20 @@ def effort(settings, poses: int) -> int:
     return poses * (1 if settings["policy"] == TorquePolicy.EQUAL else OPTIMAL_EFFORT)
 
 
-@sweep_kernel
-def evaluate_poses(models, poses, held, works, results):
-    """Evaluate the poses into `results`, one chunk per work space, in parallel.
+@kernel
+def evaluate_poses(models, places, works, results, part):
+    """Evaluate the poses of some chunks into `results`, one chunk per work space.
 
     Args:
-        models: (1,) MODEL; Numba passes records to threads only as arrays.
-        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
-        held: As for `evaluate`.
+        models: (1,) MODEL.
+        places: `poses` and `held` of `evaluate`.
         works: (chunks,) WORK.
         results: (n,) RESULT, written.
+        part: The first chunk and the one after the last.
     """
-    n, chunks = poses.shape[0], works.size
-    for chunk in prange(chunks):
+    (poses, held), chunks = places, works.size
+    n = poses.shape[0]
+    for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk])
             hold_wheels(held, i, works[chunk].contacts)
