@@ -5,6 +5,7 @@ controller and server run in separate processes. The controller's diagnostics re
 time of its updates (estimate, build, solve, publish) and the number of missed cycles.
 """
 
+import os
 import threading
 import time
 from dataclasses import fields
@@ -126,11 +127,12 @@ def measure_together() -> list[Figure]:
         processes.start_server(ground, candidate_count=1)
         planner.ask(SERVER, START, GOAL)
         processes.start_rover(ground, RATE, START, PRIORITY)
-        before = reader.wait_for_updates(int(RATE))
+        before, stolen = reader.wait_for_updates(int(RATE)), stolen_time()
         stop = threading.Event()
         asked = threading.Thread(target=_ask_on, args=(planner, stop))
         asked.start()
         time.sleep(TOGETHER_TIME)
+        stolen = stolen_time() - stolen
         stop.set()
         asked.join()
         after = reader.wait_for_updates(int(before["updates"] + 0.9 * RATE * TOGETHER_TIME))
@@ -143,9 +145,17 @@ def measure_together() -> list[Figure]:
                repeats=updates),
         Figure("traction", "cycles missed at 100 Hz in a minute, a server busy beside it", missed,
                "", 0.0, repeats=updates),
+        Figure("traction", "time that the host of a virtual machine took from it meanwhile",
+               1e3 * stolen, "ms"),
         Figure("traction", "updates that fell back to equal torques", after["fallbacks"], "",
                repeats=updates),
     ]  # fmt: skip
+
+
+def stolen_time() -> float:
+    """Return the time for which the host let the processors of this machine wait [s]."""
+    with open("/proc/stat", encoding="ascii") as file:
+        return int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")
 
 
 def _ask_on(planner: Planner, stop: threading.Event) -> None:

@@ -153,13 +153,18 @@ def find_margin(case: Case, margins: Sequence[float] = MARGINS) -> float:
     return kept
 
 
-def draw_promised(pool: ProcessPoolExecutor, count: int, seed: int) -> dict[Case, float]:
-    """Return `count` cases that are passable with traction control, with their margins."""
+def draw_promised(
+    pool: ProcessPoolExecutor, count: int, seed: int, least: float = 0.0
+) -> dict[Case, float]:
+    """Return `count` cases that are passable with traction control, with their margins.
+
+    `least` is the least margin of a case.
+    """
     rng, margins = np.random.default_rng(seed), {}
     while True:
         cases = [draw_case(rng) for _ in range(BATCH)]
         for case, margin in zip(cases, pool.map(find_margin, cases), strict=True):
-            if margin >= 0.0:
+            if margin >= least:
                 margins[case] = margin
             if len(margins) == count:
                 return margins
@@ -248,13 +253,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=int, default=100, help="number of drives")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--least", type=float, default=0.0, help="least control margin")
     parser.add_argument("--workers", type=int, default=2, help="number of processes")
     parser.add_argument("--sources", nargs="+", choices=(MAP, MOTION), default=[MAP, MOTION])
     parser.add_argument("--out", type=Path, default=Path("bench_output/control_margin.json"))
     arguments = parser.parse_args()
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(arguments.workers, mp_context=context) as pool:
-        margins = draw_promised(pool, arguments.count, arguments.seed)
+        margins = draw_promised(pool, arguments.count, arguments.seed, arguments.least)
         drives = drive_all(pool, list(margins), arguments.sources)
     console = Console()
     console.print(show_failures(margins, drives))

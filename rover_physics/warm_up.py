@@ -1,24 +1,82 @@
-"""Compilation of the kernels of predictions, verdicts and bounds, or their loading from disk."""
+"""The kernels of predictions, verdicts and bounds: compiled, or loaded from disk.
 
+`python -m rover_physics.warm_up` compiles all of them.
+"""
+
+import os
 from dataclasses import replace
 
 import numpy as np
 
+from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
+from rover_physics.compilation import Step, compile_groups
+from rover_physics.prediction.evaluation import evaluate
+from rover_physics.prediction.map_sweep import score_poses
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.ground import pack_ground
 from rover_physics.traversability.judge_path import judge_path
+
+EXACT = (
+    Step("rover", "rover_physics.warm_up:pack_rover"),
+    Step("poses", "rover_physics.warm_up:evaluate_poses"),
+    Step("paths", "rover_physics.warm_up:judge_paths"),
+)
+"""All that a question needs on a map whose heights are exact."""
+UNCERTAIN = (Step("uncertain heights", "rover_physics.warm_up:bound_poses"),)
+"""All that a question needs besides on other maps."""
+SCORES = (Step("map scores", "rover_physics.warm_up:score_map"),)
+"""All that scores of single poses need."""
 
 
 def warm_up() -> None:
-    """Compile the kernels, or load them from disk, by judging short paths up a step."""
-    rover, layer = load_rover("lsr1"), np.ones((64, 64))
-    step = Terrain(np.where(np.arange(64) > 40, 0.1, 0.0) * layer, 0.05, (-1.6, -1.6))
+    """Load the kernels of questions, or compile them in this process."""
+    for step in (*EXACT, *UNCERTAIN):
+        step.run()
+
+
+def pack_rover() -> None:
+    """Pack a rover and find when it tips over."""
+    pack_model(*_rover_and_step())
+
+
+def evaluate_poses() -> None:
+    """Evaluate the model at a pose."""
+    evaluate(pack_model(*_rover_and_step()).records, np.zeros((1, 3)))
+
+
+def judge_paths() -> None:
+    """Judge short paths up and down a step, on hard ground and on soil."""
+    rover, step = _rover_and_step()
     poses = np.zeros((8, 3))
     poses[:, 0] = np.linspace(-0.12, 0.02, 8)
-    judge_path(rover, replace(step, friction=layer, elevation_std=layer), poses)
+    judge_path(rover, step, poses)
     judge_path(rover, step, poses, SweepOptions(soil="mars_simulant"))
+    down = SweepOptions(backward=True)
+    judge_path(rover, step, poses[::-1], down, stop_at_failure=True)
+
+
+def bound_poses() -> None:
+    """Bound a pose on a map with uncertain heights; it need not settle."""
+    rover, step = _rover_and_step()
+    ground = UncertainGround(*(pack_ground(step),) * 3)
+    find_bounds(pack_model(rover, step), ground, np.zeros((1, 3)), np.zeros(1, NOMINAL))
+
+
+def score_map() -> None:
+    """Score a pose."""
+    score_poses(*_rover_and_step(), np.zeros((1, 3)))
+
+
+def _rover_and_step() -> tuple[Rover, Terrain]:
+    """Return a rover and a map with a step and all layers that questions look at."""
+    layer = np.ones((64, 64))
+    step = Terrain(np.where(np.arange(64) > 40, 0.1, 0.0) * layer, 0.05, (-1.6, -1.6))
+    return load_rover("lsr1"), replace(step, friction=layer)
 
 
 if __name__ == "__main__":
-    warm_up()
+    compile_groups([EXACT, UNCERTAIN, SCORES], print, os.cpu_count() or 1)

@@ -11,6 +11,7 @@ from rover_planner.command.reach import reach
 from rover_planner.command.study import study
 from rover_planner.command.terrain import terrain
 from rover_planner.command.view import view
+from rover_planner.command.warm_up import warm_up
 from rover_planner.shell.run_app import run_app
 from rover_planner.shell.run_program import run_program
 
@@ -31,6 +32,7 @@ app.command()(view)
 app.command()(terrain)
 app.command()(demo)
 app.command()(figure4)
+app.command()(warm_up)
 
 
 def main(words: Sequence[str] | None = None) -> int:

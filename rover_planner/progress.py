@@ -1,5 +1,6 @@
 """Progress on the terminal while a command runs: spinner, bar and steps."""
 
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -48,6 +49,28 @@ def show_bar(name: str, total: int) -> Iterator[Callable[[], None]]:
     with Progress(*columns, console=console) as progress:
         task = progress.add_task(name, total=total)
         yield lambda: progress.advance(task)
+
+
+@contextmanager
+def show_names(total: int) -> Iterator[Callable[[str], None]]:
+    """Show a progress bar with the name of the current piece of work; lines if no terminal.
+
+    Yields:
+        A function to call with the name of each of at most `total` pieces when it begins.
+    """
+    console = Console(stderr=True, highlight=False)
+    if not console.is_terminal:
+        yield lambda name: console.print(f"compiling {name}")
+        return
+    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console) as progress:
+        task, begun = progress.add_task("load kernels", total=total), itertools.count()
+
+        def begin(name: str) -> None:
+            progress.update(task, description=f"compile {name}", completed=next(begun))
+
+        yield begin
+        progress.update(task, description="kernels", completed=total)
 
 
 class Steps:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import prange
 
 from rover_physics.bounds.belly import bound_clearance
 from rover_physics.bounds.contact import CONTACT_BOUNDS, bound_contacts
@@ -21,9 +20,9 @@ from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.stability import CORNERS
 from rover_physics.numerics.interruption import slices
-from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type, shared_array_of
-from rover_physics.numerics.threads import limit_threads
+from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.rover.linkage import place
@@ -109,9 +108,10 @@ def find_bounds(
     for name in ("held_height", "held_angle"):
         works["rover"]["contacts"][name] = np.nan
     uncertain = shared_array_of(_pack_uncertain(model, ground))
-    with limit_threads(BOUNDS_EFFORT * len(poses)):
+    with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
-            bound_poses(uncertain, poses[part], nominal[part], works, bounds[part])
+            sweep = uncertain, (poses[part], nominal[part]), works, bounds[part]
+            run_chunks(bound_poses, sweep, len(works), threads)
     return bounds
 
 
@@ -125,19 +125,20 @@ def _pack_uncertain(model: PackedModel, ground: UncertainGround) -> Any:
     return uncertain
 
 
-@sweep_kernel
-def bound_poses(uncertains, poses, nominal, works, bounds):
-    """Bound the poses, one chunk per work space, in parallel.
+@kernel
+def bound_poses(uncertains, places, works, bounds, part):
+    """Bound the poses of some chunks, one chunk per work space.
 
     Args:
         uncertains: (1,) UNCERTAIN.
-        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
-        nominal: (n,) NOMINAL.
+        places: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame, and (n,) NOMINAL.
         works: (chunks,) BOUNDS_WORK.
         bounds: (n,) BOUNDS, written.
+        part: The first chunk and the one after the last.
     """
-    n, chunks = poses.shape[0], works.size
-    for chunk in prange(chunks):
+    (poses, nominal), chunks = places, works.size
+    n = poses.shape[0]
+    for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk].rover)
             bounds[i].status = bound_pose(uncertains[0], nominal[i], works[chunk], bounds[i])

@@ -34,6 +34,8 @@ CHUNK = 1 << 18
 """Bytes that are unpacked at once."""
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compression methods of numpy.savez and numpy.savez_compressed."""
+FORCE_ZIP64 = 1 << 30
+"""Size of an array [bytes] from which its entry is written as one that may exceed 2 GiB."""
 ENCRYPTED = 0x1
 """Flag of an encrypted member."""
 MAX_CODE_POINT = 0x10FFFF
@@ -166,16 +168,34 @@ def open_npz(path: str | Path) -> Iterator[NpzReader]:
         yield NpzReader(file)
 
 
-def write_npz(path: str | Path, arrays: Mapping[str, Any]) -> None:
-    """Write arrays to a compressed .npz file; the name is not extended.
+def write_npz(path: str | Path, arrays: Mapping[str, Any], *, compressed: bool = True) -> None:
+    """Write arrays to an .npz file; the name is not extended.
+
+    Args:
+        path: The file; an existing one is overwritten.
+        arrays: The arrays by name.
+        compressed: Whether to compress numbers; texts are compressed in any case. It takes ten
+            times as long and saves one half to three quarters of the size of predictions.
 
     Raises:
         RoverFileError: It cannot be written; the text does not name the file.
     """
     # In memory first: zipfile prints an error of its own when the disk is full.
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, value in arrays.items():
+            array = np.asanyarray(value)
+            method = zipfile.ZIP_DEFLATED if compressed else method_for(array.dtype)
+            entry = zipfile.ZipInfo(f"{name}.npy")
+            entry.compress_type = method
+            with archive.open(entry, "w", force_zip64=array.nbytes > FORCE_ZIP64) as stream:
+                np.lib.format.write_array(stream, array, allow_pickle=False)
     write_file(path, buffer.getvalue())
+
+
+def method_for(dtype: np.dtype[Any]) -> int:
+    """Return the compression method for an array: texts are long and much alike."""
+    return zipfile.ZIP_DEFLATED if dtype.kind == "U" else zipfile.ZIP_STORED
 
 
 class _BoundedReader:

@@ -4,6 +4,9 @@ import contextlib
 import functools
 import hashlib
 import inspect
+import tempfile
+from collections.abc import Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,7 +15,25 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 PACKAGE = Path(__file__).parents[1]
 """Folder of the package whose kernels are cached."""
 
+KERNEL_SIZE = 1 << 20
+"""Space that a large kernel takes on disk [bytes]."""
+
 _notes: list[str] = []
+_only_load: ContextVar[bool] = ContextVar("only_load", default=False)
+
+
+class KernelMissingError(Exception):
+    """A kernel is not on disk, in a block that only loads kernels."""
+
+
+@contextlib.contextmanager
+def loading_only() -> Iterator[None]:
+    """Raise KernelMissingError in this block and thread where a kernel would be compiled."""
+    token = _only_load.set(True)
+    try:
+        yield
+    finally:
+        _only_load.reset(token)
 
 
 def kernel_cache_note() -> str:
@@ -74,13 +95,20 @@ class KernelCache(FunctionCache):
         )
 
     def load_overload(self, sig, target_context):
-        """Return the compiled function, None if there is none or its file is damaged."""
+        """Return the compiled function, None if there is none or its file is damaged.
+
+        Raises:
+            KernelMissingError: There is none, and kernels are only to be loaded.
+        """
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
         except Exception:
             with contextlib.suppress(OSError):
                 self.flush()  # a damaged index would also prevent that the kernel is saved
-            return None
+            found = None
+        if found is None and _only_load.get():
+            raise KernelMissingError(self._name)
+        return found
 
     def save_overload(self, sig, data):
         """Save the compiled function, or note why it cannot be saved."""
@@ -90,6 +118,21 @@ class KernelCache(FunctionCache):
             _notes.append(f"{error.strerror or error}: {self.cache_path}")
         except Exception as error:
             _notes.append(f"{type(error).__name__}: {error}")
+
+
+def kernel_folder() -> Path:
+    """Return the folder of the kernels of this file; those of other files are beside it."""
+    return Path(_KernelCacheImpl(digest_sources).locator.get_cache_path())
+
+
+def can_save_kernels() -> bool:
+    """Return whether there is a folder for kernels that can be written, with space for one."""
+    try:
+        with tempfile.TemporaryFile(dir=kernel_folder()) as file:
+            file.write(bytes(KERNEL_SIZE))
+    except OSError:
+        return False
+    return True
 
 
 def drop_stale_kernels() -> None:

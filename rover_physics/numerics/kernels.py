@@ -1,20 +1,8 @@
 """Decorators that compile kernels with Numba and keep them on disk."""
 
-import numba
+from rover_physics.numerics.kernel_cache import drop_stale_kernels
+from rover_physics.numerics.kernel_compiler import Kernel
 
-from rover_physics.numerics.kernel_cache import KernelCache, drop_stale_kernels
-
-LOOPS_ONLY = {
-    "prange": True,
-    "comprehension": False,
-    "reduction": False,
-    "inplace_binop": False,
-    "setitem": False,
-    "numpy": False,
-    "stencil": False,
-    "fusion": False,
-}
-"""What Numba may make parallel: `prange` loops only. The other analyses double compile time."""
 COMPILE_OPTIONS = {
     "nogil": True,
     "error_model": "numpy",
@@ -42,17 +30,9 @@ def allocating_kernel(function):
     return _compile(function)
 
 
-def sweep_kernel(function):
-    """Compile a function with a parallel `prange` loop, such as over poses."""
-    return _compile(function, parallel=LOOPS_ONLY)
-
-
 def _compile(function, **options):
     """Return a compiled function with a cache that does without a disk."""
-    compiled = numba.njit(**{**COMPILE_OPTIONS, **options})(function)
-    # What njit(cache=True) does, but its own cache raises where it cannot write.
-    compiled._cache = KernelCache(function)
-    return compiled
+    return Kernel(function, {**COMPILE_OPTIONS, **options})
 
 
 drop_stale_kernels()

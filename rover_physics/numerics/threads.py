@@ -1,7 +1,9 @@
 """Number of threads of a sweep; for a short sweep, waking threads takes longer than the sweep."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import Any
 
 import numba
 
@@ -22,3 +24,24 @@ def limit_threads(poses: int) -> Iterator[int]:
         yield used
     finally:
         numba.set_num_threads(allowed)
+
+
+def run_chunks(sweep: Callable[..., Any], inputs: tuple, chunks: int, threads: int) -> None:
+    """Run the chunks of a sweep, each once.
+
+    Args:
+        sweep: Kernel of a sweep. Its last argument is the first chunk and the one after the last.
+        inputs: Its other arguments.
+        chunks: Number of chunks.
+        threads: Number of threads. They take one chunk after another, as poses cost differently.
+    """
+    if threads == 1 or chunks == 1:
+        sweep(*inputs, (0, chunks))
+        return
+    pool = ThreadPoolExecutor(min(threads, chunks))
+    try:
+        for done in [pool.submit(sweep, *inputs, (k, k + 1)) for k in range(chunks)]:
+            done.result()
+    finally:
+        # An interrupted sweep ends with the chunks at work: they write into its arrays.
+        pool.shutdown(cancel_futures=True)

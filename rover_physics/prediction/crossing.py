@@ -7,8 +7,8 @@ wheel climbs a face: it is held at heights from foot to edge, with the face as i
 evaluated at each. Downwards, the wheel drops.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,9 @@ CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""
 
-Evaluate = Callable[[np.ndarray, np.ndarray], Any]
+Evaluate = Callable[..., Any]
+"""Function of poses (k, 3) and `held` (default NONE_HELD) that returns RESULTs (k,)."""
+_NUMBERS = RESULT.itemsize // 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +48,8 @@ class Crossings:
     """(m,) place along the path in waypoints: 2.5 is halfway between waypoints 2 and 3."""
     waypoint: np.ndarray
     """(m,) index of the waypoint that follows."""
+    climbing: np.ndarray
+    """(m,) True where a wheel is held at a face."""
     poses: np.ndarray
     """(m, 3) x, y [m], yaw [rad]."""
     results: Any
@@ -59,32 +63,112 @@ class Crossings:
 
     def select(self, rows: np.ndarray) -> "Crossings":
         """Return the poses at row indices, in that order, or where a mask (m,) is True."""
-        results = _numbers(self.results)[rows].view(RESULT)[:, 0]
-        return Crossings(self.place[rows], self.waypoint[rows], self.poses[rows], results)
+        return Crossings(
+            self.place[rows],
+            self.waypoint[rows],
+            self.climbing[rows],
+            self.poses[rows],
+            select_results(self.results, rows),
+        )
+
+    def in_order(self) -> "Crossings":
+        """Return the poses in path order; at a waypoint, the stretch that ends there is first."""
+        return self.select(np.lexsort((self.waypoint, self.place)))
 
     def between(self, first: int, end: int) -> "Crossings":
         """Return the poses from waypoint `first` up to `end`; places count from `first`."""
         rows = slice(*np.searchsorted(self.place, (first, end)))
-        place, waypoint = self.place[rows] - first, self.waypoint[rows] - first
-        return Crossings(place, waypoint, self.poses[rows], self.results[rows])
-
-    def followed_by(self, more: "Crossings") -> "Crossings":
-        """Return the rows of both, these first."""
-        numbers = np.concatenate([_numbers(self.results), _numbers(more.results)])
         return Crossings(
-            np.concatenate([self.place, more.place]),
-            np.concatenate([self.waypoint, more.waypoint]),
-            np.concatenate([self.poses, more.poses]),
-            numbers.view(RESULT)[:, 0],
+            self.place[rows] - first,
+            self.waypoint[rows] - first,
+            self.climbing[rows],
+            self.poses[rows],
+            self.results[rows],
+        )
+
+    def moved(self, waypoints: int) -> "Crossings":
+        """Return the poses as they lie behind that many further waypoints."""
+        return replace(self, place=self.place + waypoints, waypoint=self.waypoint + waypoints)
+
+    def reversed(self, waypoints: int) -> "Crossings":
+        """Return the poses as they lie on the reversed path of that many waypoints."""
+        rows = np.arange(len(self.place))[::-1]
+        flipped = self.select(rows)
+        return replace(
+            flipped,
+            place=(waypoints - 1) - flipped.place,
+            waypoint=waypoints - flipped.waypoint,
         )
 
 
-_NUMBERS = RESULT.itemsize // 8
+def join_crossings(parts: Sequence[Crossings]) -> Crossings:
+    """Return the rows of all parts, one after the other."""
+    if not parts:
+        return _NOTHING
+    if len(parts) == 1:
+        return parts[0]
+    return Crossings(
+        np.concatenate([part.place for part in parts]),
+        np.concatenate([part.waypoint for part in parts]),
+        np.concatenate([part.climbing for part in parts]),
+        np.concatenate([part.poses for part in parts]),
+        join_results([part.results for part in parts]),
+    )
+
+
+def select_results(results: Any, rows: Any) -> Any:
+    """Return a copy of the RESULTs at row indices, or where a mask is True."""
+    return _numbers(results)[rows].view(RESULT)[:, 0]
+
+
+def copy_results(results: Any, to: Any) -> None:
+    """Copy RESULTs (n,) into others."""
+    _numbers(to)[:] = _numbers(results)
+
+
+def join_results(parts: Sequence[Any]) -> Any:
+    """Return the RESULTs of all parts, one after the other."""
+    return np.concatenate([_numbers(part) for part in parts]).view(RESULT)[:, 0]
 
 
 def _numbers(results: Any) -> np.ndarray:
     """Return RESULTs (n,) as floats (n, k), which numpy copies faster than records."""
     return results.view(np.float64).reshape(len(results), _NUMBERS)
+
+
+class _Known:
+    """Evaluated poses of the searched stretches, in arrays with room for more."""
+
+    def __init__(self, first: Crossings) -> None:
+        self.count = 0
+        self._make_room(first, 8 * len(first.place))
+        self.add(first)
+
+    @property
+    def rows(self) -> Crossings:
+        """The poses so far, as views."""
+        parts = (self._place, self._waypoint, self._climbing, self._poses, self._results)
+        return Crossings(*(part[: self.count] for part in parts))
+
+    def add(self, more: Crossings) -> None:
+        """Append poses."""
+        end = self.count + len(more.place)
+        if end > len(self._place):
+            self._make_room(self.rows, 2 * end)
+        rows = slice(self.count, end)
+        self._place[rows], self._waypoint[rows] = more.place, more.waypoint
+        self._climbing[rows], self._poses[rows] = more.climbing, more.poses
+        _numbers(self._results)[rows] = _numbers(more.results)
+        self.count = end
+
+    def _make_room(self, known: Crossings, size: int) -> None:
+        """Move the poses so far into arrays of `size` rows."""
+        self._place, self._waypoint = np.empty(size), np.empty(size, np.int64)
+        self._climbing, self._poses = np.empty(size, bool), np.empty((size, 3))
+        self._results = np.empty((size, _NUMBERS)).view(RESULT)[:, 0]
+        count, self.count = self.count, 0
+        if count:
+            self.add(known)
 
 
 def limits_of(radius: float) -> JumpLimits:
@@ -124,25 +208,25 @@ def find_crossings(
     if not len(jumps):
         return _NOTHING
     rows = jumps.ravel()
-    at_jumps = _numbers(results)[rows].view(RESULT)[:, 0]
-    known = Crossings(rows.astype(float), jumps[:, 1].repeat(2), poses[rows], at_jumps)
-    ends, climbed = np.arange(len(rows)).reshape(-1, 2), []
+    no_climb, at_jumps = np.zeros(len(rows), bool), select_results(results, rows)
+    known = _Known(
+        Crossings(rows.astype(float), jumps[:, 1].repeat(2), no_climb, poses[rows], at_jumps)
+    )
+    ends = np.arange(len(rows)).reshape(-1, 2)
     while len(ends):
-        known = known.followed_by(_divide(known, ends, evaluate))
-        ends, closed = _sort_pieces(known, ends, radius)
+        known.add(_divide(known.rows, ends, evaluate))
+        ends, closed = _sort_pieces(known.rows, ends, radius)
         if len(closed):
-            climbs = _climb(terrain, radius, known, closed, evaluate, direction)
-            climbed.append(slice(len(known.place), len(known.place) + len(climbs.place)))
-            known = known.followed_by(climbs)
-    kept = known.results["status"] != PoseStatus.NOT_SETTLED
+            known.add(climb_faces(terrain, radius, known.rows, closed, evaluate, direction))
+    found = known.rows
+    kept = (found.results["status"] != PoseStatus.NOT_SETTLED) | found.climbing
     kept[: len(rows)] = False
-    for climb in climbed:
-        kept[climb] = True
-    between = np.flatnonzero(kept)
-    return known.select(between[np.argsort(known.place[between], kind="stable")])
+    return found.select(np.flatnonzero(kept)).in_order()
 
 
-_NOTHING = Crossings(np.empty(0), np.empty(0, int), np.empty((0, 3)), new_results(0))
+_NOTHING = Crossings(
+    np.empty(0), np.empty(0, np.int64), np.empty(0, bool), np.empty((0, 3)), new_results(0)
+)
 
 
 def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings:
@@ -150,7 +234,7 @@ def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings
     n = len(ends) * (PIECES - 1)
     place, waypoint, poses = np.empty(n), np.empty(n, np.int64), np.empty((n, 3))
     divide_stretches(ends, PIECES, known.points, (place, waypoint, poses))
-    return Crossings(place, waypoint, poses, evaluate(poses, NONE_HELD))
+    return Crossings(place, waypoint, np.zeros(n, bool), poses, evaluate(poses, NONE_HELD))
 
 
 def _sort_pieces(
@@ -166,7 +250,7 @@ def _sort_pieces(
     return pieces[0, :n_open], pieces[1, :n_closed]
 
 
-def _climb(
+def climb_faces(
     terrain: Terrain,
     radius: float,
     known: Crossings,
@@ -176,7 +260,13 @@ def _climb(
 ) -> Crossings:
     """Evaluate wheels that jump up at one place, held at stages between foot and edge.
 
-    `ends` (k, 2) are the rows of `known` before and after each place.
+    Args:
+        terrain: The ground.
+        radius: Wheel radius [m].
+        known: Evaluated poses.
+        ends: (k, 2) rows of `known` before and after each place.
+        evaluate: As for `find_crossings`.
+        direction: 1 if the rover drives forwards along the path, -1 if backwards.
     """
     before, after = known.results["wheel_centres"][ends].swapaxes(0, 1)
     rise = (after - before)[:, :, 2]
@@ -185,16 +275,18 @@ def _climb(
     if not len(at):
         return _NOTHING
     stages, foot = len(CLIMB_STAGES), ends[at, 0]
+    row, wheel = np.nonzero(climbing[at])
+    centres, course = before[at[row], wheel], known.poses[foot[row], 2]
+    face, edge = _faces_ahead(
+        terrain, radius, centres, course + (0.0 if direction > 0.0 else np.pi)
+    )
+    heights = centres[:, 2:] + CLIMB_STAGES * rise[at[row], wheel][:, None]
+    angles = direction * _angles_on_faces(radius, heights, face[:, None], edge[:, None])
+    touching = (CLIMB_STAGES > 0.0) | (heights > edge[:, None])
     held = np.full((len(at), stages, 6, 2), np.nan)
-    for row, i in enumerate(at):
-        course = known.poses[ends[i, 0], 2] + (0.0 if direction > 0.0 else np.pi)
-        for wheel in np.flatnonzero(climbing[i]):
-            centre = before[i, wheel]
-            face, edge = _face_ahead(terrain, radius, centre, course)
-            for k, height in enumerate(centre[2] + CLIMB_STAGES * rise[i, wheel]):
-                if k > 0 or height > edge:
-                    angle = direction * _angle_on_face(radius, height, face, edge)
-                    held[row, k, wheel] = height, angle
+    held[row, :, wheel] = np.where(
+        touching[..., None], np.stack([heights, angles], axis=-1), np.nan
+    )
     poses = np.repeat(known.poses[foot], stages, axis=0)
     results = evaluate(poses, held.reshape(-1, 6, 2))
     start, end = known.place[ends[at]].T[:, :, None]
@@ -202,29 +294,43 @@ def _climb(
     climbs = Crossings(
         (start + CLIMB_STAGES * (end - start)).ravel(),
         np.repeat(known.waypoint[foot], stages),
+        np.ones(len(poses), bool),
         poses,
         results,
     )
     return climbs.select((settled | ~settled.any(axis=1, keepdims=True)).ravel())
 
 
-def _face_ahead(terrain: Terrain, radius: float, centre: np.ndarray, yaw: float):
-    """Return slope angle [rad] and edge height [m] of the ground ahead of a wheel centre (3,)."""
+def _faces_ahead(
+    terrain: Terrain, radius: float, centres: np.ndarray, yaw: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return slope angles [rad] and edge heights [m] (k,) of the ground ahead of wheel centres.
+
+    Args:
+        terrain: The ground.
+        radius: Wheel radius [m].
+        centres: (k, 3) wheel centres [m], map frame.
+        yaw: (k,) courses [rad].
+    """
     step = 0.25 * terrain.resolution
     ahead = np.arange(0.0, radius + 2.0 * terrain.resolution, step)
     heights = terrain.elevation_at(
-        centre[0] + ahead * np.cos(yaw), centre[1] + ahead * np.sin(yaw)
+        centres[:, :1] + ahead * np.cos(yaw)[:, None],
+        centres[:, 1:2] + ahead * np.sin(yaw)[:, None],
     )
-    slopes = np.diff(heights) / step
-    if not np.isfinite(slopes).any():
-        return 0.5 * np.pi, np.inf
-    return float(np.arctan(np.nanmax(slopes))), float(np.nanmax(heights))
+    steepest = np.fmax.reduce(np.diff(heights, axis=1) / step, axis=1)
+    known = np.isfinite(steepest)
+    face = np.where(known, np.arctan(steepest), 0.5 * np.pi)
+    return face, np.where(known, np.fmax.reduce(heights, axis=1), np.inf)
 
 
-def _angle_on_face(radius: float, height: float, face: float, edge: float) -> float:
-    """Return the contact angle [rad] of a wheel with its centre at `height` [m].
+def _angles_on_faces(
+    radius: float, heights: np.ndarray, face: np.ndarray, edge: np.ndarray
+) -> np.ndarray:
+    """Return the contact angles [rad] of wheels with their centres at `heights` [m].
 
-    The wheel touches the face while its centre is below the edge, then the edge.
+    A wheel touches the face while its centre is below the edge, then the edge.
     """
-    above = (height - edge) / radius
-    return face if above <= 0.0 else min(face, float(np.arccos(min(above, 1.0))))
+    above = (heights - edge) / radius
+    on_edge = np.minimum(face, np.arccos(np.clip(above, 0.0, 1.0)))
+    return np.where(above <= 0.0, face, on_edge)

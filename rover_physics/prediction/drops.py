@@ -37,6 +37,11 @@ class Falls:
     """(m, 6) True for wheels that fall at a pose between waypoints."""
     drops: np.ndarray
     """(n, 6) largest drop of each wheel at a waypoint or on the way to it [m]."""
+    decided: int
+    """Number of waypoints, from the first, whose falls no later pose of the path can change."""
+    restart: int
+    """Last of these waypoints from which the falls can be found without those before it; 0 if
+    there is none."""
 
 
 def find_falls(
@@ -79,13 +84,22 @@ def _find_falls(radius, direction, poses, results, between):
         if _read_contacts(result, direction, angle[k], height[k]) < -MIN_ANGLE:
             _find_steep(angle[k], result.friction, steep[k])
         last = here
+    first_open = _find_first_open(distance, radius, angle, steep)
+    flat = np.empty(n + m, np.bool_)
+    for k in range(n + m):
+        flat[k] = not np.any(steep[k])
     _keep_short_runs(distance, radius, steep)
     _extend_to_edges(steep, angle, distance, radius, turning)
     fallen, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
     _measure_drops(radius, height, steps, turning, fallen)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
+    decided, restart = 0, 0
     for k in range(n + m):
         i = order[k]
+        if i < n and k < first_open:
+            decided += 1
+            if flat[k] and not np.any(turning[k]) and not np.any(fallen[k] > 0.0):
+                restart = i
         owner = i if i < n else between.waypoint[i - n]
         for wheel in range(6):
             drops[owner, wheel] = max(drops[owner, wheel], fallen[k, wheel])
@@ -93,7 +107,34 @@ def _find_falls(radius, direction, poses, results, between):
                 at_waypoints[i, wheel] = steep[k, wheel]
             else:
                 at_between[i - n, wheel] = steep[k, wheel]
-    return at_waypoints, at_between, drops
+    return at_waypoints, at_between, drops, decided, restart
+
+
+@exact_kernel
+def _find_first_open(distance, radius, angle, steep):
+    """Return the first row whose falls depend on poses after the last row.
+
+    These are the rows of a run in `steep` (k, 6) that may still end as a short one, and the rows
+    before it, or before a run that may begin next, while a wheel rolls over.
+    """
+    rows = distance.size
+    first = rows
+    for wheel in range(6):
+        before = rows - 1
+        while before >= 0 and steep[before, wheel]:
+            before -= 1
+        if before < rows - 1:
+            too_long = distance[rows - 1] - distance[before] > MAX_FALL_LENGTH * radius
+            if before < 0 or too_long:
+                continue
+            first = min(first, before + 1)
+        k = before
+        while (
+            k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[before] - distance[k] <= radius
+        ):
+            first = min(first, k)
+            k -= 1
+    return first
 
 
 @exact_kernel

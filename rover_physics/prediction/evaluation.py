@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numba import prange
 
 from rover_physics.contact.clearance import belly_clearance
 from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS
@@ -19,9 +18,9 @@ from rover_physics.forces.torques import (
     take_equal_torques,
 )
 from rover_physics.numerics.interruption import slices
-from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
-from rover_physics.numerics.threads import limit_threads
+from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
 from rover_physics.status import PoseStatus, TorquePolicy
 from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
@@ -106,12 +105,12 @@ WORK = record_type(
 
 def new_results(n: int) -> Any:
     """Return RESULTs (n,), all NaN with status 0."""
-    results = _unwritten_results(n)
+    results = unwritten_results(n)
     _clear(results)
     return results
 
 
-def _unwritten_results(n: int) -> Any:
+def unwritten_results(n: int) -> Any:
     """Return RESULTs (n,) of any content: the system provides their memory when it is written."""
     return np.empty((n, RESULT.itemsize // 8)).view(RESULT)[:, 0]
 
@@ -142,12 +141,13 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
         held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
             those that rest on the ground; (0, 6, 2) if none climbs.
     """
-    results = _unwritten_results(len(poses))
+    results = unwritten_results(len(poses))
     with limit_threads(effort(model["settings"][0], len(poses))) as threads:
         works = new_works(threads, len(poses))
         for part in slices(len(poses)):
             _clear(results[part])
-            evaluate_poses(model, poses[part], held[part], works, results[part])
+            sweep = model, (poses[part], held[part]), works, results[part]
+            run_chunks(evaluate_poses, sweep, len(works), threads)
     return results
 
 
@@ -162,19 +162,20 @@ def effort(settings, poses: int) -> int:
     return poses * (1 if settings["policy"] == TorquePolicy.EQUAL else OPTIMAL_EFFORT)
 
 
-@sweep_kernel
-def evaluate_poses(models, poses, held, works, results):
-    """Evaluate the poses into `results`, one chunk per work space, in parallel.
+@kernel
+def evaluate_poses(models, places, works, results, part):
+    """Evaluate the poses of some chunks into `results`, one chunk per work space.
 
     Args:
-        models: (1,) MODEL; Numba passes records to threads only as arrays.
-        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
-        held: As for `evaluate`.
+        models: (1,) MODEL.
+        places: `poses` and `held` of `evaluate`.
         works: (chunks,) WORK.
         results: (n,) RESULT, written.
+        part: The first chunk and the one after the last.
     """
-    n, chunks = poses.shape[0], works.size
-    for chunk in prange(chunks):
+    (poses, held), chunks = places, works.size
+    n = poses.shape[0]
+    for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk])
             hold_wheels(held, i, works[chunk].contacts)

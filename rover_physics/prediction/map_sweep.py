@@ -9,14 +9,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.arrays import SingleFloats
-from rover_physics.numerics.kernels import kernel, sweep_kernel
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import freeze_fields
-from rover_physics.numerics.threads import limit_threads
+from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import effort, evaluate_pose, new_works, set_pose
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses, sweep_lock
@@ -127,23 +126,26 @@ def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pos
     n = len(poses)
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
     with sweep_lock, limit_threads(effort(model.settings, n)) as threads:
-        score_all(model.records, poses, new_works(threads, n), status, numbers)
+        works = new_works(threads, n)
+        sweep = model.records, poses, works, (status, numbers)
+        run_chunks(score_all, sweep, len(works), threads)
     return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
 
 
-@sweep_kernel
-def score_all(models, poses, works, status, numbers):
-    """Score the poses, one chunk per work space, in parallel.
+@kernel
+def score_all(models, poses, works, scores, part):
+    """Score the poses of some chunks, one chunk per work space.
 
     Args:
         models: (1,) MODEL.
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         works: (chunks,) WORK.
-        status: (n,) PoseStatus, written.
-        numbers: (NUMBERS, n) scores in the order of `PoseScores`, written.
+        scores: (n,) PoseStatus, and (NUMBERS, n) numbers in the order of `PoseScores`, written.
+        part: The first chunk and the one after the last.
     """
-    n, chunks = poses.shape[0], works.size
-    for chunk in prange(chunks):
+    (status, numbers), chunks = scores, works.size
+    n = poses.shape[0]
+    for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(poses, i, works[chunk])
             evaluate_pose(models[0], works[chunk], works[chunk].result)

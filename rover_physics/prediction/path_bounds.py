@@ -1,6 +1,7 @@
 """Bounds on a prediction along a path over an uncertain map: one frozen record of intervals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,15 @@ class PathBounds:
 
     def __post_init__(self) -> None:
         freeze_fields(self)
+
+    def cut(self, waypoints: int) -> "PathBounds":
+        """Return the bounds on the first waypoints."""
+        first: dict[str, Any] = {
+            name: value[:waypoints]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray)
+        }
+        return replace(self, **first)
 
     @property
     def bounded(self) -> NDArray[np.bool_]:

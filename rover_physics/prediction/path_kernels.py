@@ -141,17 +141,18 @@ def _jumps(here, there, height_jump):
 
 
 @exact_kernel
-def add_up(poses, results, speed, sums):
-    """Write distance [m], time [s] and energy [J] since the first waypoint into sums (3, n).
+def add_up(poses, results, speed, start, sums):
+    """Write distance [m], time [s] and energy [J] into sums (3, n); return those at the last pose.
 
     Args:
         poses: (n, 3) x, y [m] and yaw [rad].
         results: (n,) RESULT of each pose. Time and energy are NaN where it is not settled, and
             the climb between two poses counts only if both are settled.
         speed: Speed along the ground [m/s].
+        start: Distance, time and energy at the first pose.
         sums: (3, n), written.
     """
-    distance, time, energy = 0.0, 0.0, 0.0
+    distance, time, energy = start
     for i in range(results.size):
         settled = results[i].status == PoseStatus.SETTLED
         if i > 0:
@@ -165,8 +166,43 @@ def add_up(poses, results, speed, sums):
         sums[0, i] = distance
         sums[1, i] = time if settled else np.nan
         sums[2, i] = energy if settled else np.nan
+    return distance, time, energy
 
 
 @exact_kernel
 def _power(result):
     return result.power if result.status == PoseStatus.SETTLED else 0.0
+
+
+@exact_kernel
+def find_remaining_jumps(path, between, limits, ends):
+    """Find the neighbours on a path whose contacts jump at one place; return their number.
+
+    Args:
+        path: PathPoints of the waypoints.
+        between: PathPoints of the poses in between, no wheel held.
+        limits: JumpLimits.
+        ends: (>= n + m, 2) pairs of neighbours, written: waypoint i as i, pose j in between as
+            n + j.
+    """
+    n, m = path.place.size, between.place.size
+    count, last, j = 0, 0, 0
+    for k in range(1, n + m):
+        waypoint = k - j
+        if j < m and between.place[j] < waypoint:
+            here = n + j
+            j += 1
+        else:
+            here = waypoint
+        a = path.results[last] if last < n else between.results[last - n]
+        b = path.results[here] if here < n else between.results[here - n]
+        if _jumps(a, b, limits.height):
+            apart = 0.0
+            if last < n and here < n:
+                apart = _distance(path.poses[last], path.poses[here])
+            searched = last >= n or here >= n or apart > 0.0
+            if searched and apart <= limits.max_spacing:
+                ends[count, 0], ends[count, 1] = last, here
+                count += 1
+        last = here
+    return count

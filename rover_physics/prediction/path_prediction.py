@@ -1,6 +1,7 @@
 """Prediction of the rover along a path: one frozen record of arrays, a row per waypoint."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,3 +95,20 @@ class PathPrediction:
 
     def __post_init__(self) -> None:
         freeze_fields(self)
+
+    def cut(self, waypoints: int) -> "PathPrediction":
+        """Return the prediction of the first waypoints of the path and of the way to them."""
+        between, bounds = self.between, self.bounds
+        if between is not None:
+            between = between.select(between.waypoint < waypoints)
+        bounds = None if bounds is None else bounds.cut(waypoints)
+        return replace(self.select(slice(waypoints)), between=between, bounds=bounds)
+
+    def select(self, rows: Any) -> "PathPrediction":
+        """Return the rows of all arrays, without `between` and `bounds`."""
+        chosen: dict[str, Any] = {
+            name: value[rows]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray)
+        }
+        return replace(self, **chosen, between=None, bounds=None)

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.crossing import Crossings, find_crossings
-from rover_physics.prediction.drops import find_falls
+from rover_physics.prediction.crossing import Crossings, Evaluate, find_crossings
+from rover_physics.prediction.drops import Falls, find_falls
 from rover_physics.prediction.evaluation import NONE_HELD, RESULT, effort, evaluate
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import add_up
@@ -25,6 +26,10 @@ from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
+
+Sums = tuple[float, float, float]
+"""Distance [m], time [s] and energy [J] since the start of a path."""
+NO_SUMS = (0.0, 0.0, 0.0)
 
 sweep_lock = threading.Lock()  # some of Numba's threading layers allow one caller only
 
@@ -69,60 +74,112 @@ def sweep_paths(
     Raises:
         PoseError, ModelError, SoilError: As `sweep_path`.
     """
+    return [swept.prediction for swept in sweep_in_full(rover, terrain, paths, options)]
+
+
+@dataclass(frozen=True, eq=False)
+class SweptPath:
+    """A prediction along a path with the results that it is made of."""
+
+    path: np.ndarray
+    """(k, 3) all poses of the path; the rest is about the first n of them."""
+    prediction: PathPrediction
+    """The prediction."""
+    results: Any
+    """(n,) RESULT of each waypoint."""
+    crossings: Crossings
+    """Poses between the waypoints."""
+
+    def cut(self, waypoints: int) -> "SweptPath":
+        """Return what is about the first waypoints."""
+        crossings = self.crossings.select(self.crossings.waypoint < waypoints)
+        prediction = self.prediction.cut(waypoints)
+        return SweptPath(self.path, prediction, self.results[:waypoints], crossings)
+
+
+@quiet
+def sweep_in_full(
+    rover: Rover, terrain: Terrain, paths: Sequence[ArrayLike], options: SweepOptions
+) -> list[SweptPath]:
+    """Sweep several paths and keep the results; arguments and errors as `sweep_paths`."""
     model = pack_model(rover, terrain, options)
-    return _sweep(rover, terrain, model, [check_poses(poses) for poses in paths])
+    if not paths:
+        return []
+    checked = [check_poses(poses) for poses in paths]
+    ends = np.cumsum([len(poses) for poses in checked])
+    poses, radius, evaluate_at = np.concatenate(checked), rover.wheel.radius, evaluator(model)
+    with limit_threads(effort(model.settings, len(poses))):  # set once, not per round
+        results = evaluate_at(poses)
+        crossings = find_crossings(
+            terrain, radius, poses, results, evaluate_at, direction_of(model), joined_paths(ends)
+        )
+    swept = []
+    for first, end in zip([0, *ends[:-1]], ends, strict=True):
+        check_interruption()
+        part = crossings.between(first, end) if len(paths) > 1 else crossings
+        swept.append(make_prediction(model, poses[first:end], results[first:end], part)[0])
+    return swept
 
 
-def _sweep(
-    rover: Rover, terrain: Terrain, model: PackedModel, paths: Sequence[np.ndarray]
-) -> list[PathPrediction]:
+def joined_paths(ends: np.ndarray) -> np.ndarray:
+    """Return (n - 1,) False where a path ends and the next begins.
+
+    `ends` (k,) are the numbers of waypoints up to the end of each path.
+    """
+    joined = np.ones(ends[-1] - 1, bool)
+    joined[ends[:-1] - 1] = False
+    return joined
+
+
+def evaluator(model: PackedModel) -> Evaluate:
+    """Return the function that evaluates a model at poses, as `find_crossings` takes it."""
+
     def evaluate_at(at: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
         with sweep_lock:
             return evaluate(model.records, at, held)
 
-    if not paths:
-        return []
-    ends = np.cumsum([len(poses) for poses in paths])
-    poses = np.concatenate(paths)
-    joined = np.ones(len(poses) - 1, bool)
-    joined[ends[:-1] - 1] = False
-    radius, direction = rover.wheel.radius, float(model.settings["direction"])
-    with limit_threads(effort(model.settings, len(poses))):  # set once, not per round
-        results = evaluate_at(poses)
-        crossings = find_crossings(terrain, radius, poses, results, evaluate_at, direction, joined)
-    predictions = []
-    for first, end in zip([0, *ends[:-1]], ends, strict=True):
-        check_interruption()
-        part = crossings.between(first, end) if len(paths) > 1 else crossings
-        predictions.append(
-            _predict(model.settings, radius, poses[first:end], results[first:end], part)
-        )
-    return predictions
+    return evaluate_at
 
 
-def _predict(
-    settings: Any, radius: float, poses: np.ndarray, results: np.ndarray, crossings: Crossings
-) -> PathPrediction:
-    """Return the prediction of one path from its results and crossings."""
-    falls = find_falls(radius, poses, results, crossings, float(settings["direction"]))
+def direction_of(model: PackedModel) -> float:
+    """Return 1.0 if the rover drives forwards, -1.0 if backwards."""
+    return float(model.settings["direction"])
+
+
+def make_prediction(
+    model: PackedModel,
+    poses: np.ndarray,
+    results: Any,
+    crossings: Crossings,
+    start: Sums = NO_SUMS,
+) -> tuple[SweptPath, Falls]:
+    """Return the prediction of one path from its results, and its falls.
+
+    Distance, time and energy at the first pose are `start`.
+    """
+    settings, radius = model.settings, float(model.record.linkage.radius)
+    falls = find_falls(radius, poses, results, crossings, direction_of(model))
     between = _collect(
         crossings.poses,
         crossings.results,
         settings,
         wheel_drop=np.zeros((len(crossings.poses), 6)),
         falling=falls.between,
+        start=NO_SUMS,
         between=None,
         waypoint=crossings.waypoint,
     )
-    return _collect(
+    prediction = _collect(
         poses,
         results,
         settings,
         wheel_drop=falls.drops,
         falling=falls.at_waypoints,
+        start=start,
         between=between,
         waypoint=np.arange(len(poses)),
     )
+    return SweptPath(poses, prediction, results, crossings), falls
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:
@@ -147,14 +204,22 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     return array
 
 
-def _collect(poses: np.ndarray, results: np.ndarray, settings: Any, **more: Any) -> PathPrediction:
+def sum_up(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> Sums:
+    """Return distance [m], time [s] and energy [J] at the last pose from those at the first."""
+    path, sums = (view_read_only(poses), view_read_only(results)), np.empty((3, len(poses)))
+    return add_up(*path, model.settings["speed"], start, sums)
+
+
+def _collect(
+    poses: np.ndarray, results: np.ndarray, settings: Any, start: Sums, **more: Any
+) -> PathPrediction:
     same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
     q, settled = results["q"], results["status"] == PoseStatus.SETTLED
     position = np.empty((len(poses), 3))
     position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
     position[~settled] = np.nan
     sums = np.empty((3, len(poses)))
-    add_up(view_read_only(poses), view_read_only(results), settings["speed"], sums)
+    add_up(view_read_only(poses), view_read_only(results), settings["speed"], start, sums)
     distance, time, energy = sums
     return PathPrediction(
         poses=poses,

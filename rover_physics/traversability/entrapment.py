@@ -11,18 +11,21 @@ places. The waypoint where the way back fails is the point of no return. Ways on
 straight ahead and in curves: from the end of the path, and from just past the point of no return.
 """
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rover_physics.forces.soil import use_of_shear
 from rover_physics.names import EQUAL
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep import SweptPath
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.prediction.way_back import predict_way_back
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.first_failure import sweep_until_failure
 from rover_physics.traversability.limit_checks import TOLERANCE, largest_of
 from rover_physics.traversability.verdict import Verdict, judge
 
@@ -42,41 +45,65 @@ UNKNOWN_CODES = ("off_map", "unknown_ground")
 """Codes that close a way on only within LOOK_AHEAD wheelbases; farther ground may be open."""
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What the check for entrapment needs to know of a path, at least up to its first failure."""
+
+    path: np.ndarray
+    """(k, 3) all poses of the path."""
+    distance: np.ndarray
+    """(n,) horizontal distance of the judged waypoints since the first [m]."""
+    one_way: np.ndarray
+    """(n,) True where the way back has to be judged, see `find_one_way`."""
+    drop: np.ndarray
+    """(n,) largest drop of a wheel at a waypoint or on the way to it [m]."""
+    judge_back: Callable[[slice], Verdict]
+    """Judges the way back over waypoints, which are in the order of the way in."""
+
+
+def course_of(rover: Rover, terrain: Terrain, swept: SweptPath, options: SweepOptions) -> Course:
+    """Return the course of a swept path; `options` are those of the sweep."""
+    prediction = swept.prediction
+    return Course(
+        swept.path,
+        prediction.distance,
+        find_one_way(rover, prediction, options),
+        prediction.wheel_drop.max(axis=1),
+        lambda waypoints: _judge_way_back(rover, terrain, swept, waypoints, options),
+    )
+
+
 def ask_for_ways_out(
-    rover: Rover,
-    terrain: Terrain,
-    prediction: PathPrediction,
-    verdict: Verdict,
-    options: SweepOptions,
+    rover: Rover, terrain: Terrain, course: Course, verdict: Verdict, options: SweepOptions
 ) -> Verdict:
     """Return the verdict, refused as "trapped" if there is neither a way on nor a way back.
 
     Args:
         rover: The rover.
         terrain: The ground.
-        prediction: The prediction of the path.
+        course: The path.
         verdict: The verdict on it.
-        options: The options of the prediction.
+        options: The options of the sweep.
     """
-    end = len(prediction.poses) if verdict.first_failure < 0 else verdict.first_failure
-    one_way = np.flatnonzero(_find_one_way(rover, prediction, options)[:end])
+    distance = course.distance
+    end = len(distance) if verdict.first_failure < 0 else verdict.first_failure
+    one_way = np.flatnonzero(course.one_way[:end])
     if not one_way.size:
         return verdict
-    run_up = prediction.distance[one_way[0]] - RUN_UP * _wheelbase(rover)
-    first = int(np.searchsorted(prediction.distance, max(run_up, 0.0)))
-    reverse = replace(options, backward=not options.backward)
-    back = _judge_way(rover, terrain, prediction.poses[first:end][::-1], reverse)
+    run_up = distance[one_way[0]] - RUN_UP * _wheelbase(rover)
+    back = course.judge_back(slice(int(np.searchsorted(distance, max(run_up, 0.0))), end))
     if back.traversable:
         return verdict
     stop = end - 1 - back.first_failure  # the way back is blocked here
-    on = _find_way_on(rover, terrain, prediction, stop, end - 1, options)
+    on = _find_way_on(rover, terrain, course, slice(stop, end), options)
     if not on:
         return verdict
-    on = verdict.reason or on
-    return _refuse(rover, prediction, verdict, stop, end, f"{on}; no way back: {back.reason}")
+    drop = course.drop[stop:end].max(initial=0.0)
+    ways = f"no way on: {verdict.reason or on}; no way back: {back.reason}"
+    return _refuse(rover, verdict, stop, drop, ways)
 
 
-def _find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
+def find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
     """Return (n,) True at or just after places where the forces of the way in allow no return.
 
     Under policy "optimal" other torques may allow it; these are only the places to check.
@@ -113,15 +140,31 @@ def _resists_way_back(
     return np.asarray(broken.any(axis=1))
 
 
+def _judge_way_back(
+    rover: Rover, terrain: Terrain, swept: SweptPath, waypoints: slice, options: SweepOptions
+) -> Verdict:
+    """Judge the way back over waypoints; without soil, from the results of the way in."""
+    reverse = replace(options, backward=not options.backward)
+    poses = swept.prediction.poses[waypoints][::-1]
+    model = pack_model(rover, terrain, reverse)
+    if model.settings.on_soil:
+        return _judge_way(rover, terrain, poses, reverse)
+    verdict = judge(rover, predict_way_back(rover, terrain, model, swept, waypoints))
+    if verdict.traversable or reverse.policy == EQUAL:
+        return verdict
+    equal = sweep_until_failure(rover, terrain, [poses], replace(reverse, policy=EQUAL))[0][1]
+    return equal if equal.traversable else verdict
+
+
 def _judge_way(
     rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
 ) -> Verdict:
     """Judge a way; equal torques are tried first under either policy, which is much faster."""
     equal = replace(options, policy=EQUAL)
-    verdict = judge(rover, sweep_path(rover, terrain, poses, equal))
+    verdict = sweep_until_failure(rover, terrain, [poses], equal)[0][1]
     if verdict.traversable or options.policy == EQUAL:
         return verdict
-    return judge(rover, sweep_path(rover, terrain, poses, options))
+    return sweep_until_failure(rover, terrain, [poses], options)[0][1]
 
 
 def _wheelbase(rover: Rover) -> float:
@@ -130,28 +173,24 @@ def _wheelbase(rover: Rover) -> float:
 
 
 def _find_way_on(
-    rover: Rover,
-    terrain: Terrain,
-    prediction: PathPrediction,
-    stop: int,
-    end: int,
-    options: SweepOptions,
+    rover: Rover, terrain: Terrain, course: Course, inside: slice, options: SweepOptions
 ) -> str:
     """Return why the first way on, straight ahead from the end, is closed; empty if any is open.
 
-    The rover can move between the waypoints `stop` and `end`.
+    The rover can move within the waypoints `inside`.
     """
-    wheelbase = _wheelbase(rover)
-    inside = prediction.distance[end] - prediction.distance[stop]
-    length = min(LOOK_AHEAD * wheelbase + inside, MAX_LOOK_AHEAD * wheelbase)
+    wheelbase, distance = _wheelbase(rover), course.distance
+    end = inside.stop - 1
+    room = distance[end] - distance[inside.start]
+    length = min(LOOK_AHEAD * wheelbase + room, MAX_LOOK_AHEAD * wheelbase)
     starts = [end]
-    if inside > wheelbase:
-        behind = prediction.distance[stop] + 0.5 * wheelbase
-        starts.append(int(np.searchsorted(prediction.distance, behind)))
-    spacing = max(_spacing(prediction), length / MAX_WAY_POSES)
+    if room > wheelbase:
+        behind = distance[inside.start] + 0.5 * wheelbase
+        starts.append(int(np.searchsorted(distance, behind)))
+    spacing = max(_spacing(course.path), length / MAX_WAY_POSES)
     closed = ""
     for start in starts:
-        for poses in _ways_ahead(prediction.poses[start], wheelbase, length, spacing, options):
+        for poses in _ways_ahead(course.path[start], wheelbase, length, spacing, options):
             verdict = _judge_way(rover, terrain, poses, options)
             if verdict.traversable:
                 return ""
@@ -177,24 +216,18 @@ def _ways_ahead(
         yield np.column_stack([places, yaw])
 
 
-def _spacing(prediction: PathPrediction) -> float:
-    steps = np.diff(prediction.distance)
+def _spacing(poses: np.ndarray) -> float:
+    """Return the median distance [m] of neighbouring poses that are apart."""
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     steps = steps[steps > 0.0]
     return float(np.median(steps)) if steps.size else 0.02
 
 
-def _refuse(
-    rover: Rover,
-    prediction: PathPrediction,
-    verdict: Verdict,
-    stop: int,
-    end: int,
-    ways: str,
-) -> Verdict:
-    drop = prediction.wheel_drop[stop:end].max(initial=0.0)
+def _refuse(rover: Rover, verdict: Verdict, stop: int, drop: float, ways: str) -> Verdict:
+    """Return the verdict, refused as trapped at waypoint `stop` after a drop [m]."""
     fell = drop > DROP * rover.wheel.radius
     what = f"a wheel drops {drop:.3f} m" if fell else "from here the rover goes in but not out"
-    reason = f"trapped: {what}; no way on: {ways}"
+    reason = f"trapped: {what}; {ways}"
     codes, reasons = list(verdict.codes), list(verdict.reasons)
     codes[stop], reasons[stop] = "trapped", reason
     return replace(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from numpy.typing import ArrayLike
 
@@ -10,22 +11,26 @@ from rover_physics.names import EQUAL
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_paths
+from rover_physics.prediction.sweep import sweep_in_full
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import judge_bounds
-from rover_physics.traversability.entrapment import ask_for_ways_out
+from rover_physics.traversability.entrapment import ask_for_ways_out, course_of
+from rover_physics.traversability.first_failure import sweep_until_failure
 from rover_physics.traversability.verdict import (
     MARGIN_CODES,
     Verdict,
     forgive,
     judge,
     name_margin,
+    name_margin_at,
 )
 
 Judged = tuple[PathPrediction, Verdict]
 """A prediction and the verdict on it."""
+Judge = Callable[[Sequence[ArrayLike], SweepOptions, bool], list[Judged]]
+"""Function that judges paths with options; the last argument is `stop_at_failure`."""
 
 
 def judge_path(
@@ -35,6 +40,7 @@ def judge_path(
     options: SweepOptions = DEFAULT_OPTIONS,
     *,
     sigmas: float | None = SIGMAS,
+    stop_at_failure: bool = False,
 ) -> tuple[PathPrediction, Verdict]:
     """Predict a path and judge it, including entrapment.
 
@@ -52,16 +58,23 @@ def judge_path(
         options: As for `sweep_path`.
         sigmas: Number of standard deviations by which the map's heights may be wrong; 0 or None
             takes the map as exact.
+        stop_at_failure: Whether to leave out the waypoints beyond the first failure (default: all
+            waypoints are predicted and judged). It saves their time and changes neither whether
+            the path is traversable nor code, reason and waypoint of the first failure.
 
     Returns:
-        The prediction, and the verdict on it.
+        The prediction, and the verdict on it. With `stop_at_failure`, both end at the first
+        failure or at a waypoint beyond it, and only the first refusal is sure to be the same as
+        without.
 
     Raises:
         PoseError: Poses of wrong shape, or not finite.
         ModelError: An option that this rover cannot have, or `sigmas` below 0.
         SoilError: A soil that is not a preset.
     """
-    return judge_paths(rover, terrain, [poses], options, sigmas=sigmas)[0]
+    return judge_paths(
+        rover, terrain, [poses], options, sigmas=sigmas, stop_at_failure=stop_at_failure
+    )[0]
 
 
 @quiet
@@ -72,54 +85,109 @@ def judge_paths(
     options: SweepOptions = DEFAULT_OPTIONS,
     *,
     sigmas: float | None = SIGMAS,
+    stop_at_failure: bool = False,
 ) -> list[tuple[PathPrediction, Verdict]]:
     """Judge several paths at once, faster than one by one; see `judge_path`."""
-
-    def judge_with(paths: Sequence[ArrayLike], options: SweepOptions) -> list[Judged]:
-        return _judge_under_policy(rover, terrain, paths, options, sigmas)
-
-    judged = judge_with(paths, options)
-    if options.kept_margin == 0.0:
+    check_sigmas(sigmas)
+    judge_with = partial(_judge_under_policy, rover, terrain, sigmas)
+    judged = judge_with(paths, options, stop_at_failure)
+    refused = [k for k, (_, verdict) in enumerate(judged) if not verdict.traversable]
+    if options.kept_margin == 0.0 or not refused:
         return judged
-    return [_weigh_margin(one, options, judge_with) for one in judged]
+    if stop_at_failure:
+        for k in refused:
+            judged[k] = _weigh_first_failure(paths[k], judged[k], options, judge_with)
+        return judged
+
+    def judge_others(rows: Sequence[int], others: SweepOptions) -> list[Verdict]:
+        return [found for _, found in judge_with([paths[refused[k]] for k in rows], others, False)]
+
+    weighed = weigh_margin([judged[k][1] for k in refused], options, judge_others)
+    for k, verdict in zip(refused, weighed, strict=True):
+        judged[k] = judged[k][0], verdict
+    return judged
 
 
-def _weigh_margin(
-    judged: Judged,
+def weigh_margin(
+    verdicts: Sequence[Verdict],
     options: SweepOptions,
-    judge_with: Callable[[Sequence[ArrayLike], SweepOptions], list[Judged]],
-) -> Judged:
-    """Return the verdict without refusals of what equal torques pass, and name the margin.
+    judge_others: Callable[[Sequence[int], SweepOptions], list[Verdict]],
+) -> list[Verdict]:
+    """Return verdicts without refusals of what equal torques pass, and name the margin.
 
     A waypoint that breaks its limits only less the margin may be refused as a lifting wheel,
     because no torques were found; the reason is the margin nevertheless.
+
+    Args:
+        verdicts: The verdicts on refused paths.
+        options: The options they were judged with.
+        judge_others: Judges some of the paths, by their indices, with other options.
+    """
+    equal = judge_others(range(len(verdicts)), replace(options, policy=EQUAL))
+    weighed = [forgive(one, other) for one, other in zip(verdicts, equal, strict=True)]
+    named = {"", *MARGIN_CODES}
+    unnamed = [k for k, verdict in enumerate(weighed) if not set(verdict.codes) <= named]
+    physical = judge_others(unnamed, replace(options, control_margin=0.0)) if unnamed else []
+    for k, other in zip(unnamed, physical, strict=True):
+        weighed[k] = name_margin(weighed[k], other, options.control_margin)
+    return weighed
+
+
+def _weigh_first_failure(
+    path: ArrayLike, judged: Judged, options: SweepOptions, judge_with: Judge
+) -> Judged:
+    """Return a refused path as `weigh_margin` would, from verdicts that end at the first failure.
+
+    They suffice if the path fails at the same waypoint with equal torques and, unless the reason
+    names the margin already, not before it without margin. Else the path is judged in full.
     """
     prediction, verdict = judged
+    at, kept = verdict.first_failure, options.control_margin
+    equal = judge_with([path], replace(options, policy=EQUAL), True)[0][1]
+    if equal.first_failure == at:
+        if verdict.code in MARGIN_CODES:
+            return judged
+        physical = judge_with([path], replace(options, control_margin=0.0), True)[0][1]
+        if physical.first_failure == at:
+            return judged
+        if not 0 <= physical.first_failure < at:
+            return prediction, name_margin_at(verdict, [at], kept)
+    return _judge_and_weigh(path, options, judge_with)
+
+
+def _judge_and_weigh(path: ArrayLike, options: SweepOptions, judge_with: Judge) -> Judged:
+    """Judge one path in full and weigh its margin."""
+    prediction, verdict = judge_with([path], options, False)[0]
     if verdict.traversable:
-        return judged
-    paths = [prediction.poses]
-    verdict = forgive(verdict, judge_with(paths, replace(options, policy=EQUAL))[0][1])
-    if not set(verdict.codes) <= {"", *MARGIN_CODES}:
-        physical = judge_with(paths, replace(options, control_margin=0.0))[0][1]
-        verdict = name_margin(verdict, physical, options.control_margin)
-    return prediction, verdict
+        return prediction, verdict
+
+    def judge_others(rows: Sequence[int], others: SweepOptions) -> list[Verdict]:
+        return [judge_with([path], others, False)[0][1] for _ in rows]
+
+    return prediction, weigh_margin([verdict], options, judge_others)[0]
 
 
 def _judge_under_policy(
     rover: Rover,
     terrain: Terrain,
+    sigmas: float | None,
     paths: Sequence[ArrayLike],
     options: SweepOptions,
-    sigmas: float | None,
+    stop_at_failure: bool,
 ) -> list[Judged]:
     """Judge several paths under the policy of the options."""
-    check_sigmas(sigmas)
+    if stop_at_failure:
+        swept_paths = sweep_until_failure(rover, terrain, paths, options)
+    else:
+        in_full = sweep_in_full(rover, terrain, paths, options)
+        swept_paths = [(swept, judge(rover, swept.prediction)) for swept in in_full]
     judged = []
-    for prediction in sweep_paths(rover, terrain, paths, options):
+    for swept, verdict in swept_paths:
         check_interruption()
-        verdict = judge(rover, prediction)
         if verdict.code != "wheel_drop":
-            verdict = ask_for_ways_out(rover, terrain, prediction, verdict, options)
+            course = course_of(rover, terrain, swept, options)
+            verdict = ask_for_ways_out(rover, terrain, course, verdict, options)
+        prediction = swept.prediction
         bounds = bound_path(rover, terrain, prediction, options, sigmas)
         if bounds is not None:
             verdict = judge_bounds(rover, prediction, bounds, verdict)

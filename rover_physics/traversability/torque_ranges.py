@@ -85,19 +85,17 @@ def find_torque_ranges(
     poses = check_poses(poses)
     model = pack_model(rover, terrain, replace(options, policy="optimal", control_margin=0.0))
     n = len(poses)
-    results, work = new_results(n), new_work()
+    result, work = new_results(1)[0], new_work()
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
         with sweep_lock:
             work.pose[:] = poses[i]
-            evaluate_pose(model.record, work, results[i])
-        if results[i].status != PoseStatus.SETTLED or not _is_within(rover, model, results[i]):
+            evaluate_pose(model.record, work, result)
+        if result.status != PoseStatus.SETTLED or not _is_within(rover, model, result):
             continue
         feasible[i] = True
-        lowest[i], highest[i] = _find_extremes(
-            _describe_set(rover, model, work.balance, results[i])
-        )
+        lowest[i], highest[i] = _find_extremes(_describe_set(rover, model, work.balance, result))
     scale = model.record.linkage.radius * model.record.linkage.mass * model.record.linkage.gravity
     most = model.settings.allowed_torque  # Clarabel's tolerance is 1e-8
     lowest, highest = (np.clip(scale * ends, -most, most) for ends in (lowest, highest))

@@ -1,5 +1,6 @@
 """Verdict on a prediction: whether each waypoint keeps the safety limits, and if not, why."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -34,6 +35,24 @@ MARGIN_CODES = ("friction", "torque")
 """Codes of the limits that a control margin reduces; their reasons name it."""
 UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
 """Codes of limits that do not count while a wheel rolls off an edge."""
+LOWEST = (
+    "min_tip_over_ratio",
+    "min_belly_clearance",
+    "tip_over_ratio_bound",
+    "belly_clearance_bound",
+)
+"""Fields of a verdict that are the smallest value on the path."""
+LARGEST = (
+    "max_friction_utilisation",
+    "max_torque_saturation",
+    "max_tilt",
+    "max_wheel_drop",
+    "max_sinkage",
+    "friction_utilisation_bound",
+    "torque_saturation_bound",
+    "tilt_bound",
+)
+"""Fields of a verdict that are the largest value on the path."""
 _LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
 """Codes of limits that are lower bounds."""
 _PLACELESS = {
@@ -142,6 +161,22 @@ def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
     )
 
 
+def find_first_failure(rover: Rover, prediction: PathPrediction) -> int:
+    """Return the first failure that `judge` finds, -1 if there is none, without the reasons."""
+    first = len(prediction.poses)
+    for part in (prediction, prediction.between):
+        if part is None or not len(part.poses):
+            continue
+        broken = part.status != PoseStatus.SETTLED
+        needed = _where_forces_count(part)
+        for check in check_limits(rover, part):
+            if check.breaks:
+                counts = needed if check.code in UNNEEDED_IN_A_FALL else True
+                broken = broken | (check.broken() & part.settled & counts)
+        first = min(first, int(part.waypoint[broken].min(initial=first)))
+    return first if first < len(prediction.poses) else -1
+
+
 def forgive(verdict: Verdict, other: Verdict) -> Verdict:
     """Return a verdict without its refusals of waypoints that another verdict does not refuse.
 
@@ -152,7 +187,7 @@ def forgive(verdict: Verdict, other: Verdict) -> Verdict:
     refused = [bool(code) for code in other.codes]
     codes = [code if keep else "" for code, keep in zip(verdict.codes, refused, strict=True)]
     reasons = [text if keep else "" for text, keep in zip(verdict.reasons, refused, strict=True)]
-    return _with_refusals(verdict, codes, reasons)
+    return with_refusals(verdict, codes, reasons)
 
 
 def name_margin(verdict: Verdict, physical: Verdict, margin: float) -> Verdict:
@@ -163,15 +198,24 @@ def name_margin(verdict: Verdict, physical: Verdict, margin: float) -> Verdict:
         physical: The verdict on the same path without one.
         margin: The control margin.
     """
+    waypoints = [
+        i
+        for i, code in enumerate(verdict.codes)
+        if code and code not in MARGIN_CODES and not physical.codes[i]
+    ]
+    return name_margin_at(verdict, waypoints, margin)
+
+
+def name_margin_at(verdict: Verdict, waypoints: Sequence[int], margin: float) -> Verdict:
+    """Return a verdict that names the control margin as the reason of some waypoints' refusals."""
     codes, reasons = list(verdict.codes), list(verdict.reasons)
-    for i, code in enumerate(codes):
-        if code and code not in MARGIN_CODES and not physical.codes[i]:
-            codes[i] = "torque"
-            reasons[i] = f"no torques within their limit less control margin {margin:g}"
-    return _with_refusals(verdict, codes, reasons)
+    for i in waypoints:
+        codes[i] = "torque"
+        reasons[i] = f"no torques within their limit less control margin {margin:g}"
+    return with_refusals(verdict, codes, reasons)
 
 
-def _with_refusals(verdict: Verdict, codes: list[str], reasons: list[str]) -> Verdict:
+def with_refusals(verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]) -> Verdict:
     """Return a verdict with other codes and reasons of its waypoints."""
     first = next((i for i, code in enumerate(codes) if code), -1)
     return replace(

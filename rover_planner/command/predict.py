@@ -18,7 +18,12 @@ from rover_planner.command.options import (
     Vector,
 )
 
+MAX_IN_MEMORY = 20_000
+"""Largest number of poses whose prediction is kept in memory; longer paths are written in parts,
+except with classes."""
+
 if TYPE_CHECKING:
+    from rover_physics.traversability.torque_ranges import TorqueRanges
     from rover_physics.traversability.verdict import Verdict
 
 
@@ -82,9 +87,14 @@ def predict(
     from rover_physics.terrain.grid import load_terrain
     from rover_physics.traversability.classification import classify_judged
     from rover_physics.traversability.judge_path import judge_path
+    from rover_physics.traversability.long_path import judge_long_path
     from rover_physics.traversability.torque_ranges import find_torque_ranges
     from rover_planner.command.arm_options import read_arm_angles
-    from rover_planner.command.prediction_files import read_poses, write_prediction
+    from rover_planner.command.prediction_files import (
+        read_poses,
+        write_prediction,
+        writing_parts,
+    )
     from rover_planner.progress import show_progress
 
     model = load_rover(rover)
@@ -101,20 +111,32 @@ def predict(
         tool_force=tool_force,
         tool_moment=tool_moment,
     )
+    on_soil = soil is not None or bool(ground.soil_names)
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
-        judged = judge_path(model, ground, path, options, sigmas=sigmas)
-        if classes:
-            progress("classify the waypoints")
-        found = (
-            classify_judged(model, ground, *judged, options, sigmas=sigmas) if classes else None
-        )
-        if torque_ranges:
+
+        def find_ranges() -> "TorqueRanges | None":
+            if not torque_ranges:
+                return None
             progress("find the ranges of the torques")
-        ranges = find_torque_ranges(model, ground, path, options) if torque_ranges else None
-    on_soil = soil is not None or bool(ground.soil_names)
-    write_prediction(out, *judged, on_soil=on_soil, classes=found, ranges=ranges)
-    typer.echo(f"wrote {out}: {_summarise(len(path), judged[1])}")
+            return find_torque_ranges(model, ground, path, options)
+
+        if len(path) > MAX_IN_MEMORY and not classes:
+            with writing_parts(out, len(path), on_soil) as file:
+                verdict = judge_long_path(
+                    model, ground, path, options, sigmas=sigmas, take=file.take
+                )
+                file.close(verdict, find_ranges())
+        else:
+            prediction, verdict = judge_path(model, ground, path, options, sigmas=sigmas)
+            found = None
+            if classes:
+                progress("classify the waypoints")
+                found = classify_judged(model, ground, prediction, verdict, options, sigmas=sigmas)
+            write_prediction(
+                out, prediction, verdict, on_soil=on_soil, classes=found, ranges=find_ranges()
+            )
+    typer.echo(f"wrote {out}: {_summarise(len(path), verdict)}")
 
 
 def _summarise(count: int, verdict: "Verdict") -> str:

@@ -12,6 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import ArrayHeader, open_npz, write_npz
+from rover_physics.files.npz_parts import NpzParts
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.traversability.classification import ClassifiedWaypoint
@@ -67,6 +68,8 @@ MAX_NUMBER = 1e9
 """Largest magnitude in `poses` and SHOWN [m, rad, s]."""
 MAX_POSES = 1_000_000
 """Largest number of poses or waypoints in a file."""
+BLOCK = 10_000
+"""Number of reasons that are written at a time."""
 MAX_REASONS = 200_000_000
 """Largest size of the reasons in a file [bytes]."""
 
@@ -193,11 +196,75 @@ def write_prediction(
     Raises:
         PlanningError: The file cannot be written.
     """
-    names = (*ARRAYS, *REPLAY_ARRAYS, *(SOIL_ARRAYS if on_soil else ()))
-    arrays = {name: getattr(prediction, name) for name in names}
+    arrays = _rows_of(prediction, on_soil)
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
-    arrays["traversable"] = np.array(verdict.traversable, dtype=np.bool_)
-    arrays["first_failure"] = np.array(verdict.first_failure, dtype=np.int64)
+    with _errors_of(path):
+        write_npz(
+            path, arrays | _summary_of(verdict, prediction, classes, ranges), compressed=False
+        )
+
+
+@contextmanager
+def writing_parts(path: Path, count: int, on_soil: bool) -> Iterator["PartsFile"]:
+    """Write a file as `write_prediction`, for a path that is too long to be kept in memory.
+
+    Args:
+        path: The file; an existing one is overwritten. Temporary files are made beside it.
+        count: Number of waypoints.
+        on_soil: As for `write_prediction`.
+
+    Raises:
+        PlanningError: A file cannot be written.
+    """
+    with _errors_of(path), NpzParts(path.absolute().parent, count) as parts:
+        yield PartsFile(path, parts, on_soil)
+
+
+class PartsFile:
+    """A file of a prediction whose waypoints come part by part."""
+
+    def __init__(self, path: Path, parts: NpzParts, on_soil: bool):
+        self._path, self._parts, self._on_soil = path, parts, on_soil
+        self._last: PathPrediction | None = None
+
+    def take(self, prediction: PathPrediction) -> None:
+        """Take the prediction of the next waypoints."""
+        self._parts.add(_rows_of(prediction, self._on_soil))
+        bounds = prediction.bounds
+        if bounds is not None:
+            self._parts.add({f"{name}_bounds": getattr(bounds, name) for name in BOUNDED_VALUES})
+        self._last = prediction
+
+    def close(self, verdict: Verdict, ranges: TorqueRanges | None = None) -> None:
+        """Write the file with the verdict on all waypoints; arguments as `write_prediction`."""
+        assert self._last is not None
+        longest = max(1, max(map(len, verdict.reasons)))
+        for first in range(0, len(verdict.reasons), BLOCK):
+            block = np.array(verdict.reasons[first : first + BLOCK], f"<U{longest}")
+            self._parts.add({"reason": block})
+        summary = _summary_of(verdict, self._last, None, ranges)
+        self._parts.write(
+            self._path, {name: summary[name] for name in summary if not name.endswith("_bounds")}
+        )
+
+
+def _rows_of(prediction: PathPrediction, on_soil: bool) -> dict[str, Any]:
+    """Return the arrays that have a row for each waypoint."""
+    names = (*ARRAYS, *REPLAY_ARRAYS, *(SOIL_ARRAYS if on_soil else ()))
+    return {name: getattr(prediction, name) for name in names}
+
+
+def _summary_of(
+    verdict: Verdict,
+    prediction: PathPrediction,
+    classes: Sequence[ClassifiedWaypoint] | None,
+    ranges: TorqueRanges | None,
+) -> dict[str, Any]:
+    """Return the arrays of verdict, bounds, classes and torque ranges, without the reasons."""
+    arrays: dict[str, Any] = {
+        "traversable": np.array(verdict.traversable, dtype=np.bool_),
+        "first_failure": np.array(verdict.first_failure, dtype=np.int64),
+    }
     if prediction.bounds is not None:
         arrays["map_sigmas"] = np.array(prediction.bounds.sigmas)
         for name in BOUNDED_VALUES:
@@ -209,5 +276,4 @@ def write_prediction(
         arrays["class_margin"] = np.array([waypoint.margin for waypoint in classes])
     if ranges is not None:
         arrays["torque_range"] = np.stack([ranges.lowest, ranges.highest], axis=-1)
-    with _errors_of(path):
-        write_npz(path, arrays)
+    return arrays

@@ -95,12 +95,13 @@ def view(
 
 def _compile() -> None:
     """Compile the kernels or load them from the cache before the page is served."""
-    from rover_physics.warm_up import warm_up
+    from rover_physics.compilation import Compilation
+    from rover_physics.warm_up import EXACT, UNCERTAIN
     from rover_planner.progress import show_progress
 
-    with show_progress() as progress:
-        progress("compile the model (only the first time takes long)")
-        warm_up()
+    with show_progress() as progress, Compilation((*EXACT, *UNCERTAIN)) as compilation:
+        progress("load the model")
+        compilation.run(lambda name: progress(f"compile {name} (only the first time)"))
 
 
 def _show(session: "ViewSession", host: str, port: int, prediction: Path | None) -> "PageBase":

@@ -341,8 +341,8 @@ def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     """Draw one predicted quantity along a path: six wheels, or one value."""
     values = np.asarray(getattr(candidate.prediction, name))
     steps = np.hypot(*np.diff(candidate.poses[:, :2], axis=0).T)
-    distance = np.concatenate([[0.0], np.cumsum(steps)])
-    columns = values.reshape(len(values), -1)
+    whole = np.concatenate([[0.0], np.cumsum(steps)])
+    distance, columns = whole[: len(values)], values.reshape(len(values), -1)
     if np.allclose(columns, columns[:, :1], equal_nan=True):
         axes.plot(distance, columns[:, 0], color=_INK, lw=1.3)
     else:
@@ -354,7 +354,7 @@ def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     failure = candidate.verdict.first_failure
     if failure >= 0:
         axes.axvline(distance[failure], color=REFUSED, lw=1.2)
-    axes.set_xlim(0, max(distance[-1], 1e-3))
+    axes.set_xlim(0, max(whole[-1], 1e-3))
 
 
 def _wheel_legend() -> list[Line2D]:

@@ -218,4 +218,4 @@ class _Results:
         """Return indices of waypoints about `plan_spacing` apart and where the class changes."""
         candidate = self.judgement.candidate
         assert candidate is not None
-        return decimate(candidate.poses, self.plan_spacing, self.judgement.changes())
+        return decimate(candidate.prediction.poses, self.plan_spacing, self.judgement.changes())

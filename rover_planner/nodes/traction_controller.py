@@ -25,11 +25,11 @@ from msg_adapters.commands import joint_order
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.results.traction_status import traction_diagnostics
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_COUNT, WHEEL_JOINTS
-from rover_physics.terrain.grid import Terrain
+from rover_physics.names import WHEEL_COUNT
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.traction_inputs import TractionInputs
 from rover_planner.nodes.traction_topics import TractionTopics, latched_qos
+from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
@@ -41,6 +41,7 @@ from rover_planner.ros.realtime import take_priority
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.ros.transition_log import TransitionLog
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clock_watch import ClockWatch
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
@@ -56,7 +57,6 @@ from rover_planner.traction.traction_service import TractionService
 from rover_planner.traction.watchdog import Watchdog
 
 NODE_NAME = "traction_controller"
-JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 MIN_WATCHDOG_PERIODS = 2.0
@@ -78,7 +78,8 @@ class TractionController(Node):
         super().__init__(NODE_NAME, **node_arguments)
         self._values = declare_parameters(self, TractionControllerParameters)
         self._accepted = self._values, load_traction_settings(self._values)
-        self._warm_up()
+        load_kernels(TRACTION, (), self.get_logger().info)
+        update_traction(self._accepted[1])  # so that the first update is as fast as others
         self._supervisor = TractionSupervisor(self._accepted[1], self._values.enabled_at_start)
         self._statistics = TractionStatistics(1.0 / self._values.rate)
         self._command: TractionCommand | None = None
@@ -136,18 +137,6 @@ class TractionController(Node):
         self._watchdog.close()
         self._maps.close()
         super().destroy_node()
-
-    def _warm_up(self) -> None:
-        """Compile and run everything once, so that the first update is as fast as others."""
-        service = TractionService(self._accepted[1])
-        joints = dict.fromkeys(JOINTS, 0.0)
-        service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
-        for now in (0.0, 0.01):
-            service.take_joints(joints, dict.fromkeys(JOINTS, 0.1), now)
-            service.take_attitude(0.0, 0.0, np.zeros(3), now)
-            service.take_command(0.01, 0.0, now)
-            service.take_odometry(np.zeros(4), 0.0, now)
-            service.update(now)
 
     def _create_switches(self) -> None:
         """Create the service that enables and the subscriptions to the emergency stop.
@@ -296,16 +285,21 @@ class TractionController(Node):
 class _Stop:
     """Turns signals into a stop request; ROS's own handlers would end the context too early.
 
-    The context must exist until the zero torques are sent.
+    The context must exist until the zero torques are sent. As long as the node starts, no torques
+    were sent, and a signal ends the start, which may have to compile kernels.
     """
 
     def __init__(self) -> None:
         self.wanted = False
+        self.starting = True
+        """Whether a signal raises KeyboardInterrupt."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._ask)
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.wanted = True
+        if self.starting:
+            raise KeyboardInterrupt
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -320,6 +314,7 @@ def main(words: Sequence[str] | None = None) -> int:
             "compiling kernels; the first start takes longest"
         )
         node = TractionController()
+        stop.starting = False
         warn_of_disk(node.get_logger())
         node.take_priority()
         executor = GuardedExecutor()
@@ -332,7 +327,7 @@ def main(words: Sequence[str] | None = None) -> int:
     except INPUT_ERRORS as error:
         rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
         return EXIT_BAD_INPUT
-    except ExternalShutdownException:
+    except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_OK
     finally:
         if node is not None:

@@ -28,7 +28,7 @@ from msg_adapters.results.server_status import server_diagnostics
 from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
-from rover_physics.warm_up import warm_up
+from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.nodes.map_file_service import MapFileService
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.nodes.path_validity import PathValidity
@@ -55,6 +55,7 @@ from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.ros.requests import subscribe_to_requests
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.shell.kernels import load_kernels
 from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "traverse_server"
@@ -72,7 +73,7 @@ class TraverseServer(Node):
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
-        warm_up()
+        self._behind = load_kernels(EXACT, UNCERTAIN, self.get_logger().info)
         warn_of_disk(self.get_logger())
         self._values = declare_parameters(self, TraverseServerParameters)
         self._service = TraverseService(load_service_settings(self._values))
@@ -118,6 +119,7 @@ class TraverseServer(Node):
         """Refuse open questions, end the threads and destroy the node."""
         self.desk.close()
         self._maps.close()
+        self._behind.close()
         super().destroy_node()
 
     def _create_subscriptions(self, reliability: str) -> None:

@@ -1,7 +1,7 @@
 """Judges candidate paths between two poses, compares risk and energy, and explains the choice."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_paths
+from rover_physics.traversability.judge_path import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.planning.candidates import generate_candidates, path_length
@@ -67,12 +67,18 @@ class Candidate:
     poses: NDArray[np.float64]
     """x, y [m] and yaw [rad] of the body origin at each waypoint, (n, 3), map frame."""
     prediction: PathPrediction
-    """The model's outputs at each waypoint."""
+    """The model's outputs at each waypoint; those of a refused candidate may end at its first
+    failure or a little beyond it."""
     verdict: Verdict
     """Whether the rover may drive the path, and the reason if not."""
     cost: tuple[float, float]
     """Risk (used share of a safety limit, in steps of RISK_STEP) and energy [J]; both infinite
     if the path is not traversable."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all waypoints were judged, also those beyond the first failure."""
+        return len(self.prediction.poses) == len(self.poses)
 
     @property
     def length(self) -> float:
@@ -142,6 +148,8 @@ def answer_path_query(
 ) -> PathAnswer:
     """Evaluate the candidate paths from start to goal and choose the best traversable one.
 
+    A candidate that is refused is judged up to its first failure; `check_path` judges all of it.
+
     Args:
         rover: The rover; its wheelbase is the smallest radius of a candidate.
         terrain: The ground, map frame.
@@ -163,7 +171,16 @@ def answer_path_query(
         waypoint_spacing=options.waypoint_spacing,
         min_radius=smallest_radius(rover),
     )
-    return choose(tuple(_check_paths(rover, terrain, paths, options, joint_angles)))
+    sweep_options = options.sweep_options(joint_angles)
+    judged = judge_paths(
+        rover, terrain, paths, sweep_options, sigmas=options.map_sigmas, stop_at_failure=True
+    )
+    return choose(
+        tuple(
+            Candidate(poses, prediction, verdict, path_cost(rover, prediction, verdict))
+            for poses, (prediction, verdict) in zip(paths, judged, strict=True)
+        )
+    )
 
 
 def check_path(
@@ -172,28 +189,28 @@ def check_path(
     poses: NDArray[np.float64],
     options: PathQueryOptions | None = None,
     joint_angles: Mapping[str, float] | None = None,
+    *,
+    stop_at_failure: bool = False,
 ) -> Candidate:
-    """Evaluate and judge a given path of poses (n, 3); arguments as in `answer_path_query`.
+    """Evaluate and judge a given path of poses (n, 3); other arguments as `answer_path_query`.
+
+    With `stop_at_failure`, the waypoints beyond the first failure are left out.
 
     Raises:
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
-    return _check_paths(rover, terrain, [poses], options or PathQueryOptions(), joint_angles)[0]
-
-
-def _check_paths(
-    rover: Rover,
-    terrain: Terrain,
-    paths: Sequence[NDArray[np.float64]],
-    options: PathQueryOptions,
-    joint_angles: Mapping[str, float] | None,
-) -> list[Candidate]:
+    options = options or PathQueryOptions()
     asked = options.sweep_options(joint_angles)
-    judged = judge_paths(rover, terrain, paths, asked, sigmas=options.map_sigmas)
-    return [
-        Candidate(prediction.poses, prediction, verdict, path_cost(rover, prediction, verdict))
-        for prediction, verdict in judged
-    ]
+    poses = np.array(poses, np.float64)
+    prediction, verdict = judge_path(
+        rover,
+        terrain,
+        poses,
+        asked,
+        sigmas=options.map_sigmas,
+        stop_at_failure=stop_at_failure,
+    )
+    return Candidate(poses, prediction, verdict, path_cost(rover, prediction, verdict))
 
 
 def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:

@@ -1,5 +1,6 @@
 """Makes the report of a judged path: extremes, failure, classes and the search for it."""
 
+import math
 from collections.abc import Sequence
 
 from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
@@ -72,10 +73,10 @@ def _report_extremes(candidate: Candidate) -> PathReport:
         torque_saturation_bound=verdict.torque_saturation_bound,
         tilt_bound=verdict.tilt_bound,
         belly_clearance_bound=verdict.belly_clearance_bound,
-        waypoints=len(prediction.poses),
+        waypoints=len(candidate.poses),
         length=candidate.length,
-        time=float(prediction.time[-1]),
-        energy=float(prediction.energy[-1]),
+        time=float(prediction.time[-1]) if candidate.is_complete else math.nan,
+        energy=float(prediction.energy[-1]) if candidate.is_complete else math.nan,
     )
 
 

@@ -54,9 +54,9 @@ class PathReport:
     length: float
     """Length of the path [m]."""
     time: float
-    """Driving time [s]; NaN if the last waypoint did not settle."""
+    """Driving time [s]; NaN if the last waypoint did not settle or was not judged."""
     energy: float
-    """Energy of the wheel motors [J]; NaN if the last waypoint did not settle."""
+    """Energy of the wheel motors [J]; NaN as for the time."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,10 @@ class IdentityReport:
 
 @dataclass(frozen=True)
 class WaypointLists:
-    """Verdict and class of each waypoint; only in the JSON, because they are long."""
+    """Verdict and class of each waypoint; only in the JSON, because they are long.
+
+    If there was no time for the waypoints beyond the first failure, the lists are without them.
+    """
 
     codes: tuple[str, ...]
     """Code of the violated limit; empty if passable under `policy`."""

@@ -10,6 +10,7 @@ from typing import Any
 import rclpy
 
 from rover_physics.numerics.kernel_cache import kernel_cache_note
+from rover_planner.ros.realtime import avoid_huge_pages
 
 NO_LOG_FILE = ["--ros-args", "--disable-external-lib-logs"]
 """Arguments that keep ROS from writing a log file, without which it does not start."""
@@ -22,6 +23,7 @@ def init_ros(words: Sequence[str] | None, **options: Any) -> None:
         words: Arguments of the program; None takes those of the process.
         options: Further arguments of `rclpy.init`.
     """
+    avoid_huge_pages()
     arguments = sys.argv if words is None else list(words)
     rclpy.init(args=[*arguments, *(NO_LOG_FILE if log_fault() else [])], **options)
 

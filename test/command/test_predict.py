@@ -312,3 +312,32 @@ def test_impossible_soils_arms_and_loads_are_one_line(capfd, files, words, names
 def test_an_arm_that_is_not_there_has_no_angles(capfd, files):
     words = [*predict_words(files, rover="m2020"), "--arm", "arm_yaw=0"]
     assert_refused(capfd, main(words), "no manipulator")
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["--soil", "dry_sand"], ["--sigmas", "2", "--friction", "0.2"]]
+)
+def test_a_long_path_that_is_written_in_parts_gives_the_same_file(files, monkeypatch, words):
+    if "--sigmas" in words:
+        terrain = load_terrain(files / "terrain.npz")
+        std = np.full(terrain.elevation.shape, 0.004)
+        save_terrain(files / "terrain.npz", replace(terrain, elevation_std=std))
+    assert main([*predict_words(files), *words]) == 0
+    monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
+    monkeypatch.setattr("rover_planner.command.prediction_files.BLOCK", 7)
+    monkeypatch.setattr("rover_physics.prediction.parts.PART", 10)
+    assert main([*predict_words(files, out="parts.npz"), *words]) == 0
+    with np.load(files / "out.npz") as whole, np.load(files / "parts.npz") as parts:
+        assert set(parts.files) == set(whole.files)
+        for name in whole.files:
+            assert parts[name].dtype == whole[name].dtype
+            np.testing.assert_array_equal(parts[name], whole[name], err_msg=name)
+        assert whole["traversable"] == ("--friction" not in words)
+    assert sorted(path.name for path in files.iterdir() if path.name.startswith(".")) == []
+
+
+def test_a_disk_that_is_full_is_one_line_and_leaves_no_temporary_file(files, monkeypatch, capfd):
+    monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
+    (files / "out.npz").symlink_to("/dev/full")
+    assert_refused(capfd, main(predict_words(files)), "No space left on device")
+    assert [path.name for path in files.iterdir() if path.name.startswith(".")] == []

@@ -15,6 +15,12 @@ names = os.listdir("/proc/self/task")
 print({os.sched_getscheduler(int(name)) == os.SCHED_FIFO for name in names})
 """
 
+PAGES = """
+from rover_planner.ros.disk import init_ros
+init_ros([])
+print([line for line in open("/proc/self/status") if line.startswith("THP_enabled")])
+"""
+
 
 def test_all_threads_take_it_or_the_reason_is_told():
     run = subprocess.run(
@@ -30,3 +36,10 @@ def test_zero_asks_for_nothing():
 
 def test_what_no_system_grants_is_told():
     assert "realtime_priority 1000" in take_priority(1000)
+
+
+def test_the_kernel_does_not_collect_the_memory_of_a_node_into_huge_pages():
+    run = subprocess.run(
+        [sys.executable, "-c", PAGES], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert "THP_enabled:\\t0" in run.stdout

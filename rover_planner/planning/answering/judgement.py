@@ -32,6 +32,9 @@ class Judgement:
     """Comparison with the measured suspension; None without measurements."""
     search: PathSearch | None = None
     """The search that found the path; None if the path was given."""
+    judge_rest: Callable[[], "Judgement"] | None = None
+    """Judges the waypoints beyond the first failure and returns the judgement with them; None if
+    they are judged."""
 
     @property
     def traversable(self) -> bool:
@@ -46,13 +49,16 @@ class Judgement:
     def complete(self) -> "Judgement":
         """Return the judgement with all done that needs the model; later calls are quick.
 
-        If there is no time for classes, the judgement has none.
+        If there is no time for the waypoints beyond the first failure, or for classes, the
+        judgement is without them.
         """
+        whole = self
         try:
-            _ = self.changes() if self._is_equal_and_traversable else self.classes
+            whole = self if self.judge_rest is None else self.judge_rest()
+            _ = whole.changes() if whole._is_equal_and_traversable else whole.classes
         except QuestionStoppedError:
-            return replace(self, classify=tuple)
-        return self
+            return replace(whole, classify=tuple, judge_rest=None)
+        return whole
 
     @property
     def _is_equal_and_traversable(self) -> bool:
@@ -62,7 +68,9 @@ class Judgement:
 
     @cached_property
     def report(self) -> VerdictReport:
-        """The full report of the request. Computed on first use, with the classes."""
+        """The full report of the request. Computed on first use, with the classes and the rest."""
+        if self.judge_rest is not None:
+            return self.judge_rest().report
         if self.candidate is None:
             return VerdictReport(False, self.code, self.reason)
         return report_path(self.candidate, self.classes, self.suspension, self.search)

@@ -82,7 +82,8 @@ class Situation:
             search = planner.search(
                 np.asarray(start, np.float64), np.asarray(goal, np.float64), tolerance
             )
-            return self._judgement(planner, search.answer.chosen, search)
+            suspension = self._compare_suspension(planner.predict_standing)
+            return _judgement(planner, search.answer.chosen, suspension, search)
 
         return self.refuse_map() or judge(self._planner())
 
@@ -99,7 +100,8 @@ class Situation:
         assert self.path.poses is not None
         planner = self._planner()
         poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
-        return self._judgement(planner, planner.check(poses))
+        candidate = planner.check(poses)
+        return _judgement(planner, candidate, self._compare_suspension(planner.predict_standing))
 
     def refuse_if_missing(self) -> Judgement | None:
         """Return a refusal if there is no path or no map to use, else None."""
@@ -123,19 +125,6 @@ class Situation:
             self.settings.rover, self.terrain, self.settings.query, self._manipulator_angles()
         )
 
-    def _judgement(
-        self, planner: PathPlanner, candidate: Candidate, search: PathSearch | None = None
-    ) -> Judgement:
-        """Return the judgement of a judged path; its classes are computed on demand."""
-        return Judgement(
-            candidate.verdict.code,
-            candidate.verdict.reason,
-            candidate,
-            partial(planner.classify, candidate),
-            self._compare_suspension(planner.predict_standing),
-            search,
-        )
-
     def _compare_suspension(
         self, predict: Callable[[NDArray[np.float64]], PathPrediction]
     ) -> SuspensionReport | None:
@@ -151,3 +140,25 @@ class Situation:
         if not names or any(name not in self.joints for name in names):
             return None
         return {name: self.joints[name] for name in names}
+
+
+def _judgement(
+    planner: PathPlanner,
+    candidate: Candidate,
+    suspension: SuspensionReport | None,
+    search: PathSearch | None = None,
+) -> Judgement:
+    """Return the judgement of a judged path; classes and the rest of it follow on demand."""
+
+    def judge_rest() -> Judgement:
+        return _judgement(planner, planner.check(candidate.poses), suspension, search)
+
+    return Judgement(
+        candidate.verdict.code,
+        candidate.verdict.reason,
+        candidate,
+        partial(planner.classify, candidate),
+        suspension,
+        search,
+        None if candidate.is_complete else judge_rest,
+    )

@@ -92,7 +92,7 @@ class ViewSession:
         began = time.perf_counter()
         if self.recorded:
             poses = self.shown.candidate.poses
-            only = check_path(self.rover, self.terrain, poses, self.options, self.arm_angles)
+            only = self._check(self.rover, poses, self.arm_angles)
             self.answer = choose((only,))
         else:
             self.answer = answer_path_query(
@@ -104,6 +104,14 @@ class ViewSession:
         if self.recorded:
             words = "recorded path judged again in"
         self._show(self.answer.nearest, self.answer.chosen, f"{words} {_milliseconds(began)}")
+
+    def _check(
+        self, rover: Rover, poses: NDArray[np.float64], arm_angles: dict[str, float]
+    ) -> Candidate:
+        """Judge a path up to its first failure, where its playback ends."""
+        return check_path(
+            rover, self.terrain, poses, self.options, arm_angles, stop_at_failure=True
+        )
 
     def _show(self, index: int, candidate: Candidate, summary: str) -> None:
         trajectory = Trajectory(self.rover, candidate.prediction, candidate.verdict)
@@ -205,7 +213,7 @@ class ViewSession:
         began = time.perf_counter()
         try:
             poses = self.shown.candidate.poses
-            candidate = check_path(rover, self.terrain, poses, self.options, arm_angles)
+            candidate = self._check(rover, poses, arm_angles)
         except REFUSALS as error:
             self.refusal = str(error)
             return False

@@ -82,7 +82,9 @@ def test_a_late_subscriber_gets_the_state(ros, rover, controller):
     from benchmarks.driven_rover import DrivenRover
 
     late = ros.spin(DrivenRover(ros.context))
-    wait_until(lambda: late.state == "driving" and late.brakes[-1] is False, "the latched state")
+    wait_until(
+        lambda: late.state == "driving" and late.brakes[-1:] == [False], "the latched state"
+    )
 
 
 def test_a_stall_ends_the_push_and_is_reported(rover, start_controller):
@@ -137,3 +139,24 @@ def test_a_process_that_is_told_to_end_sends_zeros_last(rover, how):
         process.kill()
         process.wait()
     wait_until(lambda: rover.torque == 0.0, "zeros")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_while_kernels_compile(tmp_path, how):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rover_planner.nodes.traction_controller"],
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "NUMBA_CACHE_DIR": str(tmp_path)},
+        stderr=subprocess.STDOUT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        next(line for line in process.stdout if "compiling kernels 1 of 1" in line)
+        time.sleep(1.0)
+        process.send_signal(how)
+        rest, _ = process.communicate(timeout=5.0)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 0 and "Traceback" not in rest and "ready" not in rest

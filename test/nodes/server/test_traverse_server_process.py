@@ -67,10 +67,10 @@ def test_it_says_what_it_does_and_ends_cleanly(start_process, how):
 def test_a_signal_ends_it_while_kernels_compile(start_process, tmp_path, monkeypatch, how):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     process = start_process()
-    read_until(process, "compiling kernels")
-    time.sleep(2.0)
+    read_until(process, "compiling kernels 1 of 3: rover")
+    time.sleep(1.0)
     process.send_signal(how)
-    rest, _ = process.communicate(timeout=10.0)
+    rest, _ = process.communicate(timeout=5.0)
     assert process.returncode == 0 and "Traceback" not in rest and "ready" not in rest
 
 

@@ -43,7 +43,7 @@ class SmallPackage:
         self.home.mkdir()
         numerics = self.package / "numerics"
         numerics.mkdir(parents=True)
-        for name in ("kernels.py", "kernel_cache.py"):
+        for name in ("kernels.py", "kernel_cache.py", "kernel_compiler.py"):
             shutil.copy(Path(rover_physics.numerics.__file__).parent / name, numerics)
         for name, text in (("__init__", ""), ("callee", CALLEE), ("caller", CALLER)):
             (self.package / f"{name}.py").write_text(text)
@@ -75,6 +75,12 @@ def package(tmp_path):
 def test_kernels_are_kept_on_disk(package):
     assert package.run() == (7.0, 0, "")
     assert package.run() == (7.0, 1, "")
+
+
+def test_only_the_kernel_that_python_calls_is_kept_on_disk(package):
+    package.run()
+    kept = {file.name.split("-")[0] for file in package.package.rglob("*.nbc")}
+    assert kept == {"caller.twice_and_one"}
 
 
 def test_kernels_compile_where_no_folder_can_be_written_and_the_note_says_so(package):

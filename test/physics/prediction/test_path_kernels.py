@@ -105,7 +105,7 @@ def test_way_time_and_energy_are_summed_over_settled_stretches():
     results["status"][lost] = PoseStatus.NOT_SETTLED
     results["q"][lost] = results["power"][lost] = np.nan
     sums = np.empty((3, 50))
-    add_up(poses, results, 0.03, sums)
+    add_up(poses, results, 0.03, (0.0, 0.0, 0.0), sums)
     steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     durations = np.hypot(steps, np.nan_to_num(np.diff(results["q"][:, 0]))) / 0.03
     power = np.nan_to_num(results["power"])

@@ -182,11 +182,13 @@ def test_backwards_into_a_crater_is_as_much_a_trap():
 
 def test_on_coulomb_ground_without_drops_nothing_more_is_swept(monkeypatch):
     asked = []
-    monkeypatch.setattr(
-        trap,
-        "sweep_path",
-        lambda *asked_for: asked.append(asked_for) or sweep_path(*asked_for),
-    )
+    for name in ("sweep_until_failure", "predict_way_back"):
+        sweep = getattr(trap, name)
+        monkeypatch.setattr(
+            trap,
+            name,
+            lambda *asked_for, sweep=sweep: asked.append(asked_for) or sweep(*asked_for),
+        )
     assert verdict_in(CRATER, -5.0, 5.0).traversable
     assert verdict_in(edge(0.0), -2.0, 2.0, soil="dry_sand").traversable
     assert not asked

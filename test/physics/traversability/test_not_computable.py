@@ -139,7 +139,7 @@ def test_a_pose_without_numbers_says_so_and_has_none():
 def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
     model = model_of_infinite_weight()
     status, numbers = np.empty(5, np.int8), np.zeros((NUMBERS_OF_SCORE, 5), np.float32)
-    score_all(model.records, POSES, new_works(1, 5), status, numbers)
+    score_all(model.records, POSES, new_works(1, 5), (status, numbers), (0, 1))
     assert not PoseScores(status, *numbers).within_limits(LSR1).any()
     fine = sweep_path(LSR1, LEVEL, POSES)
     unsettled = replace(fine, status=status, settled=status == PoseStatus.SETTLED)

@@ -13,6 +13,7 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.judgement import refusal
 from rover_planner.planning.answering.service_settings import load_service_settings
@@ -79,7 +80,7 @@ def test_the_summary_lacks_nothing_but_the_lists(full):
 
 
 def test_the_report_says_what_the_model_found(full):
-    told, verdict = full.report.to_dict(), full.candidate.verdict
+    told, verdict = full.report.to_dict(), full.complete().candidate.verdict
     for name, value in verdict.to_dict().items():
         assert told[name] == value
     np.testing.assert_array_equal(
@@ -88,6 +89,25 @@ def test_the_report_says_what_the_model_found(full):
     assert told["traversability_class"] == "impassable"
     assert told["class_waypoint"] == told["traversability_classes"].index("impassable")
     assert told["goal"] == [2.0, 0.0, 0.0] and told["candidates"] == 2
+
+
+def test_a_refused_candidate_ends_at_its_failure_until_the_judgement_is_complete(full):
+    first, whole = full.candidate, full.complete().candidate
+    failure = first.verdict.first_failure
+    assert len(first.prediction.poses) == failure + 1 < len(first.poses)
+    assert len(whole.prediction.poses) == len(whole.poses) == len(first.poses)
+    assert (whole.verdict.first_failure, whole.verdict.reason) == (failure, full.reason)
+
+
+def test_without_time_for_the_rest_the_report_ends_at_the_failure(full):
+    def no_time():
+        raise QuestionStoppedError("too_slow", "no time is left")
+
+    hasty = replace(full, judge_rest=no_time).complete()
+    told = hasty.report.to_dict()
+    assert told["reason"] == full.reason and told["waypoints"] == len(full.candidate.poses)
+    assert len(told["codes"]) == told["first_failure"] + 1
+    assert told["time"] is None and told["energy"] is None
 
 
 def test_a_refusal_says_why_and_nothing_of_a_path():

@@ -1,0 +1,44 @@
+"""The kernels of the nodes beyond those of rover_physics, and the groups of all kernels."""
+
+import numpy as np
+
+from rover_physics.compilation import Step
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.terrain.grid import Terrain
+from rover_physics.warm_up import EXACT, SCORES, UNCERTAIN
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.planning.candidates import generate_candidates
+from rover_planner.traction.settings import TractionSettings, load_traction_settings
+from rover_planner.traction.traction_service import TractionService
+
+CANDIDATES = (Step("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
+"""All that candidates of a question need."""
+TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
+"""All that updates of the traction controller need."""
+GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES))
+"""All kernels; groups have hardly any in common."""
+
+JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+
+
+def plan_candidates() -> None:
+    """Generate the candidates of a question."""
+    generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+
+
+def control_traction() -> None:
+    """Update a traction controller with its default parameters."""
+    update_traction(load_traction_settings(TractionControllerParameters()))
+
+
+def update_traction(settings: TractionSettings) -> None:
+    """Run all that an update of the traction controller runs, on level ground."""
+    service = TractionService(settings)
+    joints = dict.fromkeys(JOINTS, 0.0)
+    service.take_terrain(Terrain(np.zeros((50, 50)), 0.1, (-2.5, -2.5)))
+    for now in (0.0, 0.01):
+        service.take_joints(joints, dict.fromkeys(JOINTS, 0.1), now)
+        service.take_attitude(0.0, 0.0, np.zeros(3), now)
+        service.take_command(0.01, 0.0, now)
+        service.take_odometry(np.zeros(4), 0.0, now)
+        service.update(now)

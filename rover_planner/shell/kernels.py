@@ -1,0 +1,58 @@
+"""Loads the kernels of a program before it needs them; compiles those that are not on disk."""
+
+from collections.abc import Callable, Sequence
+
+from rover_physics.compilation import BackgroundCompilation, Compilation, Step
+
+LOADING_DELAY = 1.0
+"""Time that a program has to itself before it loads what it needs later [s]."""
+
+Report = Callable[[str], object]
+"""Function that takes a line for people."""
+
+
+def load_kernels(
+    first: Sequence[Step], behind: Sequence[Step], report: Report
+) -> BackgroundCompilation:
+    """Load kernels, and begin to load others while the program works.
+
+    Args:
+        first: What is needed at once: this function returns when it is loaded.
+        behind: What is needed later. If `first` must be compiled, it is compiled meanwhile.
+        report: Function that takes a line on each thing that is compiled, which takes seconds.
+
+    Returns:
+        What loads the others; to be closed when the program ends.
+    """
+    background = BackgroundCompilation(behind, lambda names: _tell(names, report))
+    count = count_up(len(first), report)
+
+    def begin(name: str) -> None:
+        background.start()
+        count(name)
+
+    try:
+        with Compilation(first) as compilation:
+            compilation.run(begin)
+    except BaseException:  # such as KeyboardInterrupt
+        background.close()
+        raise
+    background.start(LOADING_DELAY)
+    return background
+
+
+def _tell(names: Sequence[str], report: Report) -> None:
+    if names:
+        report(f"compiled besides: {', '.join(names)}")
+
+
+def count_up(total: int, report: Report) -> Report:
+    """Return a function that takes names and reports them as 1 of `total`, 2 of `total`, ..."""
+    count = 0
+
+    def take(name: str) -> None:
+        nonlocal count
+        count += 1
+        report(f"compiling kernels {count} of {total}: {name}")
+
+    return take

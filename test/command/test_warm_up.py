@@ -1,0 +1,40 @@
+"""`warm-up` compiles all kernels once, and says so if they cannot be kept."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from support.project.without_disk import fill_disk
+
+LOAD_ALL = """
+from rover_planner.nodes.warm_up import GROUPS
+print({step.name: step.load() for group in GROUPS for step in group})
+"""
+
+
+def run(*words, **options):
+    return subprocess.run(
+        [sys.executable, *words], capture_output=True, text=True, timeout=600, **options
+    )
+
+
+@pytest.mark.slow
+def test_after_it_every_kernel_is_on_disk(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    first = run("-m", "rover_planner", "warm-up", env=environment)
+    assert first.returncode == 0 and str(tmp_path) in first.stdout
+    for name in ("poses", "uncertain heights", "map scores", "traction controller"):
+        assert f"compiling {name}\n" in first.stderr
+    again = run("-m", "rover_planner", "warm-up", env=environment)
+    assert again.returncode == 0 and again.stderr == ""
+    loaded = run("-c", LOAD_ALL, env=environment)
+    assert loaded.returncode == 0 and "False" not in loaded.stdout
+
+
+def test_on_a_full_disk_it_says_where_kernels_cannot_be_kept(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    done = run("-m", "rover_planner", "warm-up", env=environment, preexec_fn=fill_disk)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert "cannot be kept" in done.stderr and str(tmp_path) in done.stderr

@@ -1,0 +1,158 @@
+"""Kernels compile in other processes, which end with the one that started them."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+import rover_physics
+from rover_physics.compilation import BackgroundCompilation, Compilation, Step, compile_groups
+from support.project.without_disk import drop_rights, fill_disk, read_only
+
+MODULE = """
+import os, sys, time
+from pathlib import Path
+from rover_physics.numerics.kernels import kernel
+
+@kernel
+def twice(x):
+    return 2.0 * x
+
+def first():
+    twice(1.0)
+
+def second():
+    twice(1)
+
+def endless():
+    from rover_physics.numerics.kernel_cache import KernelMissingError
+    if "compile_worker" not in sys.argv[0]:
+        raise KernelMissingError
+    Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
+    while True:
+        time.sleep(0.01)
+"""
+PROGRAM = """
+from rover_physics.compilation import Compilation, Step
+import some_kernels
+
+steps = [Step(name, f"some_kernels:{name}") for name in ("first", "second")]
+print(Compilation(steps).run(lambda name: print(name, end=" ")), end=" ")
+print(sum(some_kernels.twice.stats.cache_hits.values()))
+"""
+PARENT = """
+from rover_physics.compilation import Compilation, Step
+Compilation([Step("endless", "some_kernels:endless")]).run(print)
+"""
+ENDLESS = Step("endless", "some_kernels:endless")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "some_kernels.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PID_FILE", str(tmp_path / "pid"))
+    yield tmp_path
+    sys.modules.pop("some_kernels", None)
+
+
+def start(folder: Path, program: str, **options) -> subprocess.Popen:
+    path = f"{folder}:{Path(rover_physics.__file__).parents[1]}"
+    away = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
+    environment = {name: text for name, text in os.environ.items() if name not in away}
+    return subprocess.Popen(
+        [sys.executable, "-c", program],
+        env=environment | {"PYTHONPATH": path, "HOME": str(folder)},
+        stdout=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+def output_of(folder: Path, **options) -> str:
+    with start(folder, PROGRAM, **options) as process:
+        return process.communicate(timeout=120)[0].strip()
+
+
+def wait_for_worker(folder: Path) -> int:
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        if (folder / "pid").exists() and (folder / "pid").read_text():
+            return int((folder / "pid").read_text())
+        time.sleep(0.02)
+    raise AssertionError("no worker")
+
+
+def runs(pid: int) -> bool:
+    status = Path(f"/proc/{pid}/status")
+    return status.exists() and "zombie" not in status.read_text()
+
+
+def wait_for_end(pid: int) -> None:
+    deadline = time.monotonic() + 10.0
+    while runs(pid):
+        assert time.monotonic() < deadline, "the worker goes on"
+        time.sleep(0.02)
+
+
+def test_a_process_compiles_what_is_missing_and_this_one_loads_it(folder):
+    assert output_of(folder) == "first second True 2"
+    assert output_of(folder) == "True 2"
+
+
+def test_without_a_disk_kernels_compile_in_the_process_that_needs_them(folder):
+    with read_only(folder):
+        assert output_of(folder, preexec_fn=drop_rights).endswith("True 0")
+    assert output_of(folder, preexec_fn=fill_disk) == "True 0"
+
+
+def test_a_closed_compilation_ends_its_process_and_compiles_nothing(folder):
+    compilation = Compilation([ENDLESS])
+    done = []
+    thread = threading.Thread(target=lambda: done.append(compilation.run(lambda name: None)))
+    thread.start()
+    pid = wait_for_worker(folder)
+    compilation.close()
+    thread.join(10.0)
+    assert done == [False]
+    wait_for_end(pid)
+
+
+def test_a_background_compilation_can_be_closed(folder):
+    background = BackgroundCompilation([ENDLESS], lambda names: None)
+    background.start()
+    pid = wait_for_worker(folder)
+    background.close()
+    wait_for_end(pid)
+
+
+def test_a_background_compilation_that_has_not_begun_can_be_closed():
+    told = []
+    background = BackgroundCompilation([ENDLESS], told.append)
+    background.start(delay=60.0)
+    began = time.monotonic()
+    background.close()
+    assert time.monotonic() - began < 5.0 and told == []
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_the_worker_ends_with_its_parent(folder, how):
+    with start(folder, PARENT, stderr=subprocess.DEVNULL) as process:
+        pid = wait_for_worker(folder)
+        process.send_signal(how)
+        process.wait(10.0)
+    wait_for_end(pid)
+
+
+def test_groups_are_compiled_by_several_processes_and_errors_are_raised(folder):
+    names = []
+    steps = [Step(name, f"some_kernels:{name}") for name in ("first", "second")]
+    compile_groups([[step] for step in steps], names.append, 2)
+    assert sorted(names) == ["first", "second"]
+    with pytest.raises(AttributeError, match="third"):
+        compile_groups([[Step("third", "some_kernels:third")], steps], names.append, 2)

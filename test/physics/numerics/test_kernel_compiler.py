@@ -1,0 +1,86 @@
+"""A kernel is compiled once with all that it calls, and can be called from Python as well."""
+
+import numpy as np
+import pytest
+
+from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
+from rover_physics.numerics.kernels import allocating_kernel, kernel
+from rover_physics.numerics.threads import run_chunks
+
+
+@kernel
+def add_one(values):
+    for i in range(values.size):
+        values[i] += 1.0
+
+
+@kernel
+def add_two(values):
+    add_one(values)
+    add_one(values)
+
+
+@allocating_kernel
+def threes(n):
+    values = np.ones(n)
+    add_two(values)
+    return values
+
+
+@kernel
+def write_number(numbers, part):
+    for chunk in range(part[0], part[1]):
+        numbers[chunk] += chunk
+
+
+def test_a_kernel_is_called_from_python_and_from_kernels():
+    values = np.zeros(3)
+    add_two(values)
+    add_one(values)
+    assert values.tolist() == [3.0, 3.0, 3.0] and threes(2).tolist() == [3.0, 3.0]
+
+
+def test_a_kernel_that_only_kernels_call_has_no_machine_code():
+    @kernel
+    def inner(x):
+        return 2.0 * x
+
+    @kernel
+    def outer(x):
+        return inner(x) + 1.0
+
+    assert outer(3.0) == 7.0
+    assert not inner.signatures and len(outer.signatures) == 1
+
+
+def test_kernels_may_have_several_types_of_arguments():
+    for kind in (np.float64, np.float32):
+        values = np.zeros(2, kind)
+        add_two(values)
+        assert values.tolist() == [2.0, 2.0]
+
+
+def test_where_kernels_are_only_loaded_a_missing_one_raises_an_error():
+    @kernel
+    def unknown(x):
+        return x
+
+    with loading_only(), pytest.raises(KernelMissingError, match="unknown"):
+        unknown(1.0)
+    assert unknown(1.0) == 1.0
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_each_chunk_of_a_sweep_runs_once(threads):
+    numbers = np.zeros(20)
+    run_chunks(write_number, (numbers,), 20, threads)
+    assert numbers.tolist() == list(range(20))
+
+
+def test_an_error_in_a_chunk_is_raised():
+    def fail(part):
+        if part == (7, 8):
+            raise ValueError("chunk 7")
+
+    with pytest.raises(ValueError, match="chunk 7"):
+        run_chunks(fail, (), 20, 3)
