@@ -8,8 +8,9 @@ import numpy as np
 from benchmarks.grounds import all_grounds, random_poses
 from benchmarks.measure import Figure, median_times
 from rover_physics.contact.contact_record import SearchScope
-from rover_physics.contact.rim_scan import scan_rim
-from rover_physics.contact.settling import GroundSlope, settle, write_gap_rates
+from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
+from rover_physics.contact.rim_scan import scan_rims
+from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.prediction.evaluation import WORK, evaluate, new_work, set_pose
 from rover_physics.prediction.packed_model import pack_model
@@ -40,7 +41,7 @@ def guess(model, work):
 def sample(model, work):
     """Compare all samples of the rims with the ground."""
     for wheel in range(6):
-        scan_rim(model, work, wheel, SearchScope.QUICK)
+        scan_rims(model, work, wheel, SearchScope.QUICK)
 
 
 @compiled
@@ -67,18 +68,10 @@ def look_near(model, work):
 
 @compiled
 def verify(model, work):
-    """Verify that no other point of the rims is nearer."""
+    """Verify that no other ground below the wheels is nearer."""
     look(model, work)
     for wheel in range(6):
         find_contact(model, work, wheel, SearchScope.FULL)
-
-
-@compiled
-def verify_again(model, work):
-    """Verify it again at the circles that came near the ground."""
-    verify(model, work)
-    for wheel in range(6):
-        find_contact(model, work, wheel, SearchScope.AGAIN)
 
 
 @compiled
@@ -86,7 +79,7 @@ def share_load(model, work):
     """Find the mean contacts."""
     verify(model, work)
     for wheel in range(6):
-        blend_contact(model.samples, work, wheel)
+        blend_contact(model, work, wheel)
 
 
 PARTS = {
@@ -97,7 +90,6 @@ PARTS = {
     "derivatives of the gaps": (look_and_step, look),
     "a search around the nearest": (look_near, look),
     "verification": (verify, look),
-    "the same at circles that came near": (verify_again, verify),
     "mean contacts": (share_load, verify),
 }
 """By name: a kernel, and the kernel whose time is subtracted from its time."""

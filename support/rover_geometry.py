@@ -183,46 +183,57 @@ def free_balance_matrix(
     return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
 
 
-def wheel_gaps(
-    rover: Rover,
-    terrain: Terrain,
-    prediction: PathPrediction,
-    i: int,
-    laterals: np.ndarray,
-    angles: int = 1001,
-) -> np.ndarray:
+COARSE_ANGLES, COARSE_ACROSS = 241, 33
+"""Points along and across a wheel in the first look of `wheel_gaps`."""
+STARTS, REFINEMENTS = 8, 7
+"""Nearest points that are refined, and how often the spacing is divided by three."""
+
+
+def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the smallest vertical gap (6,) [m] between each wheel's lower half and the ground.
+
+    The whole width of the wheels is looked at, densely and then around the nearest points.
 
     Args:
         rover: The rover.
         terrain: The ground.
         prediction: The model's prediction.
         i: Index of the waypoint.
-        laterals: Lateral positions of the sampled circles, from the wheel's middle plane [m].
-        angles: Points along each half circle. The same number is used again for a refinement
-            between the neighbours of the nearest point.
     """
-    coarse = np.linspace(-0.5 * np.pi, 0.5 * np.pi, angles)
-    shape = (6, len(laterals), angles)
-    gaps = _gaps_at(rover, terrain, prediction, i, laterals, np.broadcast_to(coarse, shape))
-    step = coarse[1] - coarse[0]
-    nearest = coarse[gaps.argmin(axis=2)]
-    fine = np.clip(nearest[..., None] + np.linspace(-step, step, angles), coarse[0], coarse[-1])
-    return _gaps_at(rover, terrain, prediction, i, laterals, fine).min(axis=(1, 2))
-
-
-def _gaps_at(rover, terrain, prediction, i, laterals, angle) -> np.ndarray:
-    """Return the gaps at contact angles (6, laterals, k)."""
     axis = attitude_of(prediction, i)[:, 1]
+    return np.array([wheel_gap(rover, terrain, c, axis) for c in prediction.wheel_centres[i]])
+
+
+def wheel_gap(rover: Rover, terrain: Terrain, centre: np.ndarray, axis: np.ndarray) -> float:
+    """Return the smallest vertical gap [m] of a wheel with a centre (3,) and an axle (3,)."""
+    half = 0.5 * rover.wheel.width
     ahead = np.cross(axis, UP) / np.linalg.norm(np.cross(axis, UP))
     upward = np.cross(ahead, axis)
-    points = (
-        prediction.wheel_centres[i][:, None, None, :]
-        + np.asarray(laterals)[None, :, None, None] * axis
-        + rover.wheel.radius * np.sin(angle)[..., None] * ahead
-        - rover.wheel.radius * np.cos(angle)[..., None] * upward
+
+    def gaps_at(angle: np.ndarray, across: np.ndarray) -> np.ndarray:
+        rim = np.sin(angle)[..., None] * ahead - np.cos(angle)[..., None] * upward
+        points = centre + rover.wheel.radius * rim + across[..., None] * axis
+        heights = terrain.elevation_at(points[..., 0], points[..., 1])
+        return np.where(np.isnan(heights), np.inf, points[..., 2] - heights)
+
+    most = np.array([[0.5 * np.pi], [half]])
+    steps = np.array([np.pi / (COARSE_ANGLES - 1), 2.0 * half / (COARSE_ACROSS - 1)])
+    grid = np.meshgrid(
+        np.linspace(-0.5 * np.pi, 0.5 * np.pi, COARSE_ANGLES),
+        np.linspace(-half, half, COARSE_ACROSS),
     )
-    return points[..., 2] - terrain.elevation_at(points[..., 0], points[..., 1])
+    places = np.stack([part.ravel() for part in grid])
+    gaps = gaps_at(*places)
+    best = places[:, np.argsort(gaps)[:STARTS]]
+    around = np.stack([part.ravel() for part in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 9)])])
+    for _ in range(REFINEMENTS):
+        near = best[:, :, None] + steps[:, None, None] * around[:, None, :]
+        near = np.clip(near, -most[..., None], most[..., None])
+        gaps = gaps_at(*near)
+        nearest = gaps.argmin(axis=1)
+        best = near[:, np.arange(STARTS), nearest]
+        steps = steps / 3.0
+    return float(gaps.min())
 
 
 def turned_round(rover: Rover) -> Rover:

@@ -19,8 +19,8 @@ from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import elevation_of, is_cell_on_map, look_up_cell
 
 BEND = 0.19
-"""Intrusion of an edge above that of its ends, over the curvature of the wheel: 1/8 for a parabola,
-with a margin for a circle."""
+"""Intrusion of an edge above that of its ends, over the curvature of the wheel: 1/8 for a
+parabola, with a margin for a circle."""
 STEEP = 0.64
 """(s / R)^2 beyond which the wheel's curvature is too large for that estimate."""
 INTERIOR_STEPS = 8
@@ -28,7 +28,7 @@ INTERIOR_STEPS = 8
 FLAT_RATE = 3e-3
 """Change of the intrusion along the heading at which that search stops."""
 LEAST_CHANGE = 0.3
-"""Lower bound of the derivative in that search, where the ground bends almost as the wheel does."""
+"""Lower bound of the derivative in that search, where the ground bends almost like the wheel."""
 BEYOND = 0.3
 """Distance from a crossing, to both sides, at which a rim is looked at [cells]."""
 STEEPEST = 0.9999
@@ -39,7 +39,7 @@ may touch elsewhere."""
 RIM_STEPS = 2
 """Steps for the place where an edge crosses a rim."""
 RIM_BEND = 0.14
-"""The same for a rim that crosses a cell in parallel to a side; aslant it is up to two times as long."""
+"""The same for a rim that crosses a cell in parallel to a side; aslant, it is up to twice that."""
 GENTLE = 0.8
 """Share of the radius up to which the wheel is close to a parabola."""
 MIN_COSINE = 0.3
@@ -317,7 +317,7 @@ def _look_around(ground, search, vertex, there):
 
 @kernel
 def _look_along_edge(search, start, along):
-    """Search an edge where the wheel is as steep as the edge, or where it crosses a rim.
+    """Search an edge where the wheel is as steep as the edge.
 
     Args:
         search: CELL_SEARCH.
@@ -462,7 +462,8 @@ def _look_on_line(search, corner, shape, line):
 
     Args:
         search: CELL_SEARCH.
-        corner, shape: As for `_look_into_cell`.
+        corner: As for `_look_into_cell`.
+        shape: As for `_look_into_cell`.
         line: Slope and half the second derivative of the ground along the line, and the least and
             largest s.
     """

@@ -92,9 +92,9 @@ def _close(model, work, wheel, wanted):
 
 @kernel
 def _follow_to_ground(model, work, wheel, search):
-    """Find the lift at which the followed contacts of a wheel touch, by bracketing; return it [m].
+    """Return the lift [m] at which the followed contacts of a wheel touch, by bracketing.
 
-    `search` is the lift to start from, the longest step [m], and the gap that is closed enough [m].
+    `search` is the lift to start from, the longest step, and the gap that is closed enough [m].
     """
     gaps = work.contacts.gap
     lift, longest, wanted = search

@@ -22,8 +22,8 @@ def scan_rims(model, work, wheel, scope):
         model: A record with `ground` GROUND and `samples` WHEEL_SAMPLES.
         work: A record with `placement` PLACEMENT and `contacts` CONTACTS.
         wheel: Index of the wheel.
-        scope: A SearchScope: COARSE visits every other sample of the middle circle, others the rims
-            and the middle circle.
+        scope: A SearchScope. COARSE visits every other sample of the middle circle, the others
+            visit the rims and the middle circle.
 
     Returns:
         The worst ContactStatus of the samples.
@@ -73,8 +73,9 @@ def _scan_inside(model, work, wheel, tops):
     """Sample circles over known ground.
 
     A row holds the samples at one angle. The rows follow from the lowest one to the rear, and to
-    the front. A direction ends once the gap to the highest ground exceeds the smallest gap. The loop reads local variables, because the compiler must assume that a write
-    may change any array.
+    the front. A direction ends once the gap to the highest ground exceeds the smallest gap. The
+    loop reads local variables, because the compiler must assume that a write may change any
+    array.
 
     Args:
         model: A record with `ground` and `samples`.

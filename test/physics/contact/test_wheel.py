@@ -161,13 +161,13 @@ def test_the_gap_is_the_smallest_over_the_whole_width(make, seed, roll, pitch, y
 
 
 def test_a_peak_between_the_circles_is_found_wherever_it_is():
-    for place in np.linspace(-0.45 * WIDTH, 0.45 * WIDTH, 19):
+    for aside in np.linspace(-0.45 * WIDTH, 0.45 * WIDTH, 19):
         heights = np.zeros((101, 101))
         heights[50, 50] = 0.03
-        ground = Terrain(heights, 0.01, (-0.5, -0.5 - place))
+        ground = Terrain(heights, 0.01, (-0.5, -0.5 - aside))
         wheel = WheelOn(ground, [0.0, 0.0, 0.2], SearchScope.WHOLE)
         assert wheel.gap == pytest.approx(0.2 - RADIUS - 0.03, abs=1e-5)
-        assert wheel.contacts.across[0] == pytest.approx(-place, abs=1e-6)
+        assert wheel.contacts.across[0] == pytest.approx(-aside, abs=1e-6)
 
 
 @few
