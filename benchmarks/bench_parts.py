@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
+from benchmarks.compiled import compiled
 from benchmarks.grounds import all_grounds, random_poses
 from benchmarks.measure import Figure, median_times
 from rover_physics.contact.contact_record import SearchScope
@@ -22,7 +23,6 @@ POSES = 2_000
 """Random poses on each ground."""
 REPEATS = 15
 """Repeats of each measurement: differences of times need many."""
-compiled = numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
 
 
 @compiled

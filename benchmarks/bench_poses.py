@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 
+from benchmarks.compiled import compiled
 from benchmarks.grounds import all_grounds, random_poses, reference_ground
 from benchmarks.measure import Figure, median_time, median_times
 from rover_physics.contact.settling import settle, settle_from
@@ -29,7 +30,7 @@ OTHER_POSE = 1e-3
 """Difference in height [m] or angle [rad] above which two poses count as different."""
 
 
-@numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled
 def settle_all(models, poses, works, results):
     """Settle the rover at poses (n, 3), without forces or limits."""
     for i in range(len(poses)):
@@ -38,7 +39,7 @@ def settle_all(models, poses, works, results):
         results[i].q[:] = works[0].q
 
 
-@numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled
 def settle_along(models, poses, works, results):
     """Settle the rover at poses (n, 3) of a path, each starting from the result before it."""
     for i in range(len(poses)):
@@ -50,7 +51,7 @@ def settle_along(models, poses, works, results):
         results[i].q[:] = works[0].q
 
 
-@numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled
 def look_up_all(grounds, cells):
     """Return the largest height at `cells` (n, 2) [m]."""
     ground, highest = grounds[0], -np.inf

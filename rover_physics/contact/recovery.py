@@ -51,6 +51,8 @@ def close_in_turns(model, work, turns, closed):
             break
         wanted = max(0.5 * closed, CLOSER * worst)
         for wheel in range(6):
+            for i in range(6):
+                work.start[i] = work.q[i]
             _close(model, work, wheel, wanted)
         worst = _find_worst(model, work)
     return worst
@@ -71,18 +73,15 @@ def _find_worst(model, work):
 
 @kernel
 def _close(model, work, wheel, wanted):
-    """Lift or lower one wheel until its gap is at most `wanted` [m], or nearly so at a jump."""
-    gaps, start, q = work.contacts.gap, work.start, work.q
+    """Lift or lower one wheel from `work.start` until its gap is at most `wanted` [m]."""
+    gaps = work.contacts.gap
     find_contact(model, work, wheel, SearchScope.WHOLE)
+    lift, largest = 0.0, 0.0
     if not abs(gaps[wheel]) > wanted:
         return
-    largest = 0.0
     for i in range(1, 6):
         largest = max(largest, abs(work.lifts[i, wheel]))
     longest = MAX_TURN / largest if largest > 0.0 else np.inf
-    for i in range(6):
-        start[i] = q[i]
-    lift = 0.0
     for _ in range(LOOKS):
         lift = _follow_to_ground(model, work, wheel, (lift, longest, 0.5 * wanted))
         find_contact(model, work, wheel, SearchScope.FULL)

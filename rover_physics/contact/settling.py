@@ -23,25 +23,19 @@ NEWTON_TOLERANCE = 5e-6
 MAX_NEWTON_STEPS = 20
 """Largest number of Newton steps."""
 QUICK_ATTEMPTS = 5
-"""Newton's method runs up to this often with searches near the last contacts."""
+"""Newton's method runs up to this often; after each time, all ground is looked at."""
 PROMISING = 2.0
-"""Share of the last attempt's largest gap above which another quick attempt is not promising."""
-NOTES_HOLD = 1e-2
-"""Largest gap [wheel radii] at which the samples noted by the last full scan are reused. So small
-a step brings no other circle near the ground."""
-TURNS = 8
+"""Growth of the largest gap from one attempt to the next that ends the quick attempts."""
 RECOVERIES = 4
-"""Attempts with exact searches after the quick attempts have failed."""
-RELAXATION_STEPS = 120
-"""Largest number of relaxation steps per attempt."""
+"""Times that the gaps are closed wheel by wheel, after the quick attempts have failed."""
+TURNS = 8
+"""Largest number of turns of a recovery; in each, all wheels are closed."""
 FINAL_ATTEMPTS = 5
 """Newton's method runs up to so often, less one, after each recovery."""
 RELAXED = 0.05
-"""Largest gap [wheel radii] at which relaxation ends and Newton's method starts."""
+"""Largest gap [wheel radii] at which a recovery ends and Newton's method starts."""
 RELAXED_FURTHER = 0.25
-"""Factor on RELAXED after each failed attempt: a wheel wedged at a face has small gaps."""
-RELAXATION = 0.3
-"""Fraction of a gap that a relaxation step closes."""
+"""Factor on RELAXED after each failed recovery: a wheel wedged at a face has small gaps."""
 TURNED_OVER = 1.45
 """Roll or pitch [rad] above which the search stops: the rover is on its end or side."""
 

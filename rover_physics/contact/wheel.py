@@ -166,7 +166,8 @@ def blend_contact(model, work, wheel):
     """Replace the contact of `wheel` by the weighted mean of the circles that share the load.
 
     The weight of a circle falls linearly from 1 at the smallest gap to 0 at COMPLIANCE radii above
-    it. A peak between the rims counts as a circle. A held wheel gets the angle of its face.
+    it. A peak between the rims has the weight that the nearest circle lacks. A held wheel gets
+    the angle of its face.
     """
     samples, contacts = model.samples, work.contacts
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
@@ -177,8 +178,7 @@ def blend_contact(model, work, wheel):
     reach = contacts.gap[wheel] + CIRCLE_REACH * samples.radius
     total, sine_sum, cosine_sum, across_sum = 0.0, 0.0, 0.0, 0.0
     turn = contacts.sine[wheel], contacts.cosine[wheel]
-    if contacts.inside[wheel]:
-        total, sine_sum, cosine_sum, across_sum = 1.0, turn[0], turn[1], contacts.across[wheel]
+    largest = 0.0
     for m in range(samples.circles):
         across = samples.laterals[m]
         if not _gap_at(model, work, (wheel, across), turn) < reach:
@@ -186,10 +186,17 @@ def blend_contact(model, work, wheel):
         gap, (s, c), _ = search_circle(model, work, (wheel, across), turn)
         weight = min(1.0 - (gap - contacts.gap[wheel]) / allowance, 1.0)
         if weight > 0.0:
+            largest = max(largest, weight)
             total += weight
             sine_sum += weight * s
             cosine_sum += weight * c
             across_sum += weight * across
+    if contacts.inside[wheel]:
+        weight = 1.0 - largest
+        total += weight
+        sine_sum += weight * turn[0]
+        cosine_sum += weight * turn[1]
+        across_sum += weight * contacts.across[wheel]
     if total > 0.0:
         length = np.sqrt(sine_sum * sine_sum + cosine_sum * cosine_sum)
         turn = sine_sum / length, cosine_sum / length

@@ -216,12 +216,15 @@ def _extend_to_edges(falling, angle, distance, radius, extended):
 
 @exact_kernel
 def _measure_drops(radius, height, steps, falling, fallen):
-    """Add up the descent [m] of each falling wheel; a sudden descent at one place also counts."""
+    """Add up the descent [m] of each falling wheel; a sudden descent at one place also counts.
+
+    What a wheel rises meanwhile, such as when the one beside it falls, is subtracted.
+    """
     for wheel in range(6):
         for k in range(1, steps.size):
             descent = height[k - 1, wheel] - height[k, wheel]
-            if not descent >= ROUNDING:
+            if not abs(descent) >= ROUNDING:
                 descent = 0.0
             sudden = descent > HEIGHT_JUMP * radius and steps[k] <= 2.0 * MIN_SPACING
             if falling[k - 1, wheel] or falling[k, wheel] or sudden:
-                fallen[k, wheel] = fallen[k - 1, wheel] + descent
+                fallen[k, wheel] = max(fallen[k - 1, wheel] + descent, 0.0)

@@ -17,6 +17,7 @@ from rover_physics.traversability.classification import (
 )
 from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.torque_ranges import find_torque_ranges
+from rover_planner.parameters.shared import CONTROL_MARGIN
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane, random_poses, rocky
 
@@ -119,5 +120,6 @@ def test_a_ditch_that_takes_all_the_friction_is_not_promised():
     rover, ground = unlimited(LSR1), drive_ground("ditch", 0.34)
     options = SweepOptions(friction=0.8, policy="optimal")
     assert judge_path(rover, ground, drive_path(), options)[1].traversable
-    promised = judge_path(rover, ground, drive_path(), replace(options, control_margin=0.1))[1]
+    kept = replace(options, control_margin=CONTROL_MARGIN)
+    promised = judge_path(rover, ground, drive_path(), kept)[1]
     assert not promised.traversable and "control margin" in promised.reason

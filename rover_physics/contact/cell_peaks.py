@@ -1,0 +1,149 @@
+"""Peaks of the intrusion of the ground inside twisted cells; lengths are in cells."""
+
+import numpy as np
+
+from rover_physics.contact.contact_record import NOTICED
+from rover_physics.contact.intrusion import is_below, take_point
+from rover_physics.numerics.kernels import kernel
+from rover_physics.terrain.ground import elevation_of
+
+INTERIOR_STEPS = 8
+"""Largest number of steps of the search inside a cell."""
+FLAT_RATE = 3e-3
+"""Change of the intrusion along the heading at which that search stops."""
+LEAST_CHANGE = 0.3
+"""Lower bound of the derivative in that search, where the ground bends almost like the wheel."""
+STEEPEST = 0.9999
+"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
+GENTLE = 0.8
+"""Share of the radius up to which the wheel is close to a parabola."""
+
+
+@kernel
+def look_into_cells(ground, search, i, j):
+    """Search the four cells around vertex (i, j) where they are twisted so that it may pay.
+
+    A cell is searched at the vertex that comes nearest, by the wheel's parabola.
+    """
+    ex, ey, scale = search.ahead_x, search.ahead_y, ground.inverse_resolution
+    here = elevation_of(ground, i, j)
+    x, y = j - search.x, i - search.y
+    s, curl = x * ex + y * ey, 0.5 / (search.radius * search.cosine)
+    gentle = abs(s) < GENTLE * search.radius
+    for cell in range(4):
+        row, column = i - cell // 2, j - cell % 2
+        if row < 0 or column < 0 or row > ground.rows - 2 or column > ground.columns - 2:
+            continue
+        di, dj = 1 - 2 * (cell // 2), 1 - 2 * (cell % 2)
+        beside = (elevation_of(ground, i, j + dj) - here) * scale
+        above = (elevation_of(ground, i + di, j) - here) * scale
+        across = (elevation_of(ground, i + di, j + dj) - here) * scale
+        twist = (across - beside - above) * (di * dj)
+        # Along the axle the ground bends by -2 twist ex ey; the gain over the edges is a quarter.
+        if not twist * ex * ey * 0.5 > NOTICED * search.radius:
+            continue
+        s_beside, s_above = s + dj * ex, s + di * ey
+        s_across = s_beside + di * ey
+        beside += search.tangent * dj * ey
+        above -= search.tangent * di * ex
+        across += search.tangent * (dj * ey - di * ex)
+        bend = curl * s * s
+        if gentle and (
+            beside - curl * s_beside * s_beside > -bend
+            or above - curl * s_above * s_above > -bend
+            or across - curl * s_across * s_across > -bend
+        ):
+            continue
+        a = elevation_of(ground, row, column)
+        b = (elevation_of(ground, row, column + 1) - a) * scale
+        c = (elevation_of(ground, row + 1, column) - a) * scale
+        dx, dy = column - search.x, row - search.y
+        corner = dx * ex + dy * ey, dy * ex - dx * ey
+        _look_into_cell(search, corner, ((a - search.z) * scale, b, c, twist))
+
+
+@kernel
+def _look_into_cell(search, corner, shape):
+    """Search a twisted cell for a peak of the intrusion in its inside.
+
+    Across the wheel the ground bends down, so for each s there is a best t in closed form. What is
+    left is a quadratic function of s plus the wheel's dome; its largest value is bracketed.
+
+    Args:
+        search: CELL_SEARCH.
+        corner: s and t of the cell's corner [cells].
+        shape: (a, b, c, d) of the ground a + b u + c v + d u v above the wheel's centre, u and v
+            along the cell's sides from the corner [cells].
+    """
+    ex, ey, R, inverse = search.ahead_x, search.ahead_y, search.radius, 1.0 / search.cosine
+    s0, t0 = corner
+    a, b, c, d = shape
+    sag, skew = d * ex * ey, d * (ex * ex - ey * ey)
+    slope_s, slope_t = b * ex + c * ey, c * ex - b * ey - search.tangent
+    half = 0.5 / sag
+    bend = 0.5 * d * d * half
+    rise = slope_s + slope_t * skew * half
+    base = a - search.tangent * t0 + 0.5 * slope_t * slope_t * half
+    level = base - rise * s0 + bend * s0 * s0
+    rise -= 2.0 * bend * s0
+    # The wheel bends at least as at its bottom.
+    rest = inverse / R - 2.0 * bend
+    if rest > 0.0 and level + R * inverse + 0.5 * rise * rise / rest <= search.best:
+        return
+    low = max(s0 + min(ex, 0.0) + min(ey, 0.0), -STEEPEST * R)
+    high = min(s0 + max(ex, 0.0) + max(ey, 0.0), STEEPEST * R)
+    if not low < high:
+        return
+    if rest > 0.0:
+        _look_on_line(search, (s0, t0), shape, (rise, bend, low, high))
+        return
+    # Only where the wheel bends more than the ground there are peaks: on its steep sides.
+    q = (0.5 * R * R * inverse / bend) ** (1.0 / 3.0)
+    inflection = np.sqrt(max(R * R - q * q, 0.0))
+    if high > inflection:
+        _look_on_line(search, (s0, t0), shape, (rise, bend, max(low, inflection), high))
+    if low < -inflection:
+        _look_on_line(search, (s0, t0), shape, (rise, bend, low, min(high, -inflection)))
+
+
+@kernel
+def _look_on_line(search, corner, shape, line):
+    """Find the peak on the line of best t in a cell, and keep it if it is in the cell.
+
+    Args:
+        search: CELL_SEARCH.
+        corner: As for `_look_into_cell`.
+        shape: As for `_look_into_cell`.
+        line: Slope and half the second derivative of the ground along the line, and the least and
+            largest s.
+    """
+    ex, ey, R, inverse = search.ahead_x, search.ahead_y, search.radius, 1.0 / search.cosine
+    s0, t0 = corner
+    a, b, c, d = shape
+    rise, bend, low, high = line
+    low_rate = rise + 2.0 * bend * low - low / np.sqrt(R * R - low * low) * inverse
+    high_rate = rise + 2.0 * bend * high - high / np.sqrt(R * R - high * high) * inverse
+    if not (low_rate > 0.0 and high_rate < 0.0):
+        return
+    # The unknown is the wheel's slope s / q, which makes steep contacts well-behaved.
+    gain, cosine = 2.0 * bend * search.cosine, search.cosine
+    s = 0.5 * (low + high)
+    slope = s / np.sqrt(R * R - s * s)
+    for _ in range(INTERIOR_STEPS):
+        inverse_length = 1.0 / np.sqrt(1.0 + slope * slope)
+        s = R * slope * inverse_length
+        error = rise * cosine + gain * s - slope
+        if abs(error) < FLAT_RATE:
+            break
+        change = 1.0 - gain * R * inverse_length * inverse_length * inverse_length
+        slope += error / max(change, LEAST_CHANGE)
+    half = 0.5 / (d * ex * ey)
+    slope_t, skew = c * ex - b * ey - search.tangent, d * (ex * ex - ey * ey)
+    along = s - s0
+    aside = (slope_t + skew * along) * half
+    u, v = ex * along - ey * aside, ey * along + ex * aside
+    if not (u >= 0.0 and u <= 1.0 and v >= 0.0 and v <= 1.0):
+        return
+    if is_below(search, s, t0 + aside):
+        ground = a + b * u + c * v + d * u * v
+        take_point(search, s, t0 + aside, ground - search.tangent * (t0 + aside))

@@ -1,0 +1,61 @@
+"""How far the ground intrudes into a wheel: the record of a search, and its elements.
+
+Lengths are in cells here. A point of the ground is at s along the wheel's heading and t to the
+left of its centre. The lower side of the cylinder is the surface tan(camber) t - sqrt(R^2 - s^2) /
+cos(camber) above the centre. Its distance below the ground is the intrusion.
+"""
+
+import numpy as np
+
+from rover_physics.contact.contact_record import NOTICED
+from rover_physics.numerics.kernels import kernel
+
+
+@kernel
+def begin_search(model, work, wheel):
+    """Write what the search needs of the wheel's place into `work.cells`."""
+    ground, samples, placement = model.ground, model.samples, work.placement
+    search, centres = work.cells, placement.centres
+    scale = ground.inverse_resolution
+    search.cell = 1.0 / scale
+    search.radius = samples.radius * scale
+    search.x, search.y = (
+        (centres[wheel, 0] - ground.x0) * scale,
+        (centres[wheel, 1] - ground.y0) * scale,
+    )
+    search.z = centres[wheel, 2]
+    search.ahead_x, search.ahead_y = placement.forward[0], placement.forward[1]
+    search.cosine, search.sine = placement.up[2], placement.R[2, 1]
+    search.tangent = search.sine / search.cosine
+    search.half_width = samples.half_width * scale * search.cosine
+    search.found = search.crossings = 0
+    contacts = work.contacts
+    search.peak[0] = search.peak[1] = -np.inf
+    if not contacts.inside[wheel] and contacts.across[wheel] != 0.0:
+        turn = contacts.sine[wheel], contacts.cosine[wheel]
+        side = 1 if contacts.across[wheel] > 0.0 else 0
+        note_peak(search, side, contacts.gap[wheel], turn)
+    search.best = -work.contacts.gap[wheel] * scale + NOTICED * search.radius
+
+
+@kernel
+def is_below(search, s, t):
+    """Return whether the point (s, t) is below the wheel; |s| must be below R."""
+    lean = search.sine * np.sqrt(search.radius * search.radius - s * s)
+    return abs(t - lean) <= search.half_width
+
+
+@kernel
+def take_point(search, s, t, base):
+    """Keep a point if it is the best so far; `base` is its intrusion without the wheel's dome."""
+    dome = np.sqrt(max(search.radius * search.radius - s * s, 0.0)) / search.cosine
+    if base + dome > search.best:
+        search.best, search.best_s, search.best_t = base + dome, s, t
+        search.found = 1
+
+
+@kernel
+def note_peak(search, side, gap, turn):
+    """Note the peak of a rim, 0 right or 1 left, by its gap [m] and angle (sine, cosine)."""
+    search.peak[side] = -gap / search.cell
+    search.peak_s[side], search.peak_q[side] = turn[0] * search.radius, turn[1] * search.radius
