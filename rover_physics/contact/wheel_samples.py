@@ -32,11 +32,11 @@ WHEEL_SAMPLES = record_type(
 def sample_wheel(rover: Rover, resolution: float) -> Any:
     """Return WHEEL_SAMPLES about as dense as the cells of a terrain of `resolution` [m].
 
-    There are 21 to 49 angles and 3 to 9 circles.
+    There are 21 to 49 angles and 5 to 9 circles.
     """
     wheel = rover.wheel
     half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 10, 24))
-    half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 1, 4))
+    half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 2, 4))
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * half_angles + 1)
     samples = new_record(
         WHEEL_SAMPLES,
