@@ -26,10 +26,33 @@ def all_grounds() -> dict[str, Terrain]:
     """Return grounds by name: flat, rocks, fractal, a generated Mars terrain, and a real map."""
     grounds = {name: reference_ground(name) for name in ("flat", "rocks", "fractal")}
     grounds["Mars-like"] = make_mars_terrain(1)
-    folder = Path(os.environ.get("ROVER_TERRAIN_DIR", ROOT.parent / "shared" / "terrain"))
-    for path in sorted(folder.glob("*.npz"))[:1]:
-        grounds[f"real map {path.stem}"] = load_terrain(path)
+    for name, terrain in list(real_maps().items())[:1]:
+        grounds[f"real map {name}"] = terrain
     return grounds
+
+
+def real_maps() -> dict[str, Terrain]:
+    """Return the maps of the folder ROVER_TERRAIN_DIR by name."""
+    folder = Path(os.environ.get("ROVER_TERRAIN_DIR", ROOT.parent / "shared" / "terrain"))
+    return {path.stem: load_terrain(path) for path in sorted(folder.glob("*.npz"))}
+
+
+def made_reef(seed: int = 1, half: float = 2.5, resolution: float = 0.01) -> Terrain:
+    """Return ground as rough as a coral reef: steep heads and holes on relief, in small cells."""
+    rng = np.random.default_rng(seed)
+    n = round(2.0 * half / resolution) + 1
+    wave = np.hypot(np.fft.fftfreq(n)[:, None], np.fft.rfftfreq(n)[None, :])
+    wave = np.maximum(wave, 1.0 / 120.0)
+    z = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((n, n))) * wave**-2.0, s=(n, n))
+    z *= 0.13 / z.std()
+    x = -half + resolution * np.arange(n)
+    X, Y = np.meshgrid(x, x)
+    for _ in range(220):
+        (cx, cy), height = rng.uniform(-half, half, 2), rng.uniform(0.1, 0.4)
+        width, up = rng.uniform(0.05, 0.3), rng.random() < 0.6
+        inside = np.clip(1.0 - ((X - cx) ** 2 + (Y - cy) ** 2) / width**2, 0.0, None)
+        z += (1.0 if up else -1.0) * height * np.sqrt(inside)
+    return Terrain(z, resolution, (-half, -half))
 
 
 def random_poses(ground: Terrain, count: int) -> np.ndarray:

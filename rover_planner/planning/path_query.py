@@ -148,7 +148,8 @@ def answer_path_query(
 ) -> PathAnswer:
     """Evaluate the candidate paths from start to goal and choose the best traversable one.
 
-    A candidate that is refused is judged up to its first failure; `check_path` judges all of it.
+    Of several candidates, a refused one is judged up to its first failure; `check_path` judges all
+    of it, as is done for a single candidate.
 
     Args:
         rover: The rover; its wheelbase is the smallest radius of a candidate.
@@ -173,7 +174,12 @@ def answer_path_query(
     )
     sweep_options = options.sweep_options(joint_angles)
     judged = judge_paths(
-        rover, terrain, paths, sweep_options, sigmas=options.map_sigmas, stop_at_failure=True
+        rover,
+        terrain,
+        paths,
+        sweep_options,
+        sigmas=options.map_sigmas,
+        stop_at_failure=len(paths) > 1,
     )
     return choose(
         tuple(

@@ -32,7 +32,7 @@ def warn_of_disk(logger: Any) -> None:
     """Log one warning for each thing that the disk did not take."""
     kernels, log = kernel_cache_note(), log_fault()
     if kernels:
-        advice = "each start compiles for about a minute"
+        advice = "each start compiles for half a minute"
         logger.warning(f"kernels are not cached: {kernels}; {advice}")
     if log:
         logger.warning(f"no log file is written: {log}")
