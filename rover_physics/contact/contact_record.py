@@ -72,6 +72,7 @@ CELL_SEARCH = record_type(
     ("peak_s", float, (2,)),  # its place along the heading [cells]
     ("peak_q", float, (2,)),  # its distance from the axle, in the wheel's up direction [cells]
     ("crossings", np.int64),  # number of places where edges cross a rim that may come near
+    ("crossing", float, (CROSSINGS,)),  # intrusions there [cells]
     ("crossing_s", float, (CROSSINGS,)),  # their places along the heading [cells]
     ("crossing_rim", np.int64, (CROSSINGS,)),  # -1 on the right rim, 1 on the left one
     ("found", np.int64),  # 1 if the search has found it

@@ -50,14 +50,17 @@ def cross_rim(search, start, along):
         return
     k = search.crossings % CROSSINGS
     search.crossing_s[k], search.crossing_rim[k] = at, int64(side)
+    search.crossing[k] = intrusion
     search.crossings += 1
 
 
 @kernel
 def look_along_rims(model, work, wheel):
-    """Search the rims on both sides of each crossing, where they may come near."""
-    search = work.cells
+    """Search the rims at each crossing and on both sides of it, where they may come near."""
+    search, gap = work.cells, work.contacts.gap
     for k in range(min(search.crossings, CROSSINGS)):
+        if search.crossing[k] > -gap[wheel] / search.cell + NOTICED * search.radius:
+            _search_rim(model, work, wheel, search.crossing_rim[k], search.crossing_s[k])
         for beyond in (-BEYOND, BEYOND):
             rim, s = search.crossing_rim[k], search.crossing_s[k] + beyond
             if abs(s) < search.radius and not _is_covered(model.ground, search, rim, s):

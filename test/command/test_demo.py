@@ -162,7 +162,7 @@ def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
     subprocess.run(
         [sys.executable, "-m", demo_module.COMPILER], env=environment, check=True, timeout=300
     )
-    assert len(list(tmp_path.rglob("*.nbc"))) > 50
+    assert len(list(tmp_path.rglob("*.nbc"))) > 5
 
 
 def test_the_picture_is_of_the_same_candidates_as_the_server_judges():

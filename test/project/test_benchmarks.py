@@ -21,6 +21,8 @@ SMALL = {
     "ingestion": {"CELLS": 60},
     "mujoco": {"POSES": 2, "MANY": 20},
     "parts": {"POSES": 20, "REPEATS": 2},
+    "paths": {"REPEATS": 2},
+    "rough": {"POSES": 10, "LOOKED_AT": 3, "CELLS": (0.4,)},
     "poses": {"POSES": 20, "FLOOR_POSES": 10, "LINES": 2, "SPACING": 0.2},
     "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2},
     "start": {"STARTS": 1, "COLD_STARTS": 0},
