@@ -27,7 +27,7 @@ MAX_TURN = 0.3
 
 
 @kernel
-def close_in_turns(model, work, turns, closed):
+def close_in_turns(model, work, turns, closed, together):
     """Close the gaps wheel by wheel until none exceeds `closed` [m], in at most so many turns.
 
     Args:
@@ -35,6 +35,8 @@ def close_in_turns(model, work, turns, closed):
         work: As for `settle`; placement and contacts belong to `work.q`, before and after.
         turns: Largest number of turns.
         closed: Gap at which a wheel counts as closed [m].
+        together: Whether the lifts of a turn are found from the same configuration and applied
+            together; else each starts where the one before has ended.
 
     Returns:
         The largest absolute gap [m], NaN over unknown ground.
@@ -50,12 +52,29 @@ def close_in_turns(model, work, turns, closed):
         if not solve_in_place(work.J, work.lifts, 6, 6):
             break
         wanted = max(0.5 * closed, CLOSER * worst)
-        for wheel in range(6):
-            for i in range(6):
-                work.start[i] = work.q[i]
-            _close(model, work, wheel, wanted)
+        _take_turn(model, work, wanted, together)
         worst = _find_worst(model, work)
     return worst
+
+
+@kernel
+def _take_turn(model, work, wanted, together):
+    """Lift each wheel to the ground; as for `close_in_turns`."""
+    start, q = work.start, work.q
+    for i in range(6):
+        start[i] = q[i]
+    for wheel in range(6):
+        work.step[wheel, 0] = _close(model, work, wheel, wanted)
+        if together:
+            _lift_to(model, work, wheel, 0.0)
+        else:
+            for i in range(6):
+                start[i] = q[i]
+    if together:
+        for wheel in range(6):
+            for i in range(6):
+                q[i] += work.step[wheel, 0] * work.lifts[i, wheel]
+        place(model.linkage, work.pose, q, work.placement)
 
 
 @kernel
@@ -73,12 +92,12 @@ def _find_worst(model, work):
 
 @kernel
 def _close(model, work, wheel, wanted):
-    """Lift or lower one wheel from `work.start` until its gap is at most `wanted` [m]."""
+    """Lift a wheel from `work.start` until its gap is at most `wanted`; return the lift [m]."""
     gaps = work.contacts.gap
     find_contact(model, work, wheel, SearchScope.WHOLE)
     lift, largest = 0.0, 0.0
     if not abs(gaps[wheel]) > wanted:
-        return
+        return lift
     for i in range(1, 6):
         largest = max(largest, abs(work.lifts[i, wheel]))
     longest = MAX_TURN / largest if largest > 0.0 else np.inf
@@ -86,7 +105,8 @@ def _close(model, work, wheel, wanted):
         lift = _follow_to_ground(model, work, wheel, (lift, longest, 0.5 * wanted))
         find_contact(model, work, wheel, SearchScope.FULL)
         if not abs(gaps[wheel]) > wanted:
-            return
+            break
+    return lift
 
 
 @kernel

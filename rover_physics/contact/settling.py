@@ -27,7 +27,8 @@ QUICK_ATTEMPTS = 5
 PROMISING = 2.0
 """Growth of the largest gap from one attempt to the next that ends the quick attempts."""
 RECOVERIES = 4
-"""Times that the gaps are closed wheel by wheel, after the quick attempts have failed."""
+"""Times that the gaps are closed wheel by wheel, after the quick attempts have failed: first all
+wheels together, so that no side comes first, then, if that fails, one after the other."""
 TURNS = 8
 """Largest number of turns of a recovery; in each, all wheels are closed."""
 FINAL_ATTEMPTS = 5
@@ -71,7 +72,6 @@ def settle_from(model, work):
 
     This is faster. Over edges with several solutions, the start decides which one is found.
     """
-    radius = model.linkage.radius
     place(model.linkage, work.pose, work.q, work.placement)
     status, worst = _find_contacts(model, work, SearchScope.QUICK)
     if status != ContactStatus.IN_CONTACT:
@@ -83,19 +83,15 @@ def settle_from(model, work):
         status, worst = _find_contacts(model, work, SearchScope.FULL)
         if worst <= GAP_TOLERANCE or np.isnan(worst) or worst > PROMISING * before:
             break
-    for attempt in range(RECOVERIES):
-        if worst <= GAP_TOLERANCE or np.isnan(worst) or status != ContactStatus.IN_CONTACT:
-            break
-        closed = RELAXED * radius * RELAXED_FURTHER**attempt
-        close_in_turns(model, work, TURNS, closed)
-        if _has_turned_over(work.q):
-            return PoseStatus.NOT_SETTLED
-        _find_contacts(model, work, SearchScope.QUICK)
-        for _ in range(FINAL_ATTEMPTS):
-            status, worst = _find_contacts(model, work, SearchScope.FULL)
-            if worst <= GAP_TOLERANCE or np.isnan(worst):
-                break
-            _newton(model, work, SearchScope.NEAR)
+    if status == ContactStatus.IN_CONTACT and worst > GAP_TOLERANCE:
+        for i in range(6):
+            work.unsettled[i] = work.q[i]
+        status, worst = _recover(model, work, True)
+        if status == ContactStatus.IN_CONTACT and not worst <= GAP_TOLERANCE:
+            for i in range(6):
+                work.q[i] = work.unsettled[i]
+            place(model.linkage, work.pose, work.q, work.placement)
+            status, worst = _recover(model, work, False)
     if status != ContactStatus.IN_CONTACT:
         return _refuse(status)
     if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
@@ -103,6 +99,34 @@ def settle_from(model, work):
     for wheel in range(6):
         blend_contact(model, work, wheel)
     return PoseStatus.SETTLED
+
+
+@kernel
+def _recover(model, work, together):
+    """Close the gaps wheel by wheel, then by Newton's method, as often as RECOVERIES.
+
+    Args:
+        model: As for `settle`.
+        work: As for `settle`.
+        together: As for `close_in_turns`.
+
+    Returns:
+        The worst ContactStatus, and the largest absolute gap [m]; infinite if the rover turns
+        over.
+    """
+    status, worst = ContactStatus.IN_CONTACT, np.inf
+    for attempt in range(RECOVERIES):
+        closed = RELAXED * model.linkage.radius * RELAXED_FURTHER**attempt
+        close_in_turns(model, work, TURNS, closed, together)
+        if _has_turned_over(work.q):
+            return ContactStatus.IN_CONTACT, np.inf
+        _find_contacts(model, work, SearchScope.QUICK)
+        for _ in range(FINAL_ATTEMPTS):
+            status, worst = _find_contacts(model, work, SearchScope.FULL)
+            if worst <= GAP_TOLERANCE or np.isnan(worst):
+                return status, worst
+            _newton(model, work, SearchScope.NEAR)
+    return status, worst
 
 
 @kernel

@@ -92,6 +92,7 @@ WORK = record_type(
     ("step", float, (6, 1)),  # Newton step
     ("lifts", float, (6, 6)),  # changes of q, one column for each wheel, that raise this wheel
     ("start", float, (6,)),  # q before a lift
+    ("unsettled", float, (6,)),  # q before the recoveries
     ("corners", float, (CORNERS, 3)),  # support polygon [m]
     ("centre", float, (3,)),  # centre of mass [m]
     ("force", float, (3,)),  # net force without that of the ground [N]
