@@ -1,11 +1,10 @@
 """Record of the wheel contacts, and the scopes of the contact search."""
 
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 
-from rover_physics.numerics.records import new_record, record_type
+from rover_physics.numerics.records import record_type
 
 
 class SearchScope(IntEnum):
@@ -78,8 +77,3 @@ CELL_SEARCH = record_type(
     ("found", np.int64),  # 1 if the search has found it
 )
 """Work space of `look_everywhere`."""
-
-
-def new_contacts() -> Any:
-    """Return an empty CONTACTS, no wheel held."""
-    return new_record(CONTACTS, held_height=np.nan, held_angle=np.nan)
