@@ -58,11 +58,11 @@ def bound_contacts(uncertain, work, nominal):
     """
     placement, contact_bounds = work.rover.placement, work.contact_bounds
     angles, points, reach = nominal.contact_angle, nominal.contact_points, work.spread.reach
-    R, rim = placement.R, contact_bounds.rim
+    axis, rim = placement.axis, contact_bounds.rim
     for wheel in range(6):
         lateral = 0.0
         for i in range(3):
-            lateral += R[i, 1] * (points[wheel, i] - placement.centres[wheel, i])
+            lateral += axis[wheel, i] * (points[wheel, i] - placement.centres[wheel, i])
         angle = angles[wheel]
         contact_bounds.angle[wheel] = contact_bounds.angle_low[wheel] = contact_bounds.angle_high[
             wheel
@@ -140,11 +140,12 @@ def _gap_at(model, rover, circle, turn):
     ground, samples, placement = model.ground, model.samples, rover.placement
     wheel, m = circle
     s, c = turn
-    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     across, radius = samples.laterals[m], samples.radius
-    x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
-    y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
-    z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+    x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
+    y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
+    z = centres[wheel, 2] + across * axis[2] - radius * c * up[2]
     gx = (x - ground.x0) * ground.inverse_resolution
     gy = (y - ground.y0) * ground.inverse_resolution
     if not is_cell_on_map(ground, gx, gy):

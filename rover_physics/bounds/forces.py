@@ -148,7 +148,8 @@ def _find_grounds(model, placement, contact_bounds, box):
 @kernel
 def _find_footprint(samples, placement, wheel, contact_bounds):
     """Return smallest and largest x and y [m] of the points of a wheel that may touch."""
-    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     left = near = np.inf
     right = far = -np.inf
     for corner in range(4):
@@ -158,8 +159,8 @@ def _find_footprint(samples, placement, wheel, contact_bounds):
         if corner % 2 == 1:
             across = contact_bounds.lateral_high[wheel]
         s, c = samples.radius * np.sin(angle), samples.radius * np.cos(angle)
-        x = centres[wheel, 0] + across * R[0, 1] + s * forward[0] - c * up[0]
-        y = centres[wheel, 1] + across * R[1, 1] + s * forward[1] - c * up[1]
+        x = centres[wheel, 0] + across * axis[0] + s * forward[0] - c * up[0]
+        y = centres[wheel, 1] + across * axis[1] + s * forward[1] - c * up[1]
         left, right, near, far = min(left, x), max(right, x), min(near, y), max(far, y)
     return left, right, near, far
 
@@ -209,9 +210,11 @@ def _evaluate(model, work):
         s, c = np.sin(box.at[ANGLE_INPUTS + wheel]), np.cos(box.at[ANGLE_INPUTS + wheel])
         contacts.sine[wheel], contacts.cosine[wheel] = s, c
         for i in range(3):
-            radial = linkage.radius * (s * placement.forward[i] - c * placement.up[i])
-            aside = box.at[PLACE_INPUTS + wheel] * placement.R[i, 1]
-            contacts.point[wheel, i] = placement.centres[wheel, i] + aside + radial
+            radial = s * placement.forward[wheel, i] - c * placement.up[wheel, i]
+            aside = box.at[PLACE_INPUTS + wheel] * placement.axis[wheel, i]
+            contacts.point[wheel, i] = (
+                placement.centres[wheel, i] + aside + linkage.radius * radial
+            )
     if not balance_forces(linkage, placement, contacts, box.columns, rover.balance):
         return False
     if box.columns == 1:

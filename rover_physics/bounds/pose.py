@@ -140,7 +140,7 @@ def _may_change_level(uncertain, work):
     """Return whether any wheel of the placed rover may climb or fall to another level."""
     rover, spread, linkage = work.rover, work.spread, uncertain.nominal.linkage
     placement, contacts = rover.placement, rover.contacts
-    fx, fy = placement.forward[0], placement.forward[1]
+    fx, fy = placement.ahead[0], placement.ahead[1]
     for wheel in range(6):
         slope = -contacts.normal[wheel, 0] * fx - contacts.normal[wheel, 1] * fy
         along, reach = _find_moves(linkage, work, wheel)
@@ -174,7 +174,7 @@ def _find_arm(linkage, wheel, placement):
     this second-order term out.
     """
     pivots = placement.bogie_pivots if linkage.on_bogie[wheel] else placement.rocker_pivots
-    forward, centre, pivot = placement.forward, placement.centres[wheel], pivots[wheel // 3]
+    forward, centre, pivot = placement.ahead, placement.centres[wheel], pivots[wheel // 3]
     ahead, square = 0.0, 0.0
     for k in range(3):
         ahead += forward[k] * (centre[k] - pivot[k])
@@ -187,8 +187,8 @@ def _rise_at(model, rover, wheel, move):
     """Return the rise of a wheel [m] when it is moved forward by `move` [m]."""
     placement = rover.placement
     x, y = placement.centres[wheel, 0], placement.centres[wheel, 1]
-    placement.centres[wheel, 0] += move * placement.forward[0]
-    placement.centres[wheel, 1] += move * placement.forward[1]
+    placement.centres[wheel, 0] += move * placement.ahead[0]
+    placement.centres[wheel, 1] += move * placement.ahead[1]
     find_contact(model, rover, wheel, SearchScope.QUICK)
     placement.centres[wheel, 0], placement.centres[wheel, 1] = x, y
     return -rover.contacts.gap[wheel]
@@ -203,7 +203,7 @@ def _find_moves(linkage, work, wheel):
     placement, spread = work.rover.placement, work.spread
     rate = spread.rate
     R, origin, centre = placement.R, placement.origin, placement.centres[wheel]
-    forward = placement.forward
+    forward = placement.ahead
     length, side = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0]), wheel // 3
     rate[:] = 0.0
     rate[1] = _shift((R[0, 0], R[1, 0], R[2, 0]), centre, origin, forward)

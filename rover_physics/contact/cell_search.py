@@ -43,7 +43,7 @@ def look_everywhere(model, work, wheel, tops):
         UNKNOWN_GROUND if ground below the wheel is unknown, else IN_CONTACT.
     """
     contacts, search = work.contacts, work.cells
-    if not work.placement.up[2] > LEAST_UPRIGHT:
+    if not work.placement.up[wheel, 2] > LEAST_UPRIGHT:
         return ContactStatus.IN_CONTACT
     begin_search(model, work, wheel)
     status = _look_at_vertices(model.ground, search, tops)

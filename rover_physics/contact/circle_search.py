@@ -35,11 +35,12 @@ def search_circle(model, work, circle, turn):
     ground, samples, placement = model.ground, model.samples, work.placement
     wheel, across = circle
     s, c = turn
-    R, centres, forward, up = placement.R, placement.centres, placement.forward, placement.up
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     radius, scale = samples.radius, ground.inverse_resolution
-    x = (centres[wheel, 0] + across * R[0, 1] - ground.x0) * scale
-    y = (centres[wheel, 1] + across * R[1, 1] - ground.y0) * scale
-    z = centres[wheel, 2] + across * R[2, 1]
+    x = (centres[wheel, 0] + across * axis[0] - ground.x0) * scale
+    y = (centres[wheel, 1] + across * axis[1] - ground.y0) * scale
+    z = centres[wheel, 2] + across * axis[2]
     ahead_x, ahead_y = radius * scale * forward[0], radius * scale * forward[1]
     down_x, down_y, down_z = radius * scale * up[0], radius * scale * up[1], radius * up[2]
     best, best_s, best_c, best_x, best_y = np.inf, s, c, 0.0, 0.0

@@ -24,8 +24,8 @@ def begin_search(model, work, wheel):
         (centres[wheel, 1] - ground.y0) * scale,
     )
     search.z = centres[wheel, 2]
-    search.ahead_x, search.ahead_y = placement.forward[0], placement.forward[1]
-    search.cosine, search.sine = placement.up[2], placement.R[2, 1]
+    search.ahead_x, search.ahead_y = placement.forward[wheel, 0], placement.forward[wheel, 1]
+    search.cosine, search.sine = placement.up[wheel, 2], placement.axis[wheel, 2]
     search.tangent = search.sine / search.cosine
     search.half_width = samples.half_width * scale * search.cosine
     search.found = search.crossings = 0

@@ -54,7 +54,7 @@ def _find_max_below_half(model, work, wheel, half):
     Infinite where any ground there is unknown.
     """
     ground, samples, placement = model.ground, model.samples, work.placement
-    forward, up, centres = placement.forward, placement.up, placement.centres
+    forward, up, centres = placement.forward[wheel], placement.up[wheel], placement.centres
     scale = ground.inverse_resolution
     along = 0.5 * samples.radius
     # Horizontal: half the sideways shift of the lowest point by camber, plus half the width.
@@ -87,16 +87,17 @@ def _scan_inside(model, work, wheel, tops):
     placement, contacts = work.placement, work.contacts
     rear, front = tops
     middle, best = samples.rows // 2, np.inf
-    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     scale, radius = ground.inverse_resolution, samples.radius
     ahead_x, ahead_y = scale * radius * forward[0], scale * radius * forward[1]
     down_x, down_y, down_z = scale * radius * up[0], scale * radius * up[1], radius * up[2]
     across, width = -samples.half_width, samples.half_width
-    x = (centres[wheel, 0] - ground.x0 + across * R[0, 1]) * scale
-    y = (centres[wheel, 1] - ground.y0 + across * R[1, 1]) * scale
-    z = centres[wheel, 2] + across * R[2, 1]
-    step_x, step_y, step_z = width * R[0, 1] * scale, width * R[1, 1] * scale, width * R[2, 1]
-    lowest = centres[wheel, 2] - abs(samples.half_width * R[2, 1])
+    x = (centres[wheel, 0] - ground.x0 + across * axis[0]) * scale
+    y = (centres[wheel, 1] - ground.y0 + across * axis[1]) * scale
+    z = centres[wheel, 2] + across * axis[2]
+    step_x, step_y, step_z = width * axis[0] * scale, width * axis[1] * scale, width * axis[2]
+    lowest = centres[wheel, 2] - abs(samples.half_width * axis[2])
     best_rim, best_row = 0, middle
     k, end, turn, top = middle, -1, -1, rear
     for direction in range(2):
@@ -132,7 +133,8 @@ def scan_carefully(model, work, wheel, scope):
     first, last, stride = 0, RIMS - 1, 1
     if scope == SearchScope.COARSE:
         first, last, stride = 1, 1, 2
-    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     scale, radius = ground.inverse_resolution, samples.radius
     middle = samples.rows // 2
     status, best, best_rim, best_row = ContactStatus.IN_CONTACT, np.inf, first, middle
@@ -141,13 +143,13 @@ def scan_carefully(model, work, wheel, scope):
         s, c = samples.sines[k], samples.cosines[k]
         for rim in range(first, last + 1):
             across = (rim - 1) * samples.half_width
-            x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
-            y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
+            x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
+            y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
             gx, gy = (x - ground.x0) * scale, (y - ground.y0) * scale
             if not is_cell_on_map(ground, gx, gy):
                 status = ContactStatus.OFF_MAP
                 continue
-            gap = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+            gap = centres[wheel, 2] + across * axis[2] - radius * c * up[2]
             gap -= height_at_cell(ground, gx, gy)
             if gap != gap:
                 if status == ContactStatus.IN_CONTACT:

@@ -44,14 +44,14 @@ def find_gap_above(model, work, wheel, point):
     distance of the contact from the axle in the wheel's up direction [m].
     """
     placement, radius = work.placement, model.samples.radius
-    forward, up, centres = placement.forward, placement.up, placement.centres
+    forward, up, centres = placement.forward[wheel], placement.up[wheel], placement.centres
     dx, dy = point[0] - centres[wheel, 0], point[1] - centres[wheel, 1]
     s, t = dx * forward[0] + dy * forward[1], dy * forward[0] - dx * forward[1]
     q = np.sqrt(max(radius * radius - s * s, 0.0))
-    across = (t - placement.R[2, 1] * q) / up[2]
+    across = (t - placement.axis[wheel, 2] * q) / up[2]
     if not (q > 0.0 and abs(across) <= model.samples.half_width):
         return np.inf, s, across, q
-    return centres[wheel, 2] - point[2] + (placement.R[2, 1] * t - q) / up[2], s, across, q
+    return centres[wheel, 2] - point[2] + (placement.axis[wheel, 2] * t - q) / up[2], s, across, q
 
 
 @kernel

@@ -82,7 +82,7 @@ def find_contact(model, work, wheel, scope):
 def _guess(model, work, wheel):
     """Write the nearest of every other sample of the middle circle; False near unknown ground."""
     ground, samples, placement = model.ground, model.samples, work.placement
-    forward, up, centres = placement.forward, placement.up, placement.centres
+    forward, up, centres = placement.forward[wheel], placement.up[wheel], placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
     gx, gy = (centres[wheel, 0] - ground.x0) * scale, (centres[wheel, 1] - ground.y0) * scale
     reach = radius * scale
@@ -142,7 +142,7 @@ def _write_contact(work, wheel, samples):
 def _write_radial_normal(work, wheel, turn):
     """Write the wheel's radius as the contact normal, scaled to z = 1."""
     placement, normal = work.placement, work.contacts.normal
-    forward, up = placement.forward, placement.up
+    forward, up = placement.forward[wheel], placement.up[wheel]
     s, c = turn
     z = max(c * up[2], LEAST_RISE)
     normal[wheel, 0] = (-s * forward[0] + c * up[0]) / z
@@ -207,12 +207,13 @@ def blend_contact(model, work, wheel):
 def _gap_at(model, work, circle, turn):
     """Return the gap [m] of a circle (wheel, place across [m]) at an angle (sine, cosine)."""
     ground, placement, radius = model.ground, work.placement, model.samples.radius
-    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
     wheel, across = circle
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     s, c = turn
-    x = centres[wheel, 0] + across * R[0, 1] + radius * (s * forward[0] - c * up[0])
-    y = centres[wheel, 1] + across * R[1, 1] + radius * (s * forward[1] - c * up[1])
-    z = centres[wheel, 2] + across * R[2, 1] - radius * c * up[2]
+    x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
+    y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
+    z = centres[wheel, 2] + across * axis[2] - radius * c * up[2]
     return z - look_up(ground, x, y)[0]
 
 
@@ -224,12 +225,13 @@ def write_point(samples, work, wheel, turn, lateral):
     [m], positive to the left.
     """
     placement, contacts = work.placement, work.contacts
-    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     s, c = turn
     contacts.sine[wheel], contacts.cosine[wheel] = s, c
     for i in range(3):
         radial = samples.radius * (s * forward[i] - c * up[i])
-        contacts.point[wheel, i] = centres[wheel, i] + lateral * R[i, 1] + radial
+        contacts.point[wheel, i] = centres[wheel, i] + lateral * axis[i] + radial
 
 
 @kernel
@@ -242,15 +244,15 @@ def write_normal(work, wheel, turn, slope):
     normal.
     """
     placement, normal = work.placement, work.contacts.normal
-    R, forward, up = placement.R, placement.forward, placement.up
+    axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
     s, c = turn
     slope_x, slope_y = slope
     radial_x = -s * forward[0] + c * up[0]
     radial_y = -s * forward[1] + c * up[1]
     radial_z = c * up[2]
     along_radius = radial_z - slope_x * radial_x - slope_y * radial_y
-    along_axis = R[2, 1] - slope_x * R[0, 1] - slope_y * R[1, 1]
-    z = max(along_radius * radial_z + along_axis * R[2, 1], LEAST_RISE * along_radius)
-    normal[wheel, 0] = (along_radius * radial_x + along_axis * R[0, 1]) / z
-    normal[wheel, 1] = (along_radius * radial_y + along_axis * R[1, 1]) / z
+    along_axis = axis[2] - slope_x * axis[0] - slope_y * axis[1]
+    z = max(along_radius * radial_z + along_axis * axis[2], LEAST_RISE * along_radius)
+    normal[wheel, 0] = (along_radius * radial_x + along_axis * axis[0]) / z
+    normal[wheel, 1] = (along_radius * radial_y + along_axis * axis[1]) / z
     normal[wheel, 2] = 1.0

@@ -90,13 +90,13 @@ def _axle(linkage, placement, wheel):
 
 @kernel
 def _write_frames(placement, contacts, frames):
-    R, forward, up = placement.R, placement.forward, placement.up
     for wheel in range(6):
+        axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
         s, c = contacts.sine[wheel], contacts.cosine[wheel]
         for i in range(3):
             frames[wheel, 0, i] = c * up[i] - s * forward[i]
             frames[wheel, 1, i] = s * up[i] + c * forward[i]
-            frames[wheel, 2, i] = R[i, 1]
+            frames[wheel, 2, i] = axis[i]
 
 
 @kernel

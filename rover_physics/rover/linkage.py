@@ -102,16 +102,22 @@ def attitude_matrix(roll, pitch, yaw, R):
 
 
 PLACEMENT = record_type(
-    ("R", float, (3, 3)),  # attitude, body to map; its second column is the axis of all wheels
+    ("steering", float, (6,)),  # angles of the wheels about the z axis of their link [rad]; read
+    ("R", float, (3, 3)),  # attitude, body to map; its second column is the axis of all pivots
     ("origin", float, (3,)),  # body origin [m]
     ("centres", float, (6, 3)),  # wheel centres [m]
     ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
     ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
     ("part_coms", float, (5, 3)),  # centres of mass of body, rockers and bogies, right first [m]
-    ("forward", float, (3,)),  # horizontal direction in the plane of the wheels
-    ("up", float, (3,)),  # direction in the plane of the wheels normal to `forward`, upwards
+    ("ahead", float, (3,)),  # horizontal direction in the plane in which the linkage moves
+    ("axis", float, (6, 3)),  # wheel axles, positive to the left
+    ("forward", float, (6, 3)),  # horizontal directions in the planes of the wheels
+    ("up", float, (6, 3)),  # directions in these planes normal to `forward`, upwards
 )
-"""Positions of a rover's parts in one configuration, map frame; written by `place`."""
+"""Positions of a rover's parts in one configuration, map frame.
+
+`place` reads the steering angles and writes the rest.
+"""
 
 
 @kernel
@@ -138,7 +144,7 @@ def place(linkage, pose, q, placement):
         pose: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
         q: (6,) z of the body origin [m], roll, pitch, right rocker angle, right and left bogie
             angle [rad].
-        placement: PLACEMENT, written.
+        placement: PLACEMENT with the steering angles; the rest is written.
     """
     R, origin, wheels = placement.R, placement.origin, linkage.wheels
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
@@ -154,14 +160,23 @@ def place(linkage, pose, q, placement):
         bx, bz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
         to_map(placement, (bx, bogie_pivots[side, 1], bz), placement.bogie_pivots, side)
         for i in range(3 * side, 3 * side + 3):
+            link_c, link_s = rocker_c, rocker_s
             if linkage.on_bogie[i]:
+                link_c, link_s = bogie_c, bogie_s
                 dx, dz = wheels[i, 0] - bogie_pivots[side, 0], wheels[i, 2] - bogie_pivots[side, 2]
                 wx, wz = bx + bogie_c * dx + bogie_s * dz, bz - bogie_s * dx + bogie_c * dz
             else:
                 dx, dz = wheels[i, 0] - px, wheels[i, 2] - pz
                 wx, wz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
             to_map(placement, (wx, wheels[i, 1], wz), placement.centres, i)
-    _span_wheel_plane(R, placement.forward, placement.up)
+            _write_axis(placement, i, (link_s, link_c))
+            _span_wheel_plane(placement, i)
+    length = np.sqrt(R[0, 1] * R[0, 1] + R[1, 1] * R[1, 1])
+    placement.ahead[0], placement.ahead[1], placement.ahead[2] = (
+        R[1, 1] / length,
+        -R[0, 1] / length,
+        0.0,
+    )
 
 
 @kernel
@@ -188,10 +203,29 @@ def place_masses(linkage, q, placement):
 
 
 @kernel
-def _span_wheel_plane(R, forward, up):
-    axis_x, axis_y, axis_z = R[0, 1], R[1, 1], R[2, 1]
-    length = np.sqrt(axis_x * axis_x + axis_y * axis_y)
-    forward[0], forward[1], forward[2] = axis_y / length, -axis_x / length, 0.0
-    up[0] = forward[1] * axis_z
-    up[1] = -forward[0] * axis_z
-    up[2] = forward[0] * axis_y - forward[1] * axis_x
+def _write_axis(placement, wheel, link):
+    """Write the axle of a wheel, turned about the z axis of its link.
+
+    `link` is the (sine, cosine) of the link's angle about body y.
+    """
+    R, axis = placement.R, placement.axis
+    angle = placement.steering[wheel]
+    if angle == 0.0:
+        for i in range(3):
+            axis[wheel, i] = R[i, 1]
+        return
+    link_s, link_c = link
+    s, c = np.sin(angle), np.cos(angle)
+    for i in range(3):
+        axis[wheel, i] = c * R[i, 1] - s * (link_c * R[i, 0] - link_s * R[i, 2])
+
+
+@kernel
+def _span_wheel_plane(placement, wheel):
+    """Write the two directions in the plane of a wheel."""
+    axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
+    length = np.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    forward[0], forward[1], forward[2] = axis[1] / length, -axis[0] / length, 0.0
+    up[0] = forward[1] * axis[2]
+    up[1] = -forward[0] * axis[2]
+    up[2] = forward[0] * axis[1] - forward[1] * axis[0]

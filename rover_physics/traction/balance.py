@@ -263,8 +263,8 @@ def _write_balance(linkages, works, balances):
 def _write_contacts(radius, work):
     """Write the contacts of wheels from their measured contact angles."""
     placement, contacts, measured = work.placement, work.contacts, work.measured
-    R, forward, up = placement.R, placement.forward, placement.up
     for wheel in range(WHEEL_COUNT):
+        axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
         angle, offset = measured.contact_angles[wheel], measured.contact_offsets[wheel]
         s, c = np.sin(angle), np.cos(angle)
         contacts.sine[wheel], contacts.cosine[wheel] = s, c
@@ -272,7 +272,7 @@ def _write_contacts(radius, work):
             contacts.point[wheel, k] = (
                 placement.centres[wheel, k]
                 + radius * (s * forward[k] - c * up[k])
-                + offset * R[k, 1]
+                + offset * axis[k]
             )
 
 

@@ -168,11 +168,12 @@ def _scan_profile(ground, linkage, search, wheel, profile):
     first, then other local minima of the distance; infinite if there are no more.
     """
     placement, distances, angles = search.placement, search.distance, search.angle
-    R, forward, up, centres = placement.R, placement.forward, placement.up, placement.centres
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
     offset = 0.5 * (profile - MIDDLE_PROFILE) * linkage.width
-    cx = centres[wheel, 0] + offset * R[0, 1]
-    cy = centres[wheel, 1] + offset * R[1, 1]
-    cz = centres[wheel, 2] + offset * R[2, 1]
+    cx = centres[wheel, 0] + offset * axis[0]
+    cy = centres[wheel, 1] + offset * axis[1]
+    cz = centres[wheel, 2] + offset * axis[2]
     for k in range(MAX_PLACES):
         distances[profile, k] = angles[profile, k] = np.inf
     step = PROFILE_REACH * linkage.radius / PROFILE_STEPS
