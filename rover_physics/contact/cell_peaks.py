@@ -86,14 +86,16 @@ def _look_into_cell(search, corner, shape):
     base = a - search.tangent * t0 + 0.5 * slope_t * slope_t * half
     level = base - rise * s0 + bend * s0 * s0
     rise -= 2.0 * bend * s0
-    # The wheel bends at least as at its bottom.
-    rest = inverse / R - 2.0 * bend
-    if rest > 0.0 and level + R * inverse + 0.5 * rise * rise / rest <= search.best:
-        return
     low = max(s0 + min(ex, 0.0) + min(ey, 0.0), -STEEPEST * R)
     high = min(s0 + max(ex, 0.0) + max(ey, 0.0), STEEPEST * R)
     if not low < high:
         return
+    # The wheel bends at least as at its bottom.
+    rest = inverse / R - 2.0 * bend
+    if rest > 0.0:
+        at = min(max(rise / rest, low), high)
+        if level + R * inverse + (rise - 0.5 * rest * at) * at <= search.best:
+            return
     if rest > 0.0:
         _look_on_line(search, (s0, t0), shape, (rise, bend, low, high))
         return

@@ -18,53 +18,39 @@ from rover_physics.rover.linkage import place
 
 TRIALS = 12
 """Largest number of lifts of one wheel between two looks."""
-LOOKS = 4
-"""Largest number of looks at all ground below one wheel in a turn."""
+LOOKS = 2
+"""Largest number of looks at all ground below one wheel while it is closed."""
 CLOSER = 0.1
-"""A turn closes each gap to this share of the largest one."""
+"""Share of the largest gap to which each gap is closed."""
 MAX_TURN = 0.3
 """Largest change of an angle in one trial [rad]."""
 
 
 @kernel
-def close_in_turns(model, work, turns, closed, together):
-    """Close the gaps wheel by wheel until none exceeds `closed` [m], in at most so many turns.
+def close_gaps(model, work, worst, together):
+    """Close the gaps wheel by wheel, each to a share of the largest one.
 
     Args:
         model: As for `settle`.
-        work: As for `settle`; placement and contacts belong to `work.q`, before and after.
-        turns: Largest number of turns.
-        closed: Gap at which a wheel counts as closed [m].
-        together: Whether the lifts of a turn are found from the same configuration and applied
+        work: As for `settle`; contacts of all ground below the wheels at `work.q`. `work.q` and
+            the placement are written.
+        worst: Largest absolute gap [m].
+        together: Whether the lifts of all wheels are found from the same configuration and applied
             together; else each starts where the one before has ended.
-
-    Returns:
-        The largest absolute gap [m], NaN over unknown ground.
     """
-    worst = _find_worst(model, work)
-    for _ in range(turns):
-        if not worst > closed:
-            break
-        write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.LEVEL, work.J)
-        work.lifts[:, :] = 0.0
-        for wheel in range(6):
-            work.lifts[wheel, wheel] = 1.0
-        if not solve_in_place(work.J, work.lifts, 6, 6):
-            break
-        wanted = max(0.5 * closed, CLOSER * worst)
-        _take_turn(model, work, wanted, together)
-        worst = _find_worst(model, work)
-    return worst
-
-
-@kernel
-def _take_turn(model, work, wanted, together):
-    """Lift each wheel to the ground; as for `close_in_turns`."""
     start, q = work.start, work.q
+    write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.LEVEL, work.J)
+    work.lifts[:, :] = 0.0
+    for wheel in range(6):
+        work.lifts[wheel, wheel] = 1.0
+    if not solve_in_place(work.J, work.lifts, 6, 6):
+        return
     for i in range(6):
         start[i] = q[i]
     for wheel in range(6):
-        work.step[wheel, 0] = _close(model, work, wheel, wanted)
+        if not together:
+            find_contact(model, work, wheel, SearchScope.WHOLE)
+        work.step[wheel, 0] = _close(model, work, wheel, CLOSER * worst)
         if together:
             _lift_to(model, work, wheel, 0.0)
         else:
@@ -78,23 +64,9 @@ def _take_turn(model, work, wanted, together):
 
 
 @kernel
-def _find_worst(model, work):
-    worst = 0.0
-    for wheel in range(6):
-        find_contact(model, work, wheel, SearchScope.WHOLE)
-        gap = abs(work.contacts.gap[wheel])
-        if gap > worst or gap != gap:
-            worst = gap
-        if worst != worst:
-            break
-    return worst
-
-
-@kernel
 def _close(model, work, wheel, wanted):
     """Lift a wheel from `work.start` until its gap is at most `wanted`; return the lift [m]."""
     gaps = work.contacts.gap
-    find_contact(model, work, wheel, SearchScope.WHOLE)
     lift, largest = 0.0, 0.0
     if not abs(gaps[wheel]) > wanted:
         return lift

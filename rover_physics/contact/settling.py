@@ -9,7 +9,7 @@ import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
-from rover_physics.contact.recovery import close_in_turns
+from rover_physics.contact.recovery import close_gaps
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
@@ -20,23 +20,17 @@ GAP_TOLERANCE = 3e-5
 """Largest gap in a settled pose [m], checked by a final search."""
 NEWTON_TOLERANCE = 5e-6
 """Largest gap at which Newton's method stops [m]."""
-MAX_NEWTON_STEPS = 20
+MAX_NEWTON_STEPS = 6
 """Largest number of Newton steps."""
 QUICK_ATTEMPTS = 5
 """Newton's method runs up to this often; after each time, all ground is looked at."""
 PROMISING = 2.0
 """Growth of the largest gap from one attempt to the next that ends the quick attempts."""
-RECOVERIES = 4
+RECOVERIES = 7
 """Times that the gaps are closed wheel by wheel, after the quick attempts have failed: first all
 wheels together, so that no side comes first, then, if that fails, one after the other."""
-TURNS = 8
-"""Largest number of turns of a recovery; in each, all wheels are closed."""
-FINAL_ATTEMPTS = 5
-"""Newton's method runs up to so often, less one, after each recovery."""
-RELAXED = 0.05
-"""Largest gap [wheel radii] at which a recovery ends and Newton's method starts."""
-RELAXED_FURTHER = 0.25
-"""Factor on RELAXED after each failed recovery: a wheel wedged at a face has small gaps."""
+FINAL_ATTEMPTS = 3
+"""Newton's method runs up to so often after each recovery."""
 TURNED_OVER = 1.45
 """Roll or pitch [rad] above which the search stops: the rover is on its end or side."""
 
@@ -108,24 +102,23 @@ def _recover(model, work, together):
     Args:
         model: As for `settle`.
         work: As for `settle`.
-        together: As for `close_in_turns`.
+        together: As for `close_gaps`.
 
     Returns:
         The worst ContactStatus, and the largest absolute gap [m]; infinite if the rover turns
         over.
     """
-    status, worst = ContactStatus.IN_CONTACT, np.inf
-    for attempt in range(RECOVERIES):
-        closed = RELAXED * model.linkage.radius * RELAXED_FURTHER**attempt
-        close_in_turns(model, work, TURNS, closed, together)
+    status, worst = _find_contacts(model, work, SearchScope.WHOLE)
+    for _ in range(RECOVERIES):
+        close_gaps(model, work, worst, together)
         if _has_turned_over(work.q):
             return ContactStatus.IN_CONTACT, np.inf
-        _find_contacts(model, work, SearchScope.QUICK)
+        status, worst = _find_contacts(model, work, SearchScope.WHOLE)
         for _ in range(FINAL_ATTEMPTS):
-            status, worst = _find_contacts(model, work, SearchScope.FULL)
             if worst <= GAP_TOLERANCE or np.isnan(worst):
                 return status, worst
             _newton(model, work, SearchScope.NEAR)
+            status, worst = _find_contacts(model, work, SearchScope.FULL)
     return status, worst
 
 
