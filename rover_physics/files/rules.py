@@ -86,15 +86,16 @@ def number(
     above: float = -math.inf,
     least: float = -math.inf,
     most: float = math.inf,
+    below: float = math.inf,
 ) -> Rule:
-    """Return the rule of a finite number within bounds; `above` is an exclusive bound."""
-    named = (("above", above), ("at least", least), ("at most", most))
+    """Return the rule of a finite number within bounds; `above` and `below` are exclusive."""
+    named = (("above", above), ("at least", least), ("at most", most), ("below", below))
     bounds = " and ".join(f"{name} {bound:g}" for name, bound in named if math.isfinite(bound))
     words = "a number", bounds, f"in {unit}" if unit else ""
     return Rule(
         " ".join(filter(None, words)),
         unit,
-        lambda value: math.isfinite(value) and above < value and least <= value <= most,
+        lambda value: math.isfinite(value) and above < value < below and least <= value <= most,
     )
 
 

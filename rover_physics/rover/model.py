@@ -1,5 +1,6 @@
 """Rover parameters: geometry, masses, actuators and safety limits; the keys of a rover file."""
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -25,6 +26,7 @@ from rover_physics.numerics.plausible import (
     MIN_GRAVITY,
     MIN_LENGTH,
     MIN_SPEED,
+    MIN_STEERING,
     MIN_TORQUE,
 )
 
@@ -43,11 +45,18 @@ Angles = Annotated[tuple[Radians, Radians], interval("rad")]
 Edges = Annotated[tuple[Metres, Metres], interval("m")]
 Mass = Annotated[float, number("kg", least=0.0, most=MAX_MASS)]
 Share = Annotated[float, number("", above=0.0, most=1.0)]
+DEFAULT_SERVO_DROOP = 0.3
+"""Droop of a wheel's speed servo if the rover file has none."""
 
 
 def _is_arm(lengths: tuple[float, float, float]) -> bool:
     """Return whether three lengths are valid for column, upper arm and forearm."""
     return min(lengths) >= 0.0 and lengths[1] + lengths[2] >= MIN_LENGTH
+
+
+def _are_axles(names: tuple[str, ...]) -> bool:
+    """Return whether names are one or more of WHEEL_POSITIONS, each at most once."""
+    return bool(names) and set(names) <= set(WHEEL_POSITIONS) and len(set(names)) == len(names)
 
 
 def _are_names(texts: tuple[str, ...]) -> bool:
@@ -69,6 +78,25 @@ class Wheel:
     """Largest torque of the drive in [N m]."""
     max_speed: Annotated[float, number("rad/s", least=MIN_SPEED, most=MAX_SPEED)]
     """Largest speed of the drive in [rad/s]."""
+    servo_droop: Annotated[float, number("", least=0.0, below=1.0)] = DEFAULT_SERVO_DROOP
+    """Share of the commanded speed that the drive's servo loses at full torque; 0 is stiff."""
+
+
+@dataclass(frozen=True)
+class Steering:
+    """Wheels that turn about the z axis of their link, in pairs: both wheels of an axle."""
+
+    wheels: Annotated[
+        tuple[str, ...],
+        Rule(
+            f"a list of one or more of {', '.join(WHEEL_POSITIONS)}, each once", holds=_are_axles
+        ),
+    ]
+    """Positions of the wheels that turn: ``"rear"``, ``"middle"``, ``"front"``."""
+    limit: Annotated[float, number("rad", least=MIN_STEERING, most=math.pi)]
+    """Largest steering angle to either side in [rad]."""
+    rate: Annotated[float, number("rad/s", least=MIN_SPEED, most=MAX_SPEED)]
+    """Largest speed of the steering in [rad/s]."""
 
 
 @dataclass(frozen=True)
@@ -205,6 +233,8 @@ class Rover:
     """Safety limits."""
     manipulator: Manipulator | None = None
     """The arm; None if there is none."""
+    steering: Steering | None = None
+    """The wheels that steer; None if all are fixed, and the rover skids in curves."""
 
     @property
     def total_mass(self) -> float:

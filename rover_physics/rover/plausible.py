@@ -1,5 +1,6 @@
 """Checks the numbers of a rover before kernels use them; a rover need not come from a file."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from rover_physics.errors import ModelError
 from rover_physics.numerics.plausible import (
     MAX_COORDINATE,
+    MAX_DROOP,
     MAX_FRICTION,
     MAX_GRAVITY,
     MAX_LENGTH,
@@ -17,6 +19,7 @@ from rover_physics.numerics.plausible import (
     MIN_GRAVITY,
     MIN_LENGTH,
     MIN_SPEED,
+    MIN_STEERING,
     MIN_TORQUE,
 )
 from rover_physics.rover.model import Rover
@@ -29,6 +32,9 @@ RANGES = {
     "wheel.width": (MIN_LENGTH, MAX_LENGTH),
     "wheel.max_torque": (MIN_TORQUE, MAX_TORQUE),
     "wheel.max_speed": (MIN_SPEED, MAX_SPEED),
+    "wheel.servo_droop": (0.0, MAX_DROOP),
+    "steering.limit": (MIN_STEERING, math.pi),
+    "steering.rate": (MIN_SPEED, MAX_SPEED),
 }
 """Smallest and largest values by dotted key, in SI units."""
 

@@ -38,6 +38,8 @@ def rover_to_dict(rover: Rover) -> dict[str, Any]:
         del data["manipulator"]
     elif arm["joint_limits"] is None:
         del arm["joint_limits"]
+    if data["steering"] is None:
+        del data["steering"]
     return data
 
 

@@ -9,9 +9,12 @@ import yaml
 
 from rover_physics.errors import RoverError, RoverFileError
 from rover_physics.files.config_files import find_config
+from rover_physics.rover.model import Steering
 from rover_physics.rover.rover_file import load_rover, preset_names, rover_from_dict
 
 NAN, INF = float("nan"), float("inf")
+OPTIONAL = ("manipulator", "manipulator.payload", "steering", "wheel.servo_droop")
+"""Keys of the lsr1 file that may be left out."""
 
 
 def lsr1() -> dict[str, Any]:
@@ -110,6 +113,49 @@ def test_the_manipulator_may_be_left_out():
     assert rover_from_dict(changed("manipulator", None), "test").manipulator is None
 
 
+def test_the_presets_steer_their_rear_and_front_wheels():
+    for name in preset_names():
+        assert load_rover(name).steering == Steering(("rear", "front"), 1.57, 0.35)
+
+
+def test_a_rover_without_a_section_steering_has_fixed_wheels():
+    assert rover_from_dict(without("steering"), "test").steering is None
+    assert rover_from_dict(changed("steering", None), "test").steering is None
+
+
+def test_the_droop_of_the_servos_may_be_left_out():
+    assert rover_from_dict(without("wheel.servo_droop"), "test").wheel.servo_droop == 0.3
+    stiff = rover_from_dict(changed("wheel.servo_droop", 0), "test")
+    assert stiff.wheel.servo_droop == 0.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "must"),
+    [
+        ("wheels", ["rear", "nose"], "one or more of rear, middle, front, each once"),
+        ("wheels", ["rear", "rear"], "one or more of rear, middle, front, each once"),
+        ("wheels", [], "one or more of rear, middle, front, each once"),
+        ("wheels", "front", "one or more of rear, middle, front, each once"),
+        ("limit", 0.0, "at least 1e-06"),
+        ("limit", -0.5, "at least 1e-06"),
+        ("limit", 3.2, "at most 3.14159 in rad"),
+        ("limit", NAN, "at most 3.14159 in rad"),
+        ("rate", 0.0, "at least 1e-09"),
+        ("rate", -0.1, "at least 1e-09"),
+        ("rate", INF, "in rad/s"),
+    ],
+)
+def test_impossible_steering_is_refused_by_its_key(key, value, must):
+    with pytest.raises(RoverFileError, match=rf"^test: steering\.{key} is .*{must}"):
+        rover_from_dict(changed(f"steering.{key}", value), "test")
+
+
+@pytest.mark.parametrize("droop", [-0.1, 1.0, 2.0, NAN])
+def test_a_droop_outside_0_to_below_1_is_refused(droop):
+    with pytest.raises(RoverFileError, match=r"wheel\.servo_droop is .*at least 0 and below 1"):
+        rover_from_dict(changed("wheel.servo_droop", droop), "test")
+
+
 def test_the_payload_may_be_left_out():
     arm = rover_from_dict(without("manipulator.payload"), "test").manipulator
     assert arm is not None
@@ -120,9 +166,7 @@ def test_integers_are_numbers():
     assert rover_from_dict(changed("wheel.max_torque", 2), "test").wheel.max_torque == 2.0
 
 
-@pytest.mark.parametrize(
-    "key", [key for key in all_keys(lsr1()) if key not in ("manipulator", "manipulator.payload")]
-)
+@pytest.mark.parametrize("key", [key for key in all_keys(lsr1()) if key not in OPTIONAL])
 def test_a_missing_key_is_named(key):
     with pytest.raises(
         RoverFileError, match=rf"missing key {key};.* needs .*{key.split('.')[-1]}"
