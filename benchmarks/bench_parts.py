@@ -13,7 +13,7 @@ from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
 from rover_physics.contact.rim_scan import scan_rims
 from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel import blend_contact, find_contact
-from rover_physics.prediction.evaluation import WORK, evaluate, new_work, set_pose
+from rover_physics.prediction.evaluation import AHEAD, WORK, evaluate, new_work, set_pose
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.rover.linkage import place
 from rover_physics.rover.rover_file import load_rover
@@ -112,7 +112,7 @@ def loop_over_poses(part: Callable) -> Callable:
 def settle_all(models, poses, q, works):
     """Settle at all poses, for comparison."""
     for i in range(len(poses)):
-        set_pose(poses, i, works[0])
+        set_pose(models[0], poses, AHEAD, i, works[0])
         settle(models[0], works[0])
 
 

@@ -7,7 +7,14 @@ from benchmarks.compiled import compiled
 from benchmarks.grounds import all_grounds, random_poses, reference_ground
 from benchmarks.measure import Figure, median_time, median_times
 from rover_physics.contact.settling import settle, settle_from
-from rover_physics.prediction.evaluation import WORK, evaluate, new_results, new_work, set_pose
+from rover_physics.prediction.evaluation import (
+    AHEAD,
+    WORK,
+    evaluate,
+    new_results,
+    new_work,
+    set_pose,
+)
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import place
@@ -34,7 +41,7 @@ OTHER_POSE = 1e-3
 def settle_all(models, poses, works, results):
     """Settle the rover at poses (n, 3), without forces or limits."""
     for i in range(len(poses)):
-        set_pose(poses, i, works[0])
+        set_pose(models[0], poses, AHEAD, i, works[0])
         results[i].status = settle(models[0], works[0])
         results[i].q[:] = works[0].q
 
@@ -43,7 +50,7 @@ def settle_all(models, poses, works, results):
 def settle_along(models, poses, works, results):
     """Settle the rover at poses (n, 3) of a path, each starting from the result before it."""
     for i in range(len(poses)):
-        set_pose(poses, i, works[0])
+        set_pose(models[0], poses, AHEAD, i, works[0])
         if i > 0 and results[i - 1].status == PoseStatus.SETTLED:
             results[i].status = settle_from(models[0], works[0])
         else:

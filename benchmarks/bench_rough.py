@@ -10,6 +10,7 @@ from benchmarks.compiled import compiled
 from benchmarks.grounds import made_reef, real_maps, reference_ground
 from benchmarks.measure import Figure
 from rover_physics.prediction.evaluation import (
+    AHEAD,
     WORK,
     evaluate_pose,
     new_results,
@@ -37,7 +38,7 @@ KNOWN = (PoseStatus.SETTLED, PoseStatus.NOT_SETTLED)
 @compiled
 def evaluate_one(models, poses, works, results, i):
     """Evaluate pose i."""
-    set_pose(poses, i, works[0])
+    set_pose(models[0], poses, AHEAD, i, works[0])
     evaluate_pose(models[0], works[0], results[i])
 
 

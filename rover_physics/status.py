@@ -29,6 +29,8 @@ class PoseStatus(IntEnum):
     """The equilibrium equations are singular."""
     NOT_COMPUTABLE = 5
     """A force, torque or margin is NaN or infinite."""
+    STEERING = 6
+    """A wheel cannot point where the motion of the body asks."""
 
 
 class BoundStatus(IntEnum):

@@ -10,7 +10,7 @@ import numpy as np
 
 from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
 from rover_physics.compilation import Step, compile_groups
-from rover_physics.prediction.evaluation import evaluate
+from rover_physics.prediction.evaluation import AHEAD, evaluate
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -63,7 +63,7 @@ def bound_poses() -> None:
     """Bound a pose on a map with uncertain heights; it need not settle."""
     rover, step = _rover_and_step()
     ground = UncertainGround(*(pack_ground(step),) * 3)
-    find_bounds(pack_model(rover, step), ground, np.zeros((1, 3)), np.zeros(1, NOMINAL))
+    find_bounds(pack_model(rover, step), ground, np.zeros((1, 3)), AHEAD, np.zeros(1, NOMINAL))
 
 
 def score_map() -> None:

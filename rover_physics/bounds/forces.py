@@ -14,7 +14,9 @@ of the Engineering Mechanics Division 100(1), 1974.
 import numpy as np
 
 from rover_physics.forces.equilibrium import FREE_FORCES, balance_forces
+from rover_physics.forces.shares import has_turned_wheels
 from rover_physics.forces.soil import SoilWheel, solve_wheel
+from rover_physics.forces.soil_sharing import rolling_direction
 from rover_physics.forces.stability import CORNERS, measure_edge
 from rover_physics.forces.torques import (
     apply_torques,
@@ -23,7 +25,7 @@ from rover_physics.forces.torques import (
 )
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
-from rover_physics.prediction.evaluation import find_tip_over
+from rover_physics.prediction.tip_over import find_tip_over
 from rover_physics.rover.linkage import place, place_masses
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import SOIL_NUMBERS, copy_soil, friction_at, soil_row_at
@@ -95,9 +97,10 @@ def bound_forces(model, work):
         box.base_value[output] = box.smallest[output] = box.largest[output] = box.value[output]
     if not _find_gains(model, work):
         return False
+    turned = has_turned_wheels(rover.placement)
     for wheel in range(6):
         _bound_output(model, work, LOAD_OUTPUTS + wheel)
-        if wheel == 0 or box.columns > 1:
+        if wheel == 0 or box.columns > 1 or turned:
             _bound_output(model, work, PULL_OUTPUTS + wheel)
         else:
             box.smallest[PULL_OUTPUTS + wheel] = box.smallest[PULL_OUTPUTS]
@@ -228,7 +231,9 @@ def _evaluate(model, work):
             box.value[PULL_OUTPUTS + wheel],
             box.value[SIDE_OUTPUTS + wheel],
         ) = N, T, S
-        box.value[USE_OUTPUTS + wheel] = _worst_use(model, box, wheel, (N, T, S))
+        box.value[USE_OUTPUTS + wheel] = _worst_use(
+            model, box, wheel, (N, rolling_direction(rover, wheel) * T, S)
+        )
     find_tip_over(linkage, rover)
     for edge in range(CORNERS):
         angle, measure = measure_edge(rover.corners, edge, rover.centre, rover.force, rover.moment)
@@ -238,7 +243,10 @@ def _evaluate(model, work):
 
 @kernel
 def _worst_use(model, box, wheel, forces):
-    """Return the largest utilisation of a wheel on all grounds that it may touch."""
+    """Return the largest utilisation of a wheel on all grounds that it may touch.
+
+    `forces` are N, T in the direction in which the wheel rolls, and S, over the rover's weight.
+    """
     ground, linkage, settings = model.ground, model.linkage, model.settings
     N, T, S = forces
     N = max(N, MIN_LOAD_SHARE)
@@ -249,9 +257,7 @@ def _worst_use(model, box, wheel, forces):
     for k in range(box.soil_count[wheel]):
         copy_soil(ground, box.soils[wheel, k], box.soil)
         own = SoilWheel(linkage.radius, linkage.width, box.mu_low[wheel])
-        solved = solve_wheel(
-            box.soil, own, weight * N, settings.direction * weight * T, weight * S
-        )
+        solved = solve_wheel(box.soil, own, weight * N, weight * T, weight * S)
         worst = max(worst, solved.utilisation)
     return worst
 

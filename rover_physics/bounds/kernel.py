@@ -93,7 +93,11 @@ def new_bounds(n: int) -> Any:
 
 
 def find_bounds(
-    model: PackedModel, ground: UncertainGround, poses: np.ndarray, nominal: np.ndarray
+    model: PackedModel,
+    ground: UncertainGround,
+    poses: np.ndarray,
+    motions: np.ndarray,
+    nominal: np.ndarray,
 ) -> Any:
     """Bound the prediction at poses; return BOUNDS (n,).
 
@@ -101,6 +105,7 @@ def find_bounds(
         model: The model on the nominal ground.
         ground: The bounds of the ground.
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+        motions: (n, 3) their motions, as for `evaluate`; the wheels are steered along them.
         nominal: (n,) NOMINAL, the prediction on the nominal ground.
     """
     bounds = new_bounds(len(poses))
@@ -110,7 +115,8 @@ def find_bounds(
     uncertain = shared_array_of(_pack_uncertain(model, ground))
     with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
-            sweep = uncertain, (poses[part], nominal[part]), works, bounds[part]
+            places = poses[part], motions[part], nominal[part]
+            sweep = uncertain, places, works, bounds[part]
             run_chunks(bound_poses, sweep, len(works), threads)
     return bounds
 
@@ -131,16 +137,16 @@ def bound_poses(uncertains, places, works, bounds, part):
 
     Args:
         uncertains: (1,) UNCERTAIN.
-        places: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame, and (n,) NOMINAL.
+        places: `poses`, `motions` and `nominal` of `find_bounds`.
         works: (chunks,) BOUNDS_WORK.
         bounds: (n,) BOUNDS, written.
         part: The first chunk and the one after the last.
     """
-    (poses, nominal), chunks = places, works.size
+    (poses, motions, nominal), chunks = places, works.size
     n = poses.shape[0]
     for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            set_pose(poses, i, works[chunk].rover)
+            set_pose(uncertains[0].nominal, poses, motions, i, works[chunk].rover)
             bounds[i].status = bound_pose(uncertains[0], nominal[i], works[chunk], bounds[i])
 
 

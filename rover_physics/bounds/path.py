@@ -92,7 +92,11 @@ def bound_path(
     ground, model = _pack_uncertain(terrain, allowed), pack_model(rover, terrain, options)
     with sweep_lock:
         found = find_bounds(
-            model, ground, check_poses(prediction.poses), _pack_nominal(prediction)
+            model,
+            ground,
+            check_poses(prediction.poses),
+            np.ascontiguousarray(prediction.motion),
+            _pack_nominal(prediction),
         )
     values = {name: _include(found[name], prediction, name) for name in BOUNDED_VALUES}
     return PathBounds(sigmas=allowed, status=found.status.copy(), **values)

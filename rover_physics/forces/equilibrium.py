@@ -4,15 +4,15 @@ In the contact frame of a wheel, n points from the ground to the wheel's centre,
 the wheel and t = a x n points forward along the ground. The force of the ground on the wheel is
 N n + T t + S a. There are nine equations: six for the whole rover about its body origin, one about
 each bogie pivot for the bogie and its wheels (eq 15), and one for the differential, which passes
-equal moments from both rockers (eq 14 for both sides). The nine unknowns are six N, the lateral
-forces S_i = s0 + s1 x_i (the paper's equal share, and a linear term for the yaw balance), and the
-common part of T. Differences between the wheels' T are free, because the rover is over-actuated.
+equal moments from both rockers (eq 14 for both sides). The nine unknowns are six N, two lateral
+terms and the common part of T; `shares` has the shares of the wheels in these. With wheels that
+are not turned, S_i = s0 + s1 x_i (the paper's equal share, and a linear term for the yaw balance).
+Differences between the wheels' T are free, because the rover is over-actuated.
 Lengths are scaled by a reference length and forces by the weight, so that the numbers of the
 system are of order 1 for any rover.
 """
 
-import numpy as np
-
+from rover_physics.forces.shares import FREE_LATERAL_WHEELS, SHARES, write_shares
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
@@ -21,11 +21,8 @@ UNKNOWNS = 9
 """Number of equations and unknowns of the equilibrium."""
 FREE_TORQUES = 5
 """Degrees of freedom of the torques: extra traction of each wheel except the last."""
-FREE_FORCES = 9
+FREE_FORCES = FREE_TORQUES + FREE_LATERAL_WHEELS
 """Degrees of freedom of torques and lateral forces together; four are lateral."""
-FREE_LATERAL = np.array([0, 1, 3, 4])
-"""Wheels with a free extra lateral force; the common lateral terms s0 and s1 balance it."""
-
 
 BALANCE = record_type(
     ("normal", float, (6, 1 + FREE_FORCES)),  # wheel loads N
@@ -34,12 +31,13 @@ BALANCE = record_type(
     ("A", float, (UNKNOWNS, UNKNOWNS)),  # work space: the equations
     ("B", float, (UNKNOWNS, 1 + FREE_FORCES)),  # work space: right-hand sides, then solutions
     ("frames", float, (6, 3, 3)),  # contact frames: rows n, t, a of each wheel, map frame
+    ("shares", SHARES),  # shares of the wheels in the common forces
 )
 """Forces of a settled rover as linear functions of its free forces, over the rover's weight.
 
 Column 0 holds the forces with equal traction on all wheels. Column 1 + k, k < 5, holds their
 change per unit of extra traction of wheel k; the common traction balances it. Column 6 + k holds
-their change per unit of extra lateral force on wheel FREE_LATERAL[k]; the common lateral terms
+their change per unit of extra lateral force on wheel `shares.free[k]`; the common lateral terms
 balance it.
 """
 
@@ -57,35 +55,25 @@ def balance_forces(linkage, placement, contacts, columns, balance):
         balance: BALANCE, written.
     """
     write_equations(linkage, placement, contacts, columns, balance)
-    return solve_equations(linkage, placement, columns, balance)
+    return solve_equations(columns, balance)
 
 
 @kernel
-def solve_equations(linkage, placement, columns, balance):
+def solve_equations(columns, balance):
     """Solve the equations of `write_equations`; return False if they are singular."""
-    B = balance.B
+    B, common = balance.B, balance.shares.common
     if not solve_in_place(balance.A, B, UNKNOWNS, columns):
         return False
     for k in range(columns):
         for i in range(6):
             balance.normal[i, k] = B[i, k]
-            balance.lateral[i, k] = B[6, k] + B[7, k] * _axle(linkage, placement, i)
-            balance.tangential[i, k] = B[8, k]
+            balance.lateral[i, k] = B[6, k] * common[i, 0] + B[7, k] * common[i, 1]
+            balance.tangential[i, k] = B[8, k] * common[i, 2]
         if 0 < k <= FREE_TORQUES:
             balance.tangential[k - 1, k] += 1.0
         elif k > FREE_TORQUES:
-            balance.lateral[FREE_LATERAL[k - 1 - FREE_TORQUES], k] += 1.0
+            balance.lateral[balance.shares.free[k - 1 - FREE_TORQUES], k] += 1.0
     return True
-
-
-@kernel
-def _axle(linkage, placement, wheel):
-    """Return the position of a wheel along body x [reference lengths]."""
-    R, origin, centres = placement.R, placement.origin, placement.centres
-    along = 0.0
-    for i in range(3):
-        along += R[i, 0] * (centres[wheel, i] - origin[i])
-    return along / linkage.length
 
 
 @kernel
@@ -109,6 +97,8 @@ def write_equations(linkage, placement, contacts, columns, balance):
     """
     A, B, frames = balance.A, balance.B, balance.frames
     _write_frames(placement, contacts, frames)
+    write_shares(linkage, placement, balance.shares)
+    common, free = balance.shares.common, balance.shares.free
     A[:, :] = 0.0
     B[:, :] = 0.0
     origin, length = placement.origin, linkage.length
@@ -117,7 +107,6 @@ def write_equations(linkage, placement, contacts, columns, balance):
     for wheel in range(6):
         side = wheel // 3
         sign = 1.0 if side == 0 else -1.0
-        axle = _axle(linkage, placement, wheel)
         rx = (point[wheel, 0] - origin[0]) / length
         ry = (point[wheel, 1] - origin[1]) / length
         rz = (point[wheel, 2] - origin[2]) / length
@@ -135,20 +124,20 @@ def write_equations(linkage, placement, contacts, columns, balance):
                     linkage, placement, bogie_pivots[side], force
                 )
             wrench = fx, fy, fz, mx, my, mz, about_bogie, sign * about_rocker
-            column = wheel  # a variable: a literal would be compiled as a type of its own
+            column, share = wheel, 1.0  # variables: literals would be types of their own
             if kind == 1:
-                column = 8
+                column, share = 8, common[wheel, 2]
             elif kind == 2:
-                column = 6
-            _add_column(A, column, 1.0, wrench, side)
+                column, share = 6, common[wheel, 0]
+            _add_column(A, column, share, wrench, side)
             if kind == 2:
-                _add_column(A, column + 1, axle, wrench, side)
+                _add_column(A, column + 1, common[wheel, 1], wrench, side)
             own = 0
             if kind == 1 and wheel < FREE_TORQUES:
                 own = 1 + wheel
             elif kind == 2:
-                for k in range(FREE_LATERAL.size):
-                    if FREE_LATERAL[k] == wheel:
+                for k in range(FREE_LATERAL_WHEELS):
+                    if free[k] == wheel:
                         own = 1 + FREE_TORQUES + k
             if 0 < own < columns:
                 _add_column(B, own, -1.0, wrench, side)

@@ -19,8 +19,8 @@ def share_forces_on_soil(model, work):
 
     Args:
         model: A record with `ground` GROUND, `linkage` LINKAGE and `settings` SETTINGS.
-        work: WORK with contacts, balance and `search.mu`; `soils`, `best` and `search` are
-            written.
+        work: WORK with contacts, rolling, balance and `search.mu`; `soils`, `best` and `search`
+            are written.
     """
     ground, linkage, settings = model.ground, model.linkage, model.settings
     search, best = work.search, work.best
@@ -34,7 +34,7 @@ def share_forces_on_soil(model, work):
     least = _needed(linkage, settings, work)
     _copy(search, best)
     for _ in range(ROUNDS):
-        _write_grip(linkage, settings, work)
+        _write_grip(linkage, work)
         minimise_friction(
             work.balance, settings.allowed_torque / (linkage.radius * weight), search
         )
@@ -48,6 +48,12 @@ def share_forces_on_soil(model, work):
 
 
 @kernel
+def rolling_direction(work, wheel):
+    """Return 1.0 if a wheel rolls forwards, -1.0 if backwards."""
+    return -1.0 if work.rolling[wheel] < 0.0 else 1.0
+
+
+@kernel
 def _copy(search, best):
     for wheel in range(6):
         best[0, wheel], best[1, wheel] = search.wheel_loads[wheel], search.tangential[wheel]
@@ -55,7 +61,7 @@ def _copy(search, best):
 
 
 @kernel
-def _write_grip(linkage, settings, work):
+def _write_grip(linkage, work):
     """Write friction and resistance at the current loads into the search."""
     search = work.search
     weight = linkage.mass * linkage.gravity
@@ -65,7 +71,8 @@ def _write_grip(linkage, settings, work):
         own = SoilWheel(linkage.radius, linkage.width, search.mu[wheel])
         solved = solve_wheel(soil, own, N, 0.0, 0.0)
         search.mu[wheel] = effective_friction(soil, own, N)
-        search.resistance[wheel] = settings.direction * solved.resistance / weight
+        direction = rolling_direction(work, wheel)
+        search.resistance[wheel] = direction * solved.resistance / weight
 
 
 @kernel
@@ -80,7 +87,7 @@ def _needed(linkage, settings, work):
             soil,
             SoilWheel(linkage.radius, linkage.width, search.mu[wheel]),
             weight * search.wheel_loads[wheel],
-            settings.direction * weight * search.tangential[wheel],
+            rolling_direction(work, wheel) * weight * search.tangential[wheel],
             weight * search.lateral[wheel],
         )
         saturation = abs(solved.torque) / settings.allowed_torque

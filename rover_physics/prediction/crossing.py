@@ -18,8 +18,10 @@ from rover_physics.prediction.evaluation import NONE_HELD, RESULT, new_results
 from rover_physics.prediction.path_kernels import (
     JumpLimits,
     PathPoints,
+    Wheels,
     divide_stretches,
     find_jumps,
+    find_turned_wheels,
     sort_pieces,
 )
 from rover_physics.status import PoseStatus
@@ -36,7 +38,8 @@ CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 the wheel already touches the edge of the face there: no later contact is as steep."""
 
 Evaluate = Callable[..., Any]
-"""Function of poses (k, 3) and `held` (default NONE_HELD) that returns RESULTs (k,)."""
+"""Function of poses (k, 3), `held` (default NONE_HELD) and `motions` (default AHEAD) that returns
+RESULTs (k,)."""
 _NUMBERS = RESULT.itemsize // 8
 
 
@@ -171,31 +174,30 @@ class _Known:
             self.add(known)
 
 
-def limits_of(radius: float) -> JumpLimits:
-    """Return the JumpLimits for wheels of a radius [m]."""
-    return JumpLimits(float(radius), MIN_SPACING, HEIGHT_JUMP * radius)
+def limits_of(wheels: Wheels) -> JumpLimits:
+    """Return the JumpLimits of a rover."""
+    radius, reach = wheels
+    return JumpLimits(radius, MIN_SPACING, HEIGHT_JUMP * radius, reach)
 
 
 def find_crossings(
     terrain: Terrain,
-    radius: float,
+    wheels: Wheels,
     poses: np.ndarray,
     results: Any,
     evaluate: Evaluate,
-    direction: float = 1.0,
     joined: np.ndarray | bool = True,
 ) -> Crossings:
-    """Evaluate the poses between waypoints where contacts jump.
+    """Evaluate the poses between waypoints where contacts jump, and waypoints where wheels turn.
 
     Args:
         terrain: The ground.
-        radius: Wheel radius [m].
+        wheels: Size of wheels and rover.
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints of one path, or of several paths
             one after the other, map frame.
         results: (n,) RESULT of each waypoint.
-        evaluate: Function of poses (k, 3) and `held`: heights [m] and contact angles [rad] of
-            held wheels, (k, 6, 2), or NONE_HELD. It returns RESULTs (k,).
-        direction: 1 if the rover drives forwards along the path, -1 if backwards.
+        evaluate: Function of poses (k, 3), `held`, heights [m] and contact angles [rad] of held
+            wheels, (k, 6, 2), or NONE_HELD, and `motions` (k, 3). It returns RESULTs (k,).
         joined: (n - 1,) True where a waypoint and the next one belong to the same path.
 
     Returns:
@@ -204,9 +206,10 @@ def find_crossings(
     """
     jumps = np.empty((len(poses), 2), np.int64)
     joined = np.broadcast_to(joined, len(poses) - 1)
-    jumps = jumps[: find_jumps(results, poses, joined, limits_of(radius), jumps)]
+    at_rest = _turn_wheels(poses, results, joined, evaluate)
+    jumps = jumps[: find_jumps(results, poses, joined, limits_of(wheels), jumps)]
     if not len(jumps):
-        return _NOTHING
+        return at_rest
     rows = jumps.ravel()
     no_climb, at_jumps = np.zeros(len(rows), bool), select_results(results, rows)
     known = _Known(
@@ -215,13 +218,13 @@ def find_crossings(
     ends = np.arange(len(rows)).reshape(-1, 2)
     while len(ends):
         known.add(_divide(known.rows, ends, evaluate))
-        ends, closed = _sort_pieces(known.rows, ends, radius)
+        ends, closed = _sort_pieces(known.rows, ends, wheels)
         if len(closed):
-            known.add(climb_faces(terrain, radius, known.rows, closed, evaluate, direction))
+            known.add(climb_faces(terrain, wheels.radius, known.rows, closed, evaluate))
     found = known.rows
     kept = (found.results["status"] != PoseStatus.NOT_SETTLED) | found.climbing
     kept[: len(rows)] = False
-    return found.select(np.flatnonzero(kept)).in_order()
+    return join_crossings([found.select(np.flatnonzero(kept)), at_rest]).in_order()
 
 
 _NOTHING = Crossings(
@@ -229,16 +232,31 @@ _NOTHING = Crossings(
 )
 
 
+def _turn_wheels(
+    poses: np.ndarray, results: Any, joined: np.ndarray, evaluate: Evaluate
+) -> Crossings:
+    """Return the waypoints where the wheels turn, with the motion that leads on from there."""
+    rows = np.empty(len(poses), np.int64)
+    rows = rows[: find_turned_wheels(results, joined, rows)]
+    if not len(rows):
+        return _NOTHING
+    at, motions = np.ascontiguousarray(poses[rows]), results["motion"][rows + 1]
+    turned = evaluate(at, NONE_HELD, np.ascontiguousarray(motions))
+    return Crossings(rows.astype(float), rows + 1, np.zeros(len(rows), bool), at, turned)
+
+
 def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings:
     """Return PIECES - 1 evaluated poses in each stretch between the rows `ends` (k, 2)."""
     n = len(ends) * (PIECES - 1)
     place, waypoint, poses = np.empty(n), np.empty(n, np.int64), np.empty((n, 3))
-    divide_stretches(ends, PIECES, known.points, (place, waypoint, poses))
-    return Crossings(place, waypoint, np.zeros(n, bool), poses, evaluate(poses, NONE_HELD))
+    motions = np.empty((n, 3))
+    divide_stretches(ends, PIECES, known.points, (place, waypoint, poses, motions))
+    results = evaluate(poses, NONE_HELD, motions)
+    return Crossings(place, waypoint, np.zeros(n, bool), poses, results)
 
 
 def _sort_pieces(
-    known: Crossings, ends: np.ndarray, radius: float
+    known: Crossings, ends: np.ndarray, wheels: Wheels
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the pieces in which a contact still jumps, as rows (j, 2): open ones, closed ones.
 
@@ -246,7 +264,7 @@ def _sort_pieces(
     and closed.
     """
     pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
-    n_open, n_closed = sort_pieces(ends, PIECES, known.points, limits_of(radius), pieces)
+    n_open, n_closed = sort_pieces(ends, PIECES, known.points, limits_of(wheels), pieces)
     return pieces[0, :n_open], pieces[1, :n_closed]
 
 
@@ -256,7 +274,6 @@ def climb_faces(
     known: Crossings,
     ends: np.ndarray,
     evaluate: Evaluate,
-    direction: float,
 ) -> Crossings:
     """Evaluate wheels that jump up at one place, held at stages between foot and edge.
 
@@ -266,7 +283,6 @@ def climb_faces(
         known: Evaluated poses.
         ends: (k, 2) rows of `known` before and after each place.
         evaluate: As for `find_crossings`.
-        direction: 1 if the rover drives forwards along the path, -1 if backwards.
     """
     before, after = known.results["wheel_centres"][ends].swapaxes(0, 1)
     rise = (after - before)[:, :, 2]
@@ -274,21 +290,23 @@ def climb_faces(
     at = np.flatnonzero(np.any(climbing & (rise > HEIGHT_JUMP * radius), axis=1))
     if not len(at):
         return _NOTHING
-    stages, foot = len(CLIMB_STAGES), ends[at, 0]
+    stages, foot, top = len(CLIMB_STAGES), ends[at, 0], ends[at, 1]
     row, wheel = np.nonzero(climbing[at])
-    centres, course = before[at[row], wheel], known.poses[foot[row], 2]
-    face, edge = _faces_ahead(
-        terrain, radius, centres, course + (0.0 if direction > 0.0 else np.pi)
-    )
+    backward = known.results["wheel_speed"][top[row], wheel] < 0.0
+    course = known.poses[foot[row], 2] + known.results["steering_angle"][top[row], wheel]
+    centres = before[at[row], wheel]
+    face, edge = _faces_ahead(terrain, radius, centres, course + np.where(backward, np.pi, 0.0))
     heights = centres[:, 2:] + CLIMB_STAGES * rise[at[row], wheel][:, None]
-    angles = direction * _angles_on_faces(radius, heights, face[:, None], edge[:, None])
+    angles = _angles_on_faces(radius, heights, face[:, None], edge[:, None])
+    angles *= np.where(backward, -1.0, 1.0)[:, None]
     touching = (CLIMB_STAGES > 0.0) | (heights > edge[:, None])
     held = np.full((len(at), stages, 6, 2), np.nan)
     held[row, :, wheel] = np.where(
         touching[..., None], np.stack([heights, angles], axis=-1), np.nan
     )
     poses = np.repeat(known.poses[foot], stages, axis=0)
-    results = evaluate(poses, held.reshape(-1, 6, 2))
+    motions = np.repeat(known.results["motion"][top], stages, axis=0)
+    results = evaluate(poses, held.reshape(-1, 6, 2), motions)
     start, end = known.place[ends[at]].T[:, :, None]
     settled = (results["status"] == PoseStatus.SETTLED).reshape(-1, stages)
     climbs = Crossings(

@@ -14,6 +14,7 @@ import numpy as np
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossings
+from rover_physics.prediction.path_kernels import Wheels, way_between
 
 MIN_ANGLE = np.radians(15.0)
 """Least steepness [rad] of a contact from which a wheel falls, however low its friction."""
@@ -45,29 +46,28 @@ class Falls:
 
 
 def find_falls(
-    radius: float,
+    wheels: Wheels,
     poses: np.ndarray,
     results: Any,
     crossings: Crossings,
-    direction: float = 1.0,
 ) -> Falls:
     """Find where wheels fall along a path, and how far they drop.
 
     Args:
-        radius: Wheel radius [m].
+        wheels: Size of wheels and rover.
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
         results: (n,) RESULT of each waypoint.
         crossings: Poses between the waypoints.
-        direction: 1 if the rover drives forwards along the path, -1 if backwards.
     """
     path = view_read_only(poses), view_read_only(results)
-    found = _find_falls(float(radius), float(direction), *path, crossings.points)
+    found = _find_falls(wheels, *path, crossings.points)
     return Falls(*found)
 
 
 @allocating_kernel
-def _find_falls(radius, direction, poses, results, between):
-    """Return the fields of `Falls`; `between` holds PathPoints."""
+def _find_falls(wheels, poses, results, between):
+    """Return the fields of `Falls`; `wheels` are Wheels, `between` holds PathPoints."""
+    radius = wheels.radius
     n, m = len(poses), len(between.place)
     order = np.empty(n + m, np.int64)
     _merge(n, between.place, order)
@@ -79,9 +79,9 @@ def _find_falls(radius, direction, poses, results, between):
         i = order[k]
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
-        steps[k] = np.hypot(here[0] - last[0], here[1] - last[1])
+        steps[k] = way_between(last, here, wheels.reach)
         distance[k] = steps[k] + (distance[k - 1] if k > 0 else 0.0)
-        if _read_contacts(result, direction, angle[k], height[k]) < -MIN_ANGLE:
+        if _read_contacts(result, angle[k], height[k]) < -MIN_ANGLE:
             _find_steep(angle[k], result.friction, steep[k])
         last = here
     first_open = _find_first_open(distance, radius, angle, steep)
@@ -151,11 +151,16 @@ def _merge(n, place, order):
 
 
 @exact_kernel
-def _read_contacts(result, direction, angle, height):
-    """Write contact angles [rad] and heights [m] of the wheels; return the smallest angle."""
+def _read_contacts(result, angle, height):
+    """Write contact angles [rad], positive where each wheel rolls to, and heights [m].
+
+    Returns the smallest angle.
+    """
     smallest = 0.0
     for wheel in range(6):
-        angle[wheel] = direction * result.contact_angle[wheel]
+        angle[wheel] = result.contact_angle[wheel]
+        if result.wheel_speed[wheel] < 0.0:
+            angle[wheel] = -angle[wheel]
         height[wheel] = result.wheel_centres[wheel, 2]
         if angle[wheel] < smallest:
             smallest = angle[wheel]

@@ -8,10 +8,10 @@ from rover_physics.contact.clearance import belly_clearance
 from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS
 from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
-from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
+from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces
 from rover_physics.forces.soil import SoilWheel, coulomb_slip, effective_friction, solve_wheel
-from rover_physics.forces.soil_sharing import share_forces_on_soil
-from rover_physics.forces.stability import CORNERS, find_support, tip_over_angles
+from rover_physics.forces.soil_sharing import rolling_direction, share_forces_on_soil
+from rover_physics.forces.stability import CORNERS
 from rover_physics.forces.torques import (
     TORQUE_SEARCH,
     minimise_friction,
@@ -21,7 +21,9 @@ from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
 from rover_physics.numerics.threads import limit_threads, run_chunks
+from rover_physics.prediction.tip_over import find_tip_over
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
+from rover_physics.rover.steering import steer_wheels
 from rover_physics.status import PoseStatus, TorquePolicy
 from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
 
@@ -32,6 +34,9 @@ OPTIMAL_EFFORT = 5
 """Time of a pose with optimal torques over that of a pose with equal torques."""
 NONE_HELD = np.empty((0, 6, 2))
 """Value of `held` if no wheel climbs a face."""
+AHEAD = np.empty((0, 3))
+"""Value of `motions` if the rover drives straight ahead, or straight back if this is its direction
+of the settings."""
 
 
 SETTINGS = record_type(
@@ -77,11 +82,18 @@ RESULT = record_type(
     ("tip_over_force_angle", float),
     ("belly_clearance", float),
     ("power", float),
+    ("motion", float, (3,)),
+    ("steering_angle", float, (6,)),
+    ("wheel_speed", float, (6,)),
 )
-"""Results at one pose: `q` as in WORK, the rest as in `PathPrediction`."""
+"""Results at one pose: `q` as in WORK, the rest as in `PathPrediction`. The last three are also
+written where the rover does not settle."""
 
 WORK = record_type(
     ("pose", float, (3,)),  # x, y [m] and yaw [rad] of the body origin
+    ("motion", float, (3,)),  # its nominal vx, vy [m/s] and yaw rate [rad/s], body frame, level
+    ("rolling", float, (6,)),  # nominal speeds of the wheels along their headings [m/s]
+    ("can_follow", np.bool_),  # whether all wheels can be steered along this motion
     ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie angle [rad]
     ("placement", PLACEMENT),  # positions of the parts at q
     ("contacts", CONTACTS),  # wheel contacts
@@ -133,7 +145,9 @@ _NEW_WORK = np.array([new_work()], WORK).view(np.float64)
 """Empty WORK as floats, which numpy copies faster than records."""
 
 
-def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
+def evaluate(
+    model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD, motions: np.ndarray = AHEAD
+) -> Any:
     """Evaluate the model at poses and return RESULTs (n,).
 
     Args:
@@ -141,13 +155,16 @@ def evaluate(model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD) -> Any
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
             those that rest on the ground; (0, 6, 2) if none climbs.
+        motions: (n, 3) vx, vy [m/s] and yaw rate [rad/s] of the body origin, as `path_motions`
+            returns them; (0, 3) if all are straight ahead.
     """
     results = unwritten_results(len(poses))
     with limit_threads(effort(model["settings"][0], len(poses))) as threads:
         works = new_works(threads, len(poses))
         for part in slices(len(poses)):
             _clear(results[part])
-            sweep = model, (poses[part], held[part]), works, results[part]
+            places = poses[part], motions[part], held[part]
+            sweep = model, places, works, results[part]
             run_chunks(evaluate_poses, sweep, len(works), threads)
     return results
 
@@ -169,25 +186,34 @@ def evaluate_poses(models, places, works, results, part):
 
     Args:
         models: (1,) MODEL.
-        places: `poses` and `held` of `evaluate`.
+        places: `poses`, `motions` and `held` of `evaluate`.
         works: (chunks,) WORK.
         results: (n,) RESULT, written.
         part: The first chunk and the one after the last.
     """
-    (poses, held), chunks = places, works.size
+    (poses, motions, held), chunks = places, works.size
     n = poses.shape[0]
     for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            set_pose(poses, i, works[chunk])
+            set_pose(models[0], poses, motions, i, works[chunk])
             hold_wheels(held, i, works[chunk].contacts)
             evaluate_pose(models[0], works[chunk], results[i])
 
 
 @kernel
-def set_pose(poses, i, work):
-    """Copy row i of poses (n, 3) into the work space."""
+def set_pose(model, poses, motions, i, work):
+    """Write pose i, its motion and the steering of the wheels into the work space.
+
+    `poses` and `motions` are as for `evaluate`.
+    """
+    motion = work.motion
+    motion[0], motion[1], motion[2] = model.settings.direction * model.settings.speed, 0.0, 0.0
     for k in range(3):
         work.pose[k] = poses[i, k]
+        if motions.shape[0] > 0:
+            motion[k] = motions[i, k]
+    angles, rolling = work.placement.steering, work.rolling
+    work.can_follow = steer_wheels(model.linkage, motion, angles, rolling)
 
 
 @kernel
@@ -200,13 +226,15 @@ def hold_wheels(held, i, contacts):
 
 @kernel
 def evaluate_pose(model, work, result):
-    """Evaluate the model at `work.pose` into a RESULT.
+    """Evaluate the model at the pose and motion of `set_pose` into a RESULT.
 
-    If the rover does not settle or its forces do not balance, only status and q (NaN) are written.
+    If the rover does not settle or its forces do not balance, only motion, steering, status and q
+    (NaN) are written.
     If a result is not a number, all are NaN: a comparison with NaN would keep every limit.
     """
     linkage = model.linkage
-    status = settle(model, work)
+    _write_motion(linkage, work, result)
+    status = settle(model, work) if work.can_follow else PoseStatus.STEERING
     if status == PoseStatus.SETTLED:
         place_masses(linkage, work.q, work.placement)
         equal = model.settings.policy == TorquePolicy.EQUAL
@@ -261,6 +289,15 @@ def _forget(result):
 
 
 @kernel
+def _write_motion(linkage, work, result):
+    for k in range(3):
+        result.motion[k] = work.motion[k]
+    for wheel in range(6):
+        result.steering_angle[wheel] = work.placement.steering[wheel]
+        result.wheel_speed[wheel] = work.rolling[wheel] / linkage.radius
+
+
+@kernel
 def _write_geometry(placement, contacts, result):
     for wheel in range(6):
         result.contact_angle[wheel] = np.arctan2(contacts.sine[wheel], contacts.cosine[wheel])
@@ -290,13 +327,14 @@ def _write_forces(model, work, result):
         S = weight * search.lateral[wheel]
         mu = search.mu[wheel]
         sinkage, resistance = 0.0, 0.0
+        direction = rolling_direction(work, wheel)
         if settings.on_soil:
             soil = work.soils[wheel]
             own = SoilWheel(linkage.radius, linkage.width, mu)
-            solved = solve_wheel(soil, own, N, settings.direction * T, S)
+            solved = solve_wheel(soil, own, N, direction * T, S)
             slip, utilisation = solved.slip_ratio, solved.utilisation
             sinkage, resistance = solved.sinkage, solved.resistance
-            torque = settings.direction * solved.torque
+            torque = direction * solved.torque
             mu = effective_friction(soil, own, N)
         else:
             torque = linkage.radius * T
@@ -312,55 +350,15 @@ def _write_forces(model, work, result):
         result.torque_saturation[wheel] = abs(torque) / settings.max_torque
         result.sinkage[wheel] = sinkage
         result.motion_resistance[wheel] = resistance
-        power += max(settings.direction * torque, 0.0) * _wheel_speed(
-            linkage.radius, slip, settings
-        )
+        way = abs(work.rolling[wheel])
+        most = settings.max_wheel_speed
+        power += max(direction * torque, 0.0) * _spin(linkage.radius, slip, way, most)
     result.power = power
 
 
 @kernel
-def _wheel_speed(radius, slip, settings):
+def _spin(radius, slip, way, most):
+    """Return the rate [rad/s] of a wheel that goes `way` [m/s] over the ground, at most `most`."""
     if slip >= 1.0:
-        return settings.max_wheel_speed
-    return min(settings.speed / (radius * (1.0 - slip)), settings.max_wheel_speed)
-
-
-@kernel
-def find_tip_over(linkage, work):
-    """Return tip-over angle [rad] and force-angle measure [N m] from placement and contacts."""
-    centre, force, moment = work.centre, work.force, work.moment
-    _write_centre_of_mass(linkage, work.placement, centre)
-    force[0], force[1], force[2] = 0.0, 0.0, -linkage.mass * linkage.gravity
-    moment[:] = 0.0
-    if linkage.has_tool_load:
-        _add_tool_load(linkage, work.placement, centre, force, moment)
-    find_support(linkage, work.placement, work.contacts, work.corners)
-    return tip_over_angles(work.corners, centre, force, moment)
-
-
-@kernel
-def _add_tool_load(linkage, placement, centre, force, moment):
-    """Add the tool's force [N] and its moment [N m] about `centre` to `force` and `moment`."""
-    origin, tool = placement.origin, linkage.tool
-    fx, moment_x = tool_load(placement.R, tool, np.int64(0))
-    fy, moment_y = tool_load(placement.R, tool, np.int64(1))
-    fz, moment_z = tool_load(placement.R, tool, np.int64(2))
-    rx, ry, rz = origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2]
-    force[0] += fx
-    force[1] += fy
-    force[2] += fz
-    moment[0] += moment_x + ry * fz - rz * fy
-    moment[1] += moment_y + rz * fx - rx * fz
-    moment[2] += moment_z + rx * fy - ry * fx
-
-
-@kernel
-def _write_centre_of_mass(linkage, placement, centre):
-    coms, centres = placement.part_coms, placement.centres
-    for k in range(3):
-        total = linkage.body_mass * coms[0, k]
-        total += linkage.rocker_mass * (coms[1, k] + coms[2, k])
-        total += linkage.bogie_mass * (coms[3, k] + coms[4, k])
-        for wheel in range(6):
-            total += linkage.wheel_mass * centres[wheel, k]
-        centre[k] = total / linkage.mass
+        return most
+    return min(way / (radius * (1.0 - slip)), most)

@@ -16,7 +16,13 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.numerics.threads import limit_threads, run_chunks
-from rover_physics.prediction.evaluation import effort, evaluate_pose, new_works, set_pose
+from rover_physics.prediction.evaluation import (
+    AHEAD,
+    effort,
+    evaluate_pose,
+    new_works,
+    set_pose,
+)
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses, sweep_lock
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -127,27 +133,28 @@ def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pos
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
     with sweep_lock, limit_threads(effort(model.settings, n)) as threads:
         works = new_works(threads, n)
-        sweep = model.records, poses, works, (status, numbers)
+        sweep = model.records, (poses, AHEAD), works, (status, numbers)
         run_chunks(score_all, sweep, len(works), threads)
     return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
 
 
 @kernel
-def score_all(models, poses, works, scores, part):
+def score_all(models, places, works, scores, part):
     """Score the poses of some chunks, one chunk per work space.
 
     Args:
         models: (1,) MODEL.
-        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+        places: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame, and their motions, as
+            for `evaluate`.
         works: (chunks,) WORK.
         scores: (n,) PoseStatus, and (NUMBERS, n) numbers in the order of `PoseScores`, written.
         part: The first chunk and the one after the last.
     """
-    (status, numbers), chunks = scores, works.size
+    (poses, motions), (status, numbers), chunks = places, scores, works.size
     n = poses.shape[0]
     for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            set_pose(poses, i, works[chunk])
+            set_pose(models[0], poses, motions, i, works[chunk])
             evaluate_pose(models[0], works[chunk], works[chunk].result)
             status[i] = works[chunk].result.status
             _write_score(works[chunk].result, i, numbers)

@@ -11,8 +11,9 @@ from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.records import new_record, shared_array_of
-from rover_physics.prediction.evaluation import MODEL, SETTINGS, find_tip_over, new_work
+from rover_physics.prediction.evaluation import MODEL, SETTINGS, new_work
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
+from rover_physics.prediction.tip_over import find_tip_over
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com, pack_tool
 from rover_physics.rover.model import Rover

@@ -11,14 +11,15 @@ from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import find_crossings
 from rover_physics.prediction.evaluation import effort
 from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import (
     NO_SUMS,
     check_poses,
-    direction_of,
     evaluator,
     make_prediction,
     sum_up,
+    wheels_of,
 )
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
@@ -50,12 +51,13 @@ def sweep_in_parts(
     begins before it, at a waypoint where no wheel falls.
     """
     model, path = pack_model(rover, terrain, options), check_poses(poses)
+    motions = path_motions(model, path)
     start, done, size, sums = 0, 0, PART, NO_SUMS
     while done < len(path):
         check_interruption()
         end = min(start + size, len(path))
         here = path[start:end]
-        results, crossings = _evaluate(terrain, model, here)
+        results, crossings = _evaluate(terrain, model, here, motions[start:end])
         swept, falls = make_prediction(model, here, results, crossings, sums)
         decided = end - start if end == len(path) else falls.decided
         if start + decided > done:
@@ -69,10 +71,9 @@ def sweep_in_parts(
             size *= 2  # no waypoint to begin from: the next part is longer
 
 
-def _evaluate(terrain: Terrain, model: PackedModel, poses: np.ndarray):
+def _evaluate(terrain: Terrain, model: PackedModel, poses: np.ndarray, motions: np.ndarray):
     """Return the results and crossings of waypoints."""
-    evaluate, radius = evaluator(model), float(model.record.linkage.radius)
+    evaluate = evaluator(model)
     with limit_threads(effort(model.settings, len(poses))):
-        results = evaluate(poses)
-        direction = direction_of(model)
-        return results, find_crossings(terrain, radius, poses, results, evaluate, direction)
+        results = evaluate(poses, motions=motions)
+        return results, find_crossings(terrain, wheels_of(model), poses, results, evaluate)

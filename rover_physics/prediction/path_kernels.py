@@ -9,19 +9,33 @@ from rover_physics.status import PoseStatus
 
 ANGLE_JUMP = np.radians(12.0)
 """Change of a contact angle [rad] above which it is a jump, if one of the two angles is steep."""
+TURNED = 0.1
+"""Change of a steering angle [rad] from a waypoint to the next above which the rover is also
+evaluated with the wheels turned where it still stands. Smaller changes count as gradual."""
 STEEP_CONTACT = np.radians(25.0)
 """Size of a contact angle [rad] above which the contact is steep."""
+
+
+class Wheels(NamedTuple):
+    """Size of a rover's wheels and of the rover."""
+
+    radius: float
+    """Wheel radius [m]."""
+    reach: float
+    """Distance of the outermost wheel from the body origin, seen from above [m]."""
 
 
 class JumpLimits(NamedTuple):
     """Limits that define a contact jump."""
 
     max_spacing: float
-    """Largest distance of two waypoints between which jumps are searched [m]."""
+    """Largest way between waypoints between which jumps are searched [m], see `way_between`."""
     min_spacing: float
-    """Length below which a piece is not divided further [m]."""
+    """Way below which a piece is not divided further [m]."""
     height: float
     """Change of a wheel's height above which it is a jump [m]."""
+    reach: float
+    """As in `Wheels`."""
 
 
 class PathPoints(NamedTuple):
@@ -52,8 +66,25 @@ def find_jumps(results, poses, joined, limits, ends):
     for row in range(results.size - 1):
         if not (joined[row] and _jumps(results[row], results[row + 1], limits.height)):
             continue
-        if 0.0 < _distance(poses[row], poses[row + 1]) <= limits.max_spacing:
+        if 0.0 < way_between(poses[row], poses[row + 1], limits.reach) <= limits.max_spacing:
             ends[count, 0], ends[count, 1] = row, row + 1
+            count += 1
+    return count
+
+
+@exact_kernel
+def find_turned_wheels(results, joined, rows):
+    """Find the waypoints where a wheel turns by more than TURNED for the next; return how many.
+
+    Args:
+        results: (n,) RESULT of each waypoint.
+        joined: (n - 1,) True where a waypoint and the next one belong to the same path.
+        rows: (>= n,) indices of these waypoints, written.
+    """
+    count = 0
+    for row in range(results.size - 1):
+        if joined[row] and _largest_change(results[row], results[row + 1]) > TURNED:
+            rows[count] = row
             count += 1
     return count
 
@@ -66,15 +97,16 @@ def divide_stretches(ends, pieces, known, new):
         ends: (k, 2) rows of `known` at the start and end of each stretch.
         pieces: Number of pieces of a stretch.
         known: PathPoints.
-        new: (place, waypoint, poses), each with k * (pieces - 1) rows, written.
+        new: (place, waypoint, poses, motions), each with k * (pieces - 1) rows, written. Motions
+            are those of the end of the stretch, which lead there.
     """
     place, waypoint, poses = known.place, known.waypoint, known.poses
-    new_place, new_waypoint, new_poses = new
+    new_place, new_waypoint, new_poses, motions = new
     row = 0
-    for k in range(ends.shape[0]):
-        before, after = ends[k, 0], ends[k, 1]
+    for stretch in range(ends.shape[0]):
+        before, after = ends[stretch, 0], ends[stretch, 1]
         first, last = poses[before], poses[after]
-        turn = (last[2] - first[2] + np.pi) % (2.0 * np.pi) - np.pi
+        turn = turn_between(first, last)
         for i in range(1, pieces):
             share = i / pieces
             new_place[row] = place[before] + share * (place[after] - place[before])
@@ -82,6 +114,8 @@ def divide_stretches(ends, pieces, known, new):
             new_poses[row, 0] = first[0] + share * (last[0] - first[0])
             new_poses[row, 1] = first[1] + share * (last[1] - first[1])
             new_poses[row, 2] = first[2] + share * turn
+            for k in range(3):
+                motions[row, k] = known.results[after].motion[k]
             row += 1
 
 
@@ -111,7 +145,8 @@ def sort_pieces(ends, pieces, known, limits, sorted_ends):
                 skipped = True
                 continue
             if _jumps(results[before], results[after], limits.height):
-                if skipped or _distance(poses[before], poses[after]) < limits.min_spacing:
+                way = way_between(poses[before], poses[after], limits.reach)
+                if skipped or way < limits.min_spacing:
                     sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
                     n_closed += 1
                 else:
@@ -123,8 +158,21 @@ def sort_pieces(ends, pieces, known, limits, sorted_ends):
 
 
 @exact_kernel
-def _distance(here, there):
-    return np.hypot(there[0] - here[0], there[1] - here[1])
+def way_between(here, there, reach):
+    """Return the way [m] from a pose to another: of the body or, if it turns, of a wheel.
+
+    `reach` is the distance [m] of the outermost wheel from the body origin.
+    """
+    way = np.hypot(there[0] - here[0], there[1] - here[1])
+    return max(way, reach * abs(turn_between(here, there)))
+
+
+@exact_kernel
+def turn_between(here, there):
+    """Return the turn [rad] from a pose to another, from -pi to below pi."""
+    if there[2] == here[2]:
+        return 0.0
+    return (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
 
 
 @exact_kernel
@@ -141,32 +189,66 @@ def _jumps(here, there, height_jump):
 
 
 @exact_kernel
-def add_up(poses, results, speed, start, sums):
+def add_up(poses, results, rate, start, sums):
     """Write distance [m], time [s] and energy [J] into sums (3, n); return those at the last pose.
+
+    The rover drives from pose to pose with the motion of the later one. If steering to its angles
+    takes longer than that, the drive waits.
 
     Args:
         poses: (n, 3) x, y [m] and yaw [rad].
         results: (n,) RESULT of each pose. Time and energy are NaN where it is not settled, and
             the climb between two poses counts only if both are settled.
-        speed: Speed along the ground [m/s].
+        rate: Largest speed of the steering [rad/s].
         start: Distance, time and energy at the first pose.
         sums: (3, n), written.
     """
     distance, time, energy = start
     for i in range(results.size):
-        settled = results[i].status == PoseStatus.SETTLED
+        result = results[i]
+        settled = result.status == PoseStatus.SETTLED
         if i > 0:
+            before = results[i - 1]
             step = _distance(poses[i - 1], poses[i])
-            both = settled and results[i - 1].status == PoseStatus.SETTLED
-            climb = results[i].q[0] - results[i - 1].q[0] if both else 0.0
-            duration = np.hypot(step, climb) / speed
+            both = settled and before.status == PoseStatus.SETTLED
+            climb = result.q[0] - before.q[0] if both else 0.0
+            duration = _drive_time(
+                step, climb, turn_between(poses[i - 1], poses[i]), result.motion
+            )
             distance += step
-            time += duration
-            energy += 0.5 * (_power(results[i]) + _power(results[i - 1])) * duration
+            energy += 0.5 * (_power(result) + _power(before)) * duration
+            time += max(duration, _largest_change(before, result) / rate)
         sums[0, i] = distance
         sums[1, i] = time if settled else np.nan
         sums[2, i] = energy if settled else np.nan
     return distance, time, energy
+
+
+@exact_kernel
+def _distance(here, there):
+    return np.hypot(there[0] - here[0], there[1] - here[1])
+
+
+@exact_kernel
+def _drive_time(step, climb, turn, motion):
+    """Return the time [s] of a step [m] with a climb [m] and a turn [rad]."""
+    speed, rate = np.hypot(motion[0], motion[1]), motion[2]
+    if speed == 0.0:
+        return abs(turn / rate)
+    half = 0.5 * abs(turn)
+    if rate != 0.0 and half > 1e-8:
+        step *= half / np.sin(half)
+    return np.hypot(step, climb) / speed
+
+
+@exact_kernel
+def _largest_change(before, after):
+    """Return the largest change of a steering angle [rad] between two RESULTs."""
+    largest = 0.0
+    for wheel in range(6):
+        change = abs(after.steering_angle[wheel] - before.steering_angle[wheel])
+        largest = max(largest, change)
+    return largest
 
 
 @exact_kernel
@@ -199,7 +281,7 @@ def find_remaining_jumps(path, between, limits, ends):
         if _jumps(a, b, limits.height):
             apart = 0.0
             if last < n and here < n:
-                apart = _distance(path.poses[last], path.poses[here])
+                apart = way_between(path.poses[last], path.poses[here], limits.reach)
             searched = last >= n or here >= n or apart > 0.0
             if searched and apart <= limits.max_spacing:
                 ends[count, 0], ends[count, 1] = last, here

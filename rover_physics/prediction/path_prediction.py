@@ -74,7 +74,17 @@ class PathPrediction:
     """(n,) mechanical energy spent since the first waypoint; poses that are not settled count as
     0 W [J]."""
     time: Floats
-    """(n,) time since the first waypoint at nominal speed [s]."""
+    """(n,) time since the first waypoint at nominal speed [s]. Where wheels take longer to turn
+    than the drive from a waypoint to the next, the drive waits for them."""
+    motion: Floats
+    """(n, 3) nominal motion of the body origin on the way to the waypoint, body frame: vx, vy
+    [m/s] and yaw rate [rad/s]; that of the first waypoint leads on from there. It is also known
+    where the rover did not settle."""
+    steering_angle: Floats
+    """(n, 6) angles of the wheels about the z axes of their links [rad], positive to the left.
+    Where the status is STEERING: the angles that the motion asks for."""
+    wheel_speed: Floats
+    """(n, 6) nominal rates of the wheels [rad/s], without slip, negative where they roll back."""
     distance: Floats
     """(n,) horizontal distance since the first waypoint [m]."""
     wheel_drop: Floats

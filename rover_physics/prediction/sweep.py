@@ -16,9 +16,10 @@ from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, Evaluate, find_crossings
 from rover_physics.prediction.drops import Falls, find_falls
-from rover_physics.prediction.evaluation import NONE_HELD, RESULT, effort, evaluate
+from rover_physics.prediction.evaluation import AHEAD, NONE_HELD, RESULT, effort, evaluate
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.path_kernels import add_up
+from rover_physics.prediction.path_kernels import Wheels, add_up
+from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.rover.model import Rover
@@ -107,11 +108,12 @@ def sweep_in_full(
         return []
     checked = [check_poses(poses) for poses in paths]
     ends = np.cumsum([len(poses) for poses in checked])
-    poses, radius, evaluate_at = np.concatenate(checked), rover.wheel.radius, evaluator(model)
+    poses, evaluate_at = np.concatenate(checked), evaluator(model)
+    motions = np.concatenate([path_motions(model, path) for path in checked])
     with limit_threads(effort(model.settings, len(poses))):  # set once, not per round
-        results = evaluate_at(poses)
+        results = evaluate_at(poses, motions=motions)
         crossings = find_crossings(
-            terrain, radius, poses, results, evaluate_at, direction_of(model), joined_paths(ends)
+            terrain, wheels_of(model), poses, results, evaluate_at, joined_paths(ends)
         )
     swept = []
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
@@ -134,16 +136,19 @@ def joined_paths(ends: np.ndarray) -> np.ndarray:
 def evaluator(model: PackedModel) -> Evaluate:
     """Return the function that evaluates a model at poses, as `find_crossings` takes it."""
 
-    def evaluate_at(at: np.ndarray, held: np.ndarray = NONE_HELD) -> Any:
+    def evaluate_at(
+        at: np.ndarray, held: np.ndarray = NONE_HELD, motions: np.ndarray = AHEAD
+    ) -> Any:
         with sweep_lock:
-            return evaluate(model.records, at, held)
+            return evaluate(model.records, at, held, motions)
 
     return evaluate_at
 
 
-def direction_of(model: PackedModel) -> float:
-    """Return 1.0 if the rover drives forwards, -1.0 if backwards."""
-    return float(model.settings["direction"])
+def wheels_of(model: PackedModel) -> Wheels:
+    """Return the wheel radius and the distance of the outermost wheel from the body origin."""
+    linkage = model.record.linkage
+    return Wheels(float(linkage.radius), float(linkage.reach))
 
 
 def make_prediction(
@@ -157,12 +162,11 @@ def make_prediction(
 
     Distance, time and energy at the first pose are `start`.
     """
-    settings, radius = model.settings, float(model.record.linkage.radius)
-    falls = find_falls(radius, poses, results, crossings, direction_of(model))
+    falls = find_falls(wheels_of(model), poses, results, crossings)
     between = _collect(
         crossings.poses,
         crossings.results,
-        settings,
+        model,
         wheel_drop=np.zeros((len(crossings.poses), 6)),
         falling=falls.between,
         start=NO_SUMS,
@@ -172,7 +176,7 @@ def make_prediction(
     prediction = _collect(
         poses,
         results,
-        settings,
+        model,
         wheel_drop=falls.drops,
         falling=falls.at_waypoints,
         start=start,
@@ -207,19 +211,24 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
 def sum_up(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> Sums:
     """Return distance [m], time [s] and energy [J] at the last pose from those at the first."""
     path, sums = (view_read_only(poses), view_read_only(results)), np.empty((3, len(poses)))
-    return add_up(*path, model.settings["speed"], start, sums)
+    return add_up(*path, model.record.linkage.steering_rate, start, sums)
 
 
 def _collect(
-    poses: np.ndarray, results: np.ndarray, settings: Any, start: Sums, **more: Any
+    poses: np.ndarray, results: np.ndarray, model: PackedModel, start: Sums, **more: Any
 ) -> PathPrediction:
+    settings, rate = model.settings, model.record.linkage.steering_rate
     same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
     q, settled = results["q"], results["status"] == PoseStatus.SETTLED
     position = np.empty((len(poses), 3))
     position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
-    position[~settled] = np.nan
+    if not settled.all():
+        position[~settled] = np.nan
+        same["wheel_speed"] = np.where(settled[:, None], results["wheel_speed"], np.nan)
+        asked = settled | (results["status"] == PoseStatus.STEERING)
+        same["steering_angle"] = np.where(asked[:, None], results["steering_angle"], np.nan)
     sums = np.empty((3, len(poses)))
-    add_up(view_read_only(poses), view_read_only(results), settings["speed"], start, sums)
+    add_up(view_read_only(poses), view_read_only(results), rate, start, sums)
     distance, time, energy = sums
     return PathPrediction(
         poses=poses,

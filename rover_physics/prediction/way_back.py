@@ -4,6 +4,8 @@ On Coulomb ground the forces at rest are the same in both directions. Only faces
 that dropped off an edge on the way in climbs it on the way back.
 """
 
+from typing import Any
+
 import numpy as np
 
 from rover_physics.prediction.crossing import (
@@ -16,7 +18,7 @@ from rover_physics.prediction.crossing import (
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import find_remaining_jumps
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import SweptPath, direction_of, evaluator, make_prediction
+from rover_physics.prediction.sweep import SweptPath, evaluator, make_prediction, wheels_of
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 
@@ -40,21 +42,28 @@ def predict_way_back(
     first, end = waypoints.start, waypoints.stop
     n = end - first
     poses = np.ascontiguousarray(swept.prediction.poses[first:end][::-1])
-    results = select_results(swept.results, np.arange(first, end)[::-1])
+    results = _reverse(select_results(swept.results, np.arange(first, end)[::-1]))
     rest = swept.crossings.select(~swept.crossings.climbing).between(first, end - 1)
     rest = rest.reversed(n)
+    _reverse(rest.results)
     path = Crossings(np.arange(float(n)), np.arange(n) + 1, np.zeros(n, bool), poses, results)
     pairs = np.empty((n + len(rest.place), 2), np.int64)
-    limits = limits_of(rover.wheel.radius)
+    limits = limits_of(wheels_of(model))
     pairs = pairs[: find_remaining_jumps(path.points, rest.points, limits, pairs)]
     crossings = rest
     if len(pairs):
         ends = _pick(path, rest, pairs.ravel())
         rows = np.arange(len(ends.place)).reshape(-1, 2)
-        radius, direction = rover.wheel.radius, direction_of(model)
-        climbs = climb_faces(terrain, radius, ends, rows, evaluator(model), direction)
+        climbs = climb_faces(terrain, rover.wheel.radius, ends, rows, evaluator(model))
         crossings = join_crossings([rest, climbs]).in_order()
     return make_prediction(model, poses, results, crossings)[0].prediction
+
+
+def _reverse(results: Any) -> Any:
+    """Reverse the motions in RESULTs (n,) of the way in, and return them."""
+    results["motion"] *= -1.0
+    results["wheel_speed"] *= -1.0
+    return results
 
 
 def _pick(path: Crossings, rest: Crossings, rows: np.ndarray) -> Crossings:

@@ -13,6 +13,10 @@ LINKAGE = record_type(
     ("width", float),  # wheel width [m]
     ("wheels", float, (6, 3)),  # wheel centres [m] in wheel order
     ("on_bogie", np.uint8, (6,)),  # 1 for the wheels that hang on a bogie
+    ("steers", np.uint8, (6,)),  # 1 for the wheels that steer
+    ("steering_limit", float),  # largest steering angle [rad], 0 if all wheels are fixed
+    ("steering_rate", float),  # largest speed of the steering [rad/s]
+    ("reach", float),  # distance of the outermost wheel from the body origin, seen from above [m]
     ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
     ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
     ("gravity", float),  # gravity [m/s^2]
@@ -50,12 +54,18 @@ def pack_linkage(
     names = ("rear", "middle", "front")
     left = [suspension.wheels[name] for name in names]
     on_bogie = [name != suspension.rocker_wheel for name in names]
+    steering = rover.steering
+    steers = [steering is not None and name in steering.wheels for name in names]
     return new_record(
         LINKAGE,
         radius=float(rover.wheel.radius),
         width=float(rover.wheel.width),
         wheels=np.array([_mirror(p) for p in left] + left, dtype=float),
         on_bogie=np.array(on_bogie * 2),
+        steers=np.array(steers * 2),
+        steering_limit=0.0 if steering is None else float(steering.limit),
+        steering_rate=np.inf if steering is None else float(steering.rate),
+        reach=max(float(np.hypot(x, y)) for x, y, _ in left),
         rocker_pivots=_both_sides(suspension.rocker_pivot),
         bogie_pivots=_both_sides(suspension.bogie_pivot),
         gravity=float(rover.gravity),

@@ -250,7 +250,7 @@ def _write_balance(linkages, works, balances):
     _write_contacts(linkage.radius, work)
     write_equations(linkage, placement, work.contacts, columns, balance)
     _add_push(linkage, work)
-    if not solve_equations(linkage, placement, columns, balance):
+    if not solve_equations(columns, balance):
         return False
     rows.force_unit = linkage.mass * linkage.gravity / WHEEL_COUNT
     _write_places(linkage.length, placement, rows.along)

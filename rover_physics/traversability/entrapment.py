@@ -125,7 +125,7 @@ def _resists_way_back(
         return np.zeros(len(resistance), dtype=bool)
     broken = np.zeros(resistance.shape, dtype=bool)
     wheels = np.nonzero(resistance > 0.0)
-    direction = options.direction
+    direction = np.where(prediction.wheel_speed[wheels] < 0.0, -1.0, 1.0)
     R, N = resistance[wheels], prediction.wheel_loads[wheels]
     T, S = -direction * prediction.tangential[wheels], prediction.lateral[wheels]
     largest = prediction.friction[wheels] * N + R

@@ -27,13 +27,14 @@ from rover_physics.prediction.crossing import (
 from rover_physics.prediction.drops import MIN_ANGLE, find_falls
 from rover_physics.prediction.evaluation import effort, unwritten_results
 from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import (
     SweptPath,
     check_poses,
-    direction_of,
     evaluator,
     joined_paths,
     make_prediction,
+    wheels_of,
 )
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
@@ -73,8 +74,6 @@ class SuspectLimits(NamedTuple):
     """Largest friction utilisation, less the control margin."""
     torque: float
     """Largest torque saturation, less the control margin."""
-    direction: float
-    """1 if the rover drives forwards, -1 if backwards."""
 
 
 @quiet
@@ -121,6 +120,7 @@ class _StartedPath:
 
     def __init__(self, rover: Rover, model: PackedModel, poses: np.ndarray):
         self._rover, self._model, self.poses = rover, model, poses
+        self.motions = path_motions(model, poses)
         self.results = unwritten_results(len(poses))
         """(n,) RESULT of each waypoint; the first `evaluated` are written."""
         self.evaluated = 0
@@ -163,8 +163,7 @@ class _StartedPath:
         if not (complete or self._suspicious):
             if not len(crossings.place):
                 return
-            radius, direction = self._rover.wheel.radius, self._limits.direction
-            falls = find_falls(radius, here, results, crossings, direction)
+            falls = find_falls(wheels_of(self._model), here, results, crossings)
             if not falls.drops.max() > self._rover.limits.wheel_drop:
                 return
         swept, falls = make_prediction(self._model, here, results, crossings)
@@ -190,18 +189,19 @@ def _limits_of(rover: Rover, model: PackedModel) -> SuspectLimits:
         sinkage=float(MODERATE_SINKAGE * 2.0 * rover.wheel.radius),
         friction=float(limits.friction_utilisation * kept),
         torque=float(limits.torque_saturation * kept),
-        direction=direction_of(model),
     )
 
 
 def _evaluate_block(model: PackedModel, paths: Sequence[_StartedPath], size: int) -> None:
     """Evaluate the next waypoints of all paths together."""
     blocks = [path.block(size) for path in paths]
-    at = np.concatenate([path.poses[block] for path, block in zip(paths, blocks, strict=True)])
+    pairs = list(zip(paths, blocks, strict=True))
+    at = np.concatenate([path.poses[block] for path, block in pairs])
     if not len(at):
         return
-    results, first = evaluator(model)(at), 0
-    for path, block in zip(paths, blocks, strict=True):
+    motions = np.concatenate([path.motions[block] for path, block in pairs])
+    results, first = evaluator(model)(at, motions=motions), 0
+    for path, block in pairs:
         end = first + block.stop - block.start
         copy_results(results[first:end], path.results[block])
         path.evaluated, first = block.stop, end
@@ -214,11 +214,10 @@ def _search_crossings(terrain: Terrain, model: PackedModel, paths: Sequence[_Sta
     ends = np.cumsum([stretch.stop - stretch.start for stretch in stretches])
     crossings = find_crossings(
         terrain,
-        float(model.record.linkage.radius),
+        wheels_of(model),
         np.concatenate([path.poses[stretch] for path, stretch in pairs]),
         join_results([path.results[stretch] for path, stretch in pairs]),
         evaluator(model),
-        direction_of(model),
         joined_paths(ends),
     )
     for (path, stretch), first, end in zip(pairs, [0, *ends[:-1]], ends, strict=True):
@@ -243,7 +242,7 @@ def find_suspects(results, limits):
             return (row if suspect < 0 else suspect), row
         if not _has_grip(result, limits):
             suspect = row if suspect < 0 else suspect
-            if not _may_fall(result, limits.direction):
+            if not _may_fall(result):
                 return suspect, row
     return suspect, -1
 
@@ -274,9 +273,10 @@ def _has_grip(result, limits):
 
 
 @exact_kernel
-def _may_fall(result, direction):
+def _may_fall(result):
     """Return whether a contact is so far behind its wheel that the wheel may roll off an edge."""
     steepest = 0.0
     for wheel in range(6):
-        steepest = min(steepest, direction * result.contact_angle[wheel])
+        angle = result.contact_angle[wheel]
+        steepest = min(steepest, -angle if result.wheel_speed[wheel] < 0.0 else angle)
     return steepest < -MIN_ANGLE

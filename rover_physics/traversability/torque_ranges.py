@@ -17,8 +17,9 @@ from numpy.typing import ArrayLike
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.read_only import freeze_fields
-from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work
+from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work, set_pose
 from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import check_poses, sweep_lock
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
@@ -60,7 +61,11 @@ class _FeasibleSet:
 
 
 def find_torque_ranges(
-    rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
+    rover: Rover,
+    terrain: Terrain,
+    poses: ArrayLike,
+    options: SweepOptions = DEFAULT_OPTIONS,
+    curvature: ArrayLike | None = None,
 ) -> TorqueRanges:
     """Find the torque range of each wheel in which all constraints can be kept.
 
@@ -76,21 +81,22 @@ def find_torque_ranges(
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
         options: As for `sweep_path`; its policy and control margin are ignored.
+        curvature: As for `sweep_poses`, if the poses form no path.
 
     Raises:
-        PoseError: Poses of wrong shape, or not finite.
+        PoseError: Poses of wrong shape, or not finite; or such curvatures.
         ModelError: An option that this rover cannot have.
         SoilError: A soil that is not a preset.
     """
     poses = check_poses(poses)
     model = pack_model(rover, terrain, replace(options, policy="optimal", control_margin=0.0))
-    n = len(poses)
+    n, motions = len(poses), motions_of(model, poses, curvature)
     result, work = new_results(1)[0], new_work()
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
         with sweep_lock:
-            work.pose[:] = poses[i]
+            set_pose(model.record, poses, motions, i, work)
             evaluate_pose(model.record, work, result)
         if result.status != PoseStatus.SETTLED or not _is_within(rover, model, result):
             continue
@@ -121,7 +127,7 @@ def _describe_set(rover: Rover, model: PackedModel, balance: Any, result: Any) -
     most_used = rover.limits.friction_utilisation
     resistance = (result.motion_resistance / result.wheel_loads)[:, None] * normal
     strength = most_used * (result.friction[:, None] * normal + resistance)
-    resistance = model.settings.direction * resistance
+    resistance = np.where(result.wheel_speed < 0.0, -1.0, 1.0)[:, None] * resistance
     cones = np.stack([strength, tangential + most_used * resistance, lateral], axis=1)
     thrust = tangential + resistance
     limits = np.vstack([-thrust, thrust])

@@ -6,14 +6,21 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.limit_checks import NOT_COMPUTABLE, check_limits, largest_of
+from rover_physics.traversability.limit_checks import (
+    NOT_COMPUTABLE,
+    check_limits,
+    compare,
+    largest_of,
+)
 
 CODES = (
+    "steering",
     "off_map",
     "unknown_ground",
     "not_settled",
@@ -247,7 +254,7 @@ def _hold_against_limits(
 ) -> tuple[dict[int, tuple[str, str]], dict[str, float]]:
     """Return code and reason of the impassable rows, and the extreme value of each limit."""
     found = {
-        row: _PLACELESS[PoseStatus(prediction.status[row])]
+        row: _explain_status(rover, prediction, row)
         for row in np.flatnonzero(prediction.status != PoseStatus.SETTLED).tolist()
     }
     settled = prediction.settled
@@ -265,6 +272,23 @@ def _hold_against_limits(
         extremes["friction"] = largest_of(prediction.friction_utilisation[needed])
         extremes["torque"] = largest_of(prediction.torque_saturation[needed])
     return found, extremes
+
+
+def _explain_status(rover: Rover, prediction: PathPrediction, row: int) -> tuple[str, str]:
+    """Return code and reason of a row that is not settled."""
+    status = PoseStatus(prediction.status[row])
+    if status != PoseStatus.STEERING:
+        return _PLACELESS[status]
+    angles, steering = prediction.steering_angle[row], rover.steering
+    assert steering is not None
+    turns = np.tile([position in steering.wheels for position in WHEEL_POSITIONS], 2)
+    wheel = int(np.argmax(np.abs(angles) - np.where(turns, steering.limit, 0.0)))
+    angle, limit = np.degrees(angles[wheel]), np.degrees(steering.limit)
+    if turns[wheel]:
+        needed = f"needs a steering angle of {compare(angle, limit, 1, ' deg')}"
+    else:
+        needed = f"does not steer: the way leads {angle:.1f} deg aside of its heading"
+    return "steering", f"{WHEELS[wheel]} wheel {needed}"
 
 
 def _where_forces_count(prediction: PathPrediction) -> np.ndarray | bool:

@@ -1,0 +1,224 @@
+"""Motions of the body along a path: speed forward and sideways and yaw rate at each waypoint.
+
+The step from a waypoint to the next is a motion of constant speed and yaw rate, an arc. Waypoints
+have the motion of the step that leads to them, the first one that of the first step. Poses are
+sampled, and their headings may follow the chords of a curve. So a step counts as an arc without a
+sideways part if its direction is within SIDEWAYS plus half its turn of the heading halfway. Beyond
+this it is a sideways motion, a crab, if it hardly turns.
+
+Poses need not form a path. Steps that are longer than half the wheelbase, or that turn and go
+sideways at once, are not driven, and the wheels point ahead. If no more than half the steps can be
+driven, the poses are taken one by one, all with their wheels ahead.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.errors import PoseError
+from rover_physics.numerics.kernels import kernel
+from rover_physics.prediction.packed_model import PackedModel
+from rover_physics.rover.steering import fastest_wheel
+
+SIDEWAYS = np.radians(5.0)
+"""Angle between heading and direction of travel [rad] up to which there is no sideways motion."""
+MAX_TURN = np.radians(100.0)
+"""Largest turn of a step [rad] that is driven as an arc; corners of a grid turn by 90 degrees."""
+CRAB_TURN = np.radians(10.0)
+"""Largest turn of a step [rad] with a sideways part."""
+LONGEST = 0.5
+"""Longest step that is driven [wheelbases]."""
+ON_THE_SPOT = 0.02
+"""Radius of a curve [distances of the outermost wheel] up to which it is a turn on the spot."""
+AT_REST = 1e-6
+"""Way of the wheels [wheelbases] up to which the rover rests."""
+STRAIGHT = 1e-6
+"""Curvature [rad per wheelbase] up to which a step is straight."""
+
+
+class Step(IntEnum):
+    """What is known of the way from a waypoint to the next."""
+
+    RESTS = 0
+    """Both are the same pose."""
+    DRIVEN = 1
+    """An arc, a turn on the spot or a sideways motion."""
+    OPEN = 2
+    """No motion of the wheels leads from one to the other."""
+
+
+def path_motions(model: PackedModel, poses: np.ndarray) -> np.ndarray:
+    """Return the nominal motions (n, 3) along a path: vx, vy [m/s], yaw rate [rad/s].
+
+    The body origin drives at the nominal speed, slower where a wheel would exceed its largest
+    speed. In a turn on the spot the outermost wheel has the nominal speed. A straight path has
+    exactly (nominal speed, 0, 0), negative backwards.
+
+    Args:
+        model: The model.
+        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints of one path, map frame.
+    """
+    motions = np.empty((len(poses), 3))
+    write_path_motions(model.records, poses, motions)
+    return motions
+
+
+def motions_of(
+    model: PackedModel, poses: np.ndarray, curvature: ArrayLike | None = None
+) -> np.ndarray:
+    """Return the nominal motions (n, 3) at poses, as `path_motions` does.
+
+    Args:
+        model: The model.
+        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+        curvature: (n,) curvature of the way of the body origin at each pose [1/m], positive to the
+            left, infinite on the spot; None if the poses are a path.
+
+    Raises:
+        PoseError: Curvatures of wrong shape, or not numbers.
+    """
+    if curvature is None:
+        return path_motions(model, poses)
+    bends, motions = check_curvature(curvature, len(poses)), np.empty((len(poses), 3))
+    write_curvature_motions(model.records, bends, motions)
+    return motions
+
+
+def check_curvature(curvature: ArrayLike, count: int) -> np.ndarray:
+    """Return the curvatures of `count` poses as floats (n,).
+
+    Raises:
+        PoseError: Curvatures of wrong shape, or not numbers.
+    """
+    try:
+        bends = np.array(curvature, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise PoseError(f"curvature is not numbers: {error}") from error
+    if bends.shape != (count,):
+        raise PoseError(f"curvature has shape {bends.shape}; it must be ({count},), as the poses")
+    if np.isnan(bends).any():
+        row = int(np.flatnonzero(np.isnan(bends))[0])
+        raise PoseError(
+            f"curvature of pose {row} is nan; it must be a number of 1/m, inf for on the spot"
+        )
+    return bends
+
+
+@kernel
+def write_curvature_motions(models, curvature, motions):
+    """Write the motions of `motions_of`."""
+    linkage, settings = models[0].linkage, models[0].settings
+    for i in range(curvature.size):
+        bend, motion = curvature[i], motions[i]
+        motion[0], motion[1], motion[2] = settings.direction, 0.0, 0.0
+        if abs(bend) * ON_THE_SPOT * linkage.reach >= 1.0:
+            motion[0], motion[2] = 0.0, settings.direction * (1.0 if bend > 0.0 else -1.0)
+        elif abs(bend) * linkage.length > STRAIGHT:
+            motion[2] = settings.direction * bend
+        _take_nominal_speed(linkage, settings, motion)
+
+
+@kernel
+def write_path_motions(models, poses, motions):
+    """Write the motions of `path_motions`."""
+    linkage, settings = models[0].linkage, models[0].settings
+    n, driven, open_steps = poses.shape[0], 0, 0
+    for i in range(1, n):
+        step = _find_motion(linkage, poses[i - 1], poses[i], motions[i])
+        if step == Step.DRIVEN:
+            driven += 1
+        elif step == Step.OPEN:
+            open_steps += 1
+    is_path = driven > open_steps
+    known = 0
+    for i in range(1, n):
+        motion = motions[i]
+        if motion[0] != motion[0]:
+            continue
+        if not is_path or (motion[0] == 0.0 and motion[1] == 0.0 and motion[2] == 0.0):
+            motion[0], motion[1], motion[2] = settings.direction, 0.0, 0.0
+        _take_nominal_speed(linkage, settings, motion)
+        first = known + 1 if known > 0 else 0
+        for k in range(first, i):
+            before = motions[known] if known > 0 else motion
+            motions[k, 0], motions[k, 1], motions[k, 2] = before[0], before[1], before[2]
+        known = i
+    for k in range(known + 1 if known > 0 else 0, n):
+        motions[k, 0], motions[k, 1], motions[k, 2] = settings.direction, 0.0, 0.0
+        if known > 0:
+            for j in range(3):
+                motions[k, j] = motions[known, j]
+        else:
+            _take_nominal_speed(linkage, settings, motions[k])
+
+
+@kernel
+def _find_motion(linkage, here, there, motion):
+    """Write the motion of a step, of any speed: NaN at rest, zeros if open; return a Step."""
+    dx, dy = there[0] - here[0], there[1] - here[1]
+    turn = (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
+    length, swing = np.hypot(dx, dy), linkage.reach * abs(turn)
+    motion[0] = motion[1] = motion[2] = 0.0
+    if max(length, swing) <= AT_REST * linkage.length:
+        motion[0] = np.nan
+        return Step.RESTS
+    if length <= ON_THE_SPOT * swing:
+        motion[2] = 1.0 if turn > 0.0 else -1.0
+        return Step.DRIVEN
+    if length > LONGEST * linkage.length:
+        return Step.OPEN
+    if linkage.length * abs(turn) <= STRAIGHT * length:
+        turn = 0.0
+    yaw = here[2] + 0.5 * turn
+    c, s = np.cos(yaw), np.sin(yaw)
+    ahead, aside = (dx * c + dy * s) / length, (dy * c - dx * s) / length
+    rate = turn / (length * bulge(turn))
+    if abs(turn) <= MAX_TURN and _is_ahead(linkage, (ahead, aside, rate), turn):
+        motion[0], motion[2] = (1.0 if ahead >= 0.0 else -1.0), rate
+        return Step.DRIVEN
+    if abs(turn) <= CRAB_TURN:
+        motion[0], motion[1], motion[2] = ahead, aside, rate
+        return Step.DRIVEN
+    return Step.OPEN
+
+
+@kernel
+def _is_ahead(linkage, motion, turn):
+    """Return whether a motion (vx, vy, rate) of unit speed and a turn [rad] goes ahead or back.
+
+    The body origin may swing out if the fixed wheels do not, as in a car, whose rear axle follows
+    the curve.
+    """
+    ahead, aside, rate = motion
+    allowed = SIDEWAYS + 0.5 * abs(turn)
+    if np.arctan2(abs(aside), abs(ahead)) <= allowed:
+        return True
+    x, fixed = 0.0, 0
+    for wheel in range(6):
+        if not linkage.steers[wheel]:
+            x += linkage.wheels[wheel, 0]
+            fixed += 1
+    if fixed == 0 or fixed == 6:
+        return False
+    return np.arctan2(abs(aside + rate * x / fixed), abs(ahead)) <= allowed
+
+
+@kernel
+def bulge(turn):
+    """Return the length of an arc over that of its chord; `turn` is its angle [rad]."""
+    half = 0.5 * abs(turn)
+    return half / np.sin(half) if half > 1e-8 else 1.0
+
+
+@kernel
+def _take_nominal_speed(linkage, settings, motion):
+    """Scale a motion of any speed to the nominal one, see `path_motions`."""
+    speed = np.hypot(motion[0], motion[1])
+    if motion[1] == 0.0 and motion[2] == 0.0:
+        motion[0] = settings.speed if motion[0] > 0.0 else -settings.speed
+        return
+    fastest = fastest_wheel(linkage, motion)
+    factor = settings.speed / (speed if speed > 0.0 else fastest)
+    factor = min(factor, settings.max_wheel_speed * linkage.radius / fastest)
+    motion[0], motion[1], motion[2] = factor * motion[0], factor * motion[1], factor * motion[2]
