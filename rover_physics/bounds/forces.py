@@ -243,10 +243,7 @@ def _evaluate(model, work):
 
 @kernel
 def _worst_use(model, box, wheel, forces):
-    """Return the largest utilisation of a wheel on all grounds that it may touch.
-
-    `forces` are N, T in the direction in which the wheel rolls, and S, over the rover's weight.
-    """
+    """Return the largest utilisation of a wheel on any ground, for N, T as it rolls, and S."""
     ground, linkage, settings = model.ground, model.linkage, model.settings
     N, T, S = forces
     N = max(N, MIN_LOAD_SHARE)

@@ -6,9 +6,9 @@ sampled, and their headings may follow the chords of a curve. So a step counts a
 sideways part if its direction is within SIDEWAYS plus half its turn of the heading halfway. Beyond
 this it is a sideways motion, a crab, if it hardly turns.
 
-Poses need not form a path. Steps that are longer than half the wheelbase, or that turn and go
-sideways at once, are not driven, and the wheels point ahead. If no more than half the steps can be
-driven, the poses are taken one by one, all with their wheels ahead.
+Poses need not form a path. Long steps, and steps that turn and go sideways at once, are not
+driven, and the wheels point ahead. If no more than half the steps can be driven, the poses are
+taken one by one, all with their wheels ahead.
 """
 
 from enum import IntEnum
@@ -25,10 +25,10 @@ SIDEWAYS = np.radians(5.0)
 """Angle between heading and direction of travel [rad] up to which there is no sideways motion."""
 MAX_TURN = np.radians(100.0)
 """Largest turn of a step [rad] that is driven as an arc; corners of a grid turn by 90 degrees."""
-CRAB_TURN = np.radians(10.0)
-"""Largest turn of a step [rad] with a sideways part."""
 LONGEST = 0.5
-"""Longest step that is driven [wheelbases]."""
+"""Longest arc that is driven as one step [wheelbases]."""
+CRAB_TURN, LONGEST_CRAB = np.radians(10.0), 0.25
+"""Largest turn [rad] and length [wheelbases] of a step with a sideways part."""
 ON_THE_SPOT = 0.02
 """Radius of a curve [distances of the outermost wheel] up to which it is a turn on the spot."""
 AT_REST = 1e-6
@@ -177,7 +177,7 @@ def _find_motion(linkage, here, there, motion):
     if abs(turn) <= MAX_TURN and _is_ahead(linkage, (ahead, aside, rate), turn):
         motion[0], motion[2] = (1.0 if ahead >= 0.0 else -1.0), rate
         return Step.DRIVEN
-    if abs(turn) <= CRAB_TURN:
+    if abs(turn) <= CRAB_TURN and length <= LONGEST_CRAB * linkage.length:
         motion[0], motion[1], motion[2] = ahead, aside, rate
         return Step.DRIVEN
     return Step.OPEN

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from rover_physics.prediction.drops import Falls, find_falls
 from rover_physics.prediction.evaluation import AHEAD, NONE_HELD, RESULT, effort, evaluate
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Wheels, add_up
-from rover_physics.prediction.path_motion import path_motions
+from rover_physics.prediction.path_motion import motions_of, path_motions
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.rover.model import Rover
@@ -76,6 +76,47 @@ def sweep_paths(
         PoseError, ModelError, SoilError: As `sweep_path`.
     """
     return [swept.prediction for swept in sweep_in_full(rover, terrain, paths, options)]
+
+
+@quiet
+def sweep_poses(
+    rover: Rover,
+    terrain: Terrain,
+    poses: ArrayLike,
+    curvature: ArrayLike,
+    options: SweepOptions = DEFAULT_OPTIONS,
+) -> PathPrediction:
+    """Predict the rover at single poses that form no path.
+
+    What would lie between poses, crossings, falls and drops, is left out. Time, energy and
+    distance are 0 where the rover settled.
+
+    Args:
+        rover: The rover.
+        terrain: The ground; its friction and soil layers override the options.
+        poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
+        curvature: (n,) curvature of the motion of base_link at each pose [1/m], positive to the
+            left, 0 straight ahead, inf or -inf on the spot.
+        options: As for `sweep_path`.
+
+    Raises:
+        PoseError: Poses of wrong shape, or not finite; curvatures of wrong shape, or NaN.
+        ModelError, SoilError: As `sweep_path`.
+    """
+    model, places = pack_model(rover, terrain, options), check_poses(poses)
+    results = evaluator(model)(places, motions=motions_of(model, places, curvature))
+    prediction = _collect(
+        places,
+        results,
+        model,
+        wheel_drop=np.zeros((len(places), 6)),
+        falling=np.zeros((len(places), 6), bool),
+        start=NO_SUMS,
+        between=None,
+        waypoint=np.arange(len(places)),
+    )
+    nothing = np.where(prediction.settled, 0.0, np.nan)
+    return replace(prediction, energy=nothing, time=nothing, distance=np.zeros(len(places)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge_poses import judge_poses
 from rover_physics.traversability.limit_checks import check_limits
 from rover_physics.traversability.verdict import Verdict, find_reasons
 
@@ -86,6 +87,7 @@ def classify_judged(
     options: SweepOptions = DEFAULT_OPTIONS,
     *,
     sigmas: float | None = SIGMAS,
+    curvature: ArrayLike | None = None,
 ) -> tuple[ClassifiedWaypoint, ...]:
     """Classify each waypoint of a path that `judge_path` has judged under one policy.
 
@@ -99,6 +101,7 @@ def classify_judged(
         verdict: The verdict on it, from `judge_path`.
         options: The options it was judged with; their policy is ignored.
         sigmas: The standard deviations of the map it was judged with.
+        curvature: (n,) as for `judge_poses`, if this has judged single poses.
 
     Returns:
         A class per waypoint, as `classify_path`.
@@ -110,7 +113,13 @@ def classify_judged(
     for policy in TORQUE_POLICIES:
         if policy not in judged:
             asked = replace(options, policy=policy)
-            judged[policy] = judge_path(rover, terrain, prediction.poses, asked, sigmas=sigmas)
+            poses = prediction.poses
+            if curvature is None:
+                judged[policy] = judge_path(rover, terrain, poses, asked, sigmas=sigmas)
+            else:
+                judged[policy] = judge_poses(
+                    rover, terrain, poses, curvature, asked, sigmas=sigmas
+                )
         if judged[policy][1].traversable:
             break
     equal = _decide(rover, *judged[EQUAL])

@@ -190,7 +190,9 @@ def _find_way_on(
     spacing = max(_spacing(course.path), length / MAX_WAY_POSES)
     closed = ""
     for start in starts:
-        for poses in _ways_ahead(course.path[start], wheelbase, length, spacing, options):
+        for way in _ways_ahead(course.path[start], wheelbase, length, spacing, options):
+            # From the pose before it, so that the wheels of a curve are turned on the ground.
+            poses = np.vstack([course.path[max(start - 1, 0)], way])
             verdict = _judge_way(rover, terrain, poses, options)
             if verdict.traversable:
                 return ""

@@ -19,11 +19,10 @@ from rover_physics.traversability.bounded_verdict import judge_bounds
 from rover_physics.traversability.entrapment import Course, ask_for_ways_out, find_one_way
 from rover_physics.traversability.judge_path import weigh_margin
 from rover_physics.traversability.verdict import (
-    LARGEST,
-    LOWEST,
     Verdict,
     judge,
     with_refusals,
+    worst_of,
 )
 
 Take = Callable[[PathPrediction], object]
@@ -126,12 +125,8 @@ class _Findings:
         """Take the verdict on the new waypoints of a part."""
         self.codes += verdict.codes
         self.reasons += verdict.reasons
-        before = self.verdict or verdict
-        extremes = {name: float(np.fmin(getattr(before, name), getattr(verdict, name)))
-                    for name in LOWEST}  # fmt: skip
-        extremes |= {name: float(np.fmax(getattr(before, name), getattr(verdict, name)))
-                     for name in LARGEST}  # fmt: skip
-        self.verdict = replace(verdict, codes=(), reasons=(), **extremes)  # type: ignore[arg-type]
+        worst = worst_of(self.verdict or verdict, verdict)
+        self.verdict = replace(worst, codes=(), reasons=())
 
 
 def _check_ways_out(

@@ -236,6 +236,15 @@ def with_refusals(verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]
     )
 
 
+def worst_of(verdict: Verdict, other: Verdict) -> Verdict:
+    """Return a verdict with the worse of two verdicts' extremes; the rest is the second's."""
+    extremes = {name: float(np.fmin(getattr(verdict, name), getattr(other, name)))
+                for name in LOWEST}  # fmt: skip
+    extremes |= {name: float(np.fmax(getattr(verdict, name), getattr(other, name)))
+                 for name in LARGEST}  # fmt: skip
+    return replace(other, **extremes)  # type: ignore[arg-type]
+
+
 def find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
     """Return code and reason of each row of a prediction, empty if passable."""
     return _spread_out(_hold_against_limits(rover, prediction)[0], len(prediction.poses))

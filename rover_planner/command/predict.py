@@ -31,7 +31,11 @@ def predict(
     rover: RoverName,
     terrain: TerrainName,
     poses: Annotated[
-        Path, typer.Argument(metavar="POSES", help="Poses x, y, yaw of the body, .npz.")
+        Path,
+        typer.Argument(
+            metavar="POSES",
+            help="Poses x, y, yaw of the body, .npz; with curvature, where they form no path.",
+        ),
     ],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Predictions, .npz; is overwritten.")],
     friction: Friction = None,
@@ -78,7 +82,7 @@ def predict(
     ] = False,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
-    """Predict loads, slip and margins along a path of poses and write them to a file.
+    """Predict loads, slip and margins along a path, or at single poses, and write them to a file.
 
     Exit code 0: it ran, with any verdict. 2: bad input.
     """
@@ -87,10 +91,12 @@ def predict(
     from rover_physics.terrain.grid import load_terrain
     from rover_physics.traversability.classification import classify_judged
     from rover_physics.traversability.judge_path import judge_path
+    from rover_physics.traversability.judge_poses import judge_many_poses, judge_poses
     from rover_physics.traversability.long_path import judge_long_path
     from rover_physics.traversability.torque_ranges import find_torque_ranges
     from rover_planner.command.arm_options import read_arm_angles
     from rover_planner.command.prediction_files import (
+        read_curvature,
         read_poses,
         write_prediction,
         writing_parts,
@@ -100,6 +106,7 @@ def predict(
     model = load_rover(rover)
     ground = load_terrain(terrain, max_cells)
     path = read_poses(poses)
+    curvature = read_curvature(poses, len(path))
     options = SweepOptions(
         policy=policy,
         control_margin=control_margin,
@@ -119,20 +126,38 @@ def predict(
             if not torque_ranges:
                 return None
             progress("find the ranges of the torques")
-            return find_torque_ranges(model, ground, path, options)
+            return find_torque_ranges(model, ground, path, options, curvature)
 
         if len(path) > MAX_IN_MEMORY and not classes:
             with writing_parts(out, len(path), on_soil) as file:
-                verdict = judge_long_path(
-                    model, ground, path, options, sigmas=sigmas, take=file.take
-                )
+                if curvature is None:
+                    verdict = judge_long_path(
+                        model, ground, path, options, sigmas=sigmas, take=file.take
+                    )
+                else:
+                    verdict = judge_many_poses(
+                        model, ground, path, curvature, options, sigmas=sigmas, take=file.take
+                    )
                 file.close(verdict, find_ranges())
         else:
-            prediction, verdict = judge_path(model, ground, path, options, sigmas=sigmas)
+            if curvature is None:
+                prediction, verdict = judge_path(model, ground, path, options, sigmas=sigmas)
+            else:
+                prediction, verdict = judge_poses(
+                    model, ground, path, curvature, options, sigmas=sigmas
+                )
             found = None
             if classes:
                 progress("classify the waypoints")
-                found = classify_judged(model, ground, prediction, verdict, options, sigmas=sigmas)
+                found = classify_judged(
+                    model,
+                    ground,
+                    prediction,
+                    verdict,
+                    options,
+                    sigmas=sigmas,
+                    curvature=curvature,
+                )
             write_prediction(
                 out, prediction, verdict, on_soil=on_soil, classes=found, ranges=find_ranges()
             )

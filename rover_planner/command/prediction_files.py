@@ -39,6 +39,8 @@ ARRAYS: dict[str, Shape] = {
     "tip_over_ratio": (),
     "tip_over_force_angle": (),
     "belly_clearance": (),
+    "steering_angle": (6,),
+    "wheel_speed": (6,),
     "energy": (),
     "time": (),
 }
@@ -53,6 +55,7 @@ REPLAY_ARRAYS: dict[str, Shape] = {
     "sinkage": (6,),
     "motion_resistance": (6,),
     "power": (),
+    "motion": (3,),
     "distance": (),
     "wheel_drop": (6,),
     "falling": (6,),
@@ -91,6 +94,31 @@ def read_poses(path: Path) -> NDArray[np.float64]:
             )
         _check_count("poses", header.shape[0])
         return archive.read("poses", np.float64, most=MAX_POSES * 24)
+
+
+def read_curvature(path: Path, count: int) -> NDArray[np.float64] | None:
+    """Read `curvature` (n,) [1/m] of a file of `count` poses, None if it has none.
+
+    Raises:
+        PlanningError: It is not an array of as many numbers as poses, or one of them is NaN.
+    """
+    with _errors_of(path), open_npz(path) as archive:
+        if "curvature" not in archive.names:
+            return None
+        header = archive.read_header("curvature")
+        if header.dtype.kind not in "fiu" or header.shape != (count,):
+            raise RoverFileError(
+                f"curvature is of type {header.dtype} and shape {header.shape}; it must be "
+                f"numbers ({count},), one for each pose"
+            )
+        curvature = archive.read("curvature", np.float64, most=MAX_POSES * 8)
+        unknown = np.flatnonzero(np.isnan(curvature))
+        if unknown.size:
+            raise RoverFileError(
+                f"curvature of pose {unknown[0]} is nan; it must be a number of 1/m, inf or -inf "
+                "for a turn on the spot"
+            )
+        return curvature
 
 
 def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
@@ -251,7 +279,11 @@ class PartsFile:
 def _rows_of(prediction: PathPrediction, on_soil: bool) -> dict[str, Any]:
     """Return the arrays that have a row for each waypoint."""
     names = (*ARRAYS, *REPLAY_ARRAYS, *(SOIL_ARRAYS if on_soil else ()))
-    return {name: getattr(prediction, name) for name in names}
+    rows = {name: getattr(prediction, name) for name in names}
+    rows["steering_angle"] = np.where(
+        prediction.settled[:, None], prediction.steering_angle, np.nan
+    )
+    return rows
 
 
 def _summary_of(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rover_physics.forces.equilibrium import balance_forces
 from rover_physics.prediction.evaluation import new_work
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.model import Part, Rover
@@ -124,7 +124,7 @@ def test_up_a_plane_the_pull_carries_the_weight_along_it():
 @few
 @given(seeds)
 def test_equal_torques_are_equal_and_lateral_forces_linear_along_the_rover(seed):
-    prediction = sweep_path(LSR1, rocky(seed % 20), random_poses(seed, 3, 1.5))
+    prediction = sweep_poses(LSR1, rocky(seed % 20), random_poses(seed, 3, 1.5), np.zeros(3))
     for i in np.flatnonzero(prediction.settled):
         T, S = prediction.tangential[i], prediction.lateral[i]
         assert pytest.approx(np.full(6, T[0]), abs=1e-12 * LSR1.weight) == T
@@ -197,8 +197,8 @@ def test_the_friction_of_the_ground_goes_before_that_of_the_rover():
 @given(seeds)
 def test_mirrored_ground_swaps_the_loads_of_right_and_left(seed):
     ground, poses = smooth(seed), random_poses(seed, 4, 0.6)
-    here = sweep_path(LSR1, ground, poses)
-    there = sweep_path(LSR1, *mirrored(ground, poses))
+    here = sweep_poses(LSR1, ground, poses, np.zeros(4))
+    there = sweep_poses(LSR1, *mirrored(ground, poses), np.zeros(4))
     loose = 1e-3 * LSR1.weight
     assert there.wheel_loads == pytest.approx(here.wheel_loads[:, SWAP], abs=loose)
     assert there.tangential == pytest.approx(here.tangential[:, SWAP], abs=loose)
@@ -209,8 +209,9 @@ def test_mirrored_ground_swaps_the_loads_of_right_and_left(seed):
 @given(seeds, st.floats(0.1, 10.0))
 def test_forces_grow_with_gravity_in_proportion(seed, factor):
     ground, poses = fractal(seed % 20), random_poses(seed, 4, 1.5)
-    here = sweep_path(LSR1, ground, poses)
-    there = sweep_path(replace(LSR1, gravity=factor * LSR1.gravity), ground, poses)
+    here = sweep_poses(LSR1, ground, poses, np.zeros(4))
+    heavy = replace(LSR1, gravity=factor * LSR1.gravity)
+    there = sweep_poses(heavy, ground, poses, np.zeros(4))
     for name in ("wheel_loads", "tangential", "lateral", "torque"):
         scaled = factor * getattr(here, name)
         assert getattr(there, name) == pytest.approx(scaled, rel=1e-9, nan_ok=True), name
@@ -225,8 +226,10 @@ def test_a_bogie_behind_is_a_bogie_ahead_driven_backwards(seed, rover):
     rover = replace(rover, manipulator=None)
     ground = scaled_for(rover, smooth(seed))
     poses = scaled_poses(rover, random_poses(seed, 3, 0.5))
-    here = sweep_path(rover, ground, poses)
-    there = sweep_path(turned_round(rover), ground, poses + np.array([0.0, 0.0, np.pi]))
+    here = sweep_poses(rover, ground, poses, np.zeros(3))
+    there = sweep_poses(
+        turned_round(rover), ground, poses + np.array([0.0, 0.0, np.pi]), np.zeros(3)
+    )
     assert here.settled.all()
     assert there.settled.all()
     size = rover.wheel.radius

@@ -14,7 +14,7 @@ from rover_physics.prediction.path_kernels import (
 )
 from rover_physics.status import PoseStatus
 
-LIMITS = JumpLimits(max_spacing=0.1, min_spacing=1e-4, height=0.025)
+LIMITS = JumpLimits(max_spacing=0.1, min_spacing=1e-4, height=0.025, reach=0.5)
 
 
 def results_with(contact_angles, statuses=PoseStatus.SETTLED, heights=0.0):
@@ -24,6 +24,8 @@ def results_with(contact_angles, statuses=PoseStatus.SETTLED, heights=0.0):
     results["contact_angle"][:, 2] = contact_angles
     results["wheel_centres"][:, 2, 2] = heights
     results["status"] = statuses
+    results["motion"] = [0.03, 0.0, 0.0]
+    results["steering_angle"] = 0.0
     return results
 
 
@@ -74,8 +76,11 @@ def test_stretches_are_divided_evenly_and_turned_the_shorter_way():
     ends, place = np.array([[0, 1]]), np.array([3.0, 4.0])
     poses = np.array([[0.0, 0.0, 3.0], [0.4, -0.8, -3.0]])
     new_place, new_waypoint, new_poses = np.empty(3), np.empty(3, np.int64), np.empty((3, 3))
-    known = PathPoints(place, np.array([4, 4]), poses, new_results(2))
-    divide_stretches(ends, 4, known, (new_place, new_waypoint, new_poses))
+    motions, results = np.empty((3, 3)), new_results(2)
+    results["motion"] = [[0.03, 0.0, 0.0], [0.02, 0.0, 0.1]]
+    known = PathPoints(place, np.array([4, 4]), poses, results)
+    divide_stretches(ends, 4, known, (new_place, new_waypoint, new_poses, motions))
+    assert motions.tolist() == [[0.02, 0.0, 0.1]] * 3
     assert new_place.tolist() == [3.25, 3.5, 3.75] and new_waypoint.tolist() == [4, 4, 4]
     assert new_poses[:, :2] == pytest.approx(np.array([[0.1, -0.2], [0.2, -0.4], [0.3, -0.6]]))
     turn = 2.0 * np.pi - 6.0
@@ -105,7 +110,7 @@ def test_way_time_and_energy_are_summed_over_settled_stretches():
     results["status"][lost] = PoseStatus.NOT_SETTLED
     results["q"][lost] = results["power"][lost] = np.nan
     sums = np.empty((3, 50))
-    add_up(poses, results, 0.03, (0.0, 0.0, 0.0), sums)
+    add_up(poses, results, 0.35, (0.0, 0.0, 0.0), sums)
     steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     durations = np.hypot(steps, np.nan_to_num(np.diff(results["q"][:, 0]))) / 0.03
     power = np.nan_to_num(results["power"])

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.prediction import crossing
+from rover_physics.prediction.path_kernels import Wheels
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -117,9 +118,9 @@ def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monk
     evaluate = first_failure.evaluator
 
     def counting(model):
-        def call(at, *held):
+        def call(at, *held, **motions):
             evaluated.append(len(at))
-            return evaluate(model)(at, *held)
+            return evaluate(model)(at, *held, **motions)
 
         return call
 
@@ -145,7 +146,7 @@ def test_crossings_end_where_a_stretch_ends():
     """Rows of a stretch that ends at a waypoint come before those of the next one."""
     rows = np.array([2, 1])
     rest = crossing.find_crossings(
-        bouldered(3), 0.1, np.zeros((1, 3)), crossing.new_results(1), lambda at: None
+        bouldered(3), Wheels(0.1, 0.5), np.zeros((1, 3)), crossing.new_results(1), lambda at: None
     )
     tied = replace(rest, place=np.ones(2), waypoint=rows, climbing=np.ones(2, bool),
                    poses=np.zeros((2, 3)), results=crossing.new_results(2))  # fmt: skip

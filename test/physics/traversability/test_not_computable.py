@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError, RoverError
 from rover_physics.names import EQUAL, OPTIMAL
-from rover_physics.prediction.evaluation import evaluate, new_works
+from rover_physics.prediction.evaluation import AHEAD, evaluate, new_works
 from rover_physics.prediction.map_sweep import NUMBERS as NUMBERS_OF_SCORE
 from rover_physics.prediction.map_sweep import PoseScores, score_all, score_poses
 from rover_physics.prediction.packed_model import pack_model
@@ -132,14 +132,14 @@ def model_of_infinite_weight():
 def test_a_pose_without_numbers_says_so_and_has_none():
     results = evaluate(model_of_infinite_weight().records, POSES)
     assert (results["status"] == PoseStatus.NOT_COMPUTABLE).all()
-    for name in set(results.dtype.names) - {"status"}:
+    for name in set(results.dtype.names) - {"status", "motion", "steering_angle", "wheel_speed"}:
         assert np.isnan(results[name]).all(), name
 
 
 def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
     model = model_of_infinite_weight()
     status, numbers = np.empty(5, np.int8), np.zeros((NUMBERS_OF_SCORE, 5), np.float32)
-    score_all(model.records, POSES, new_works(1, 5), (status, numbers), (0, 1))
+    score_all(model.records, (POSES, AHEAD), new_works(1, 5), (status, numbers), (0, 1))
     assert not PoseScores(status, *numbers).within_limits(LSR1).any()
     fine = sweep_path(LSR1, LEVEL, POSES)
     unsettled = replace(fine, status=status, settled=status == PoseStatus.SETTLED)
