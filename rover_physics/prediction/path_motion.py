@@ -21,8 +21,9 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.rover.steering import fastest_wheel
 
-SIDEWAYS = np.radians(5.0)
-"""Angle between heading and direction of travel [rad] up to which there is no sideways motion."""
+SIDEWAYS = np.radians(10.0)
+"""Angle between heading and direction of travel [rad] up to which there is no sideways motion:
+headings of a path may be rounded or noisy."""
 MAX_TURN = np.radians(100.0)
 """Largest turn of a step [rad] that is driven as an arc; corners of a grid turn by 90 degrees."""
 LONGEST = 0.5
