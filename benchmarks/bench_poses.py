@@ -93,10 +93,10 @@ def cells_looked_up(model: PackedModel, poses: np.ndarray) -> tuple[np.ndarray, 
     for i in np.flatnonzero(results["status"] == PoseStatus.SETTLED):
         place(model.record.linkage, poses[i], results[i].q, work.placement)
         placed = work.placement
-        axis = placed.R[:, 1]
-        rim = radius * (sines[:, None] * placed.forward - cosines[:, None] * placed.up)
-        for centre in placed.centres:
-            points = centre + rim[:, None] + laterals[:, None] * axis
+        for wheel, centre in enumerate(placed.centres):
+            forward, up = placed.forward[wheel], placed.up[wheel]
+            rim = radius * (sines[:, None] * forward - cosines[:, None] * up)
+            points = centre + rim[:, None] + laterals[:, None] * placed.axis[wheel]
             at = (points[..., :2] - corner) * scale
             middle, reach = (centre[:2] - corner) * scale, samples.reach * scale
             block_max = find_block_max(ground, middle[0], middle[1], reach, reach)

@@ -1,6 +1,7 @@
 """The settled cases of test/data, computed with MuJoCo: see test/data/README.md."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -8,12 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 
 DATA = Path(__file__).resolve().parents[1] / "test" / "data"
 FILES = ("settled_a.npz", "settled_b.npz")
+STEERED = "steered.npz"
+"""File of the cases with turned end wheels."""
+
+
+TURNED = ("rear_r", "mid_r", "front_r", "rear_l", "mid_l", "front_l")
+"""Names of the wheels in the files, in wheel order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,21 +41,32 @@ class ReferenceGround:
     """(n, 2) roll and pitch [rad]."""
     joints: np.ndarray
     """(n, 4) angles of rocker right and left, bogie right and left [rad]."""
+    curvature: np.ndarray
+    """(n,) curvature that the end wheels are turned for [1/m], 0 where none is turned."""
+    steering: np.ndarray
+    """(n, 6) steering angles [rad]."""
 
 
 @lru_cache(maxsize=1)
 def reference_grounds() -> tuple[ReferenceGround, ...]:
-    """Return all grounds of both files, with their cases."""
-    grounds = []
-    for file in FILES:
-        with np.load(DATA / file) as entries:
-            meta = json.loads(str(entries["meta"]))
-            names = sorted({row["terrain"] for row in meta["rows"]})
-            for name in names:
-                rows = [row for row in meta["rows"] if row["terrain"] == name]
-                terrain = Terrain(entries[f"terrain_{name}"], meta["res"], tuple(meta["origin"]))
-                grounds.append(_read_cases(f"{file[:-4]}/{name}", terrain, rows))
-    return tuple(grounds)
+    """Return all grounds of both files with straight wheels, with their cases."""
+    return tuple(ground for file in FILES for ground in _read_grounds(file))
+
+
+@lru_cache(maxsize=1)
+def steered_grounds() -> tuple[ReferenceGround, ...]:
+    """Return all grounds with turned wheels, with their cases."""
+    return tuple(_read_grounds(STEERED))
+
+
+def _read_grounds(file: str) -> Iterator[ReferenceGround]:
+    with np.load(DATA / file) as entries:
+        meta = json.loads(str(entries["meta"]))
+        names = sorted({row["terrain"] for row in meta["rows"]})
+        for name in names:
+            rows = [row for row in meta["rows"] if row["terrain"] == name]
+            terrain = Terrain(entries[f"terrain_{name}"], meta["res"], tuple(meta["origin"]))
+            yield _read_cases(f"{file[:-4]}/{name}", terrain, rows)
 
 
 def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGround:
@@ -63,6 +81,10 @@ def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGrou
         forces=np.array([row["force"] for row in rows]),
         attitude=column("roll", "pitch"),
         joints=column("rocker_r", "rocker_l", "bogie_r", "bogie_l"),
+        curvature=np.array([row.get("kappa", 0.0) for row in rows]),
+        steering=np.array(
+            [[row.get("steering", {}).get(wheel, 0.0) for wheel in TURNED] for row in rows]
+        ),
     )
 
 
@@ -72,6 +94,16 @@ def reference_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...
     rover = load_rover("lsr1")
     grounds = reference_grounds()
     return tuple((case, sweep_path(rover, case.terrain, case.poses)) for case in grounds)
+
+
+@lru_cache(maxsize=1)
+def steered_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
+    """Return the model's predictions for the cases with turned wheels under equal torques."""
+    rover = load_rover("lsr1")
+    return tuple(
+        (case, sweep_poses(rover, case.terrain, case.poses, case.curvature))
+        for case in steered_grounds()
+    )
 
 
 def reference_ground(label: str) -> ReferenceGround:

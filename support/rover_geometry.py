@@ -81,17 +81,30 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
     )  # fmt: skip
 
 
-def contact_frames(prediction: PathPrediction, i: int) -> np.ndarray:
+def wheel_axes(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
+    """Return the axles (6, 3) of the wheels, each turned about the z axis of its link."""
+    attitude, axes = attitude_of(prediction, i), []
+    for wheel, turn in enumerate(prediction.steering_angle[i]):
+        side, name = wheel // 3, ("rear", "middle", "front")[wheel % 3]
+        angle = prediction.rocker_angle[i, side]
+        if name != rover.suspension.rocker_wheel:
+            angle += prediction.bogie_angle[i, side]
+        link = Rotation.from_rotvec([0.0, angle, 0.0]) * Rotation.from_rotvec([0.0, 0.0, turn])
+        axes.append(attitude @ link.apply([0.0, 1.0, 0.0]))
+    return np.array(axes)
+
+
+def contact_frames(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
     """Return the unit vectors n, t, a of each wheel (6, 3, 3) from attitude and contact angle.
 
     n is the contact normal, a the wheel axis, t = a x n.
     """
-    a = attitude_of(prediction, i)[:, 1]
-    ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP))
+    a = wheel_axes(rover, prediction, i)
+    ahead = np.cross(a, UP) / np.linalg.norm(np.cross(a, UP), axis=1)[:, None]
     upward = np.cross(ahead, a)
     angle = prediction.contact_angle[i][:, None]
     n = np.cos(angle) * upward - np.sin(angle) * ahead
-    return np.stack([n, np.cross(a, n), np.broadcast_to(a, n.shape)], axis=1)
+    return np.stack([n, np.cross(a, n), a], axis=1)
 
 
 def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
@@ -142,7 +155,7 @@ def balance_residuals(rover: Rover, prediction: PathPrediction, i: int) -> np.nd
     """Return the residuals of the nine balance equations of waypoint i; see `balance_sums`."""
     placed = place_rover(rover, prediction, i)
     shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
-    forces = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(prediction, i))
+    forces = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(rover, prediction, i))
     acting = _on_wheels(prediction, i, placed, forces) + _weights(rover, placed)
     return balance_sums(rover, placed, acting)
 
@@ -169,7 +182,7 @@ def free_balance_matrix(
 
     All forces are in units of the weight; each wheel has an independent lateral force S.
     """
-    placed, frames = place_rover(rover, prediction, i), contact_frames(prediction, i)
+    placed, frames = place_rover(rover, prediction, i), contact_frames(rover, prediction, i)
     columns = []
     for kind in range(3):
         for wheel in range(6):
@@ -201,8 +214,8 @@ def wheel_gaps(rover: Rover, terrain: Terrain, prediction: PathPrediction, i: in
         prediction: The model's prediction.
         i: Index of the waypoint.
     """
-    axis = attitude_of(prediction, i)[:, 1]
-    return np.array([wheel_gap(rover, terrain, c, axis) for c in prediction.wheel_centres[i]])
+    wheels = zip(prediction.wheel_centres[i], wheel_axes(rover, prediction, i), strict=True)
+    return np.array([wheel_gap(rover, terrain, centre, axis) for centre, axis in wheels])
 
 
 def wheel_gap(rover: Rover, terrain: Terrain, centre: np.ndarray, axis: np.ndarray) -> float:

@@ -49,6 +49,17 @@ def path_across(seed: int, count: int = 24) -> np.ndarray:
     return np.column_stack([x, y, np.full(count, heading)])
 
 
+def arc_across(seed: int, size: float, count: int = 24) -> np.ndarray:
+    """Return an arc (count, 3) near the middle of a ground, of radius 0.5 or 1 m times `size`."""
+    rng = np.random.default_rng(seed)
+    radius, heading = rng.choice([-0.5, -1.0, 0.5, 1.0]) * size, rng.uniform(-np.pi, np.pi)
+    turn = np.linspace(0.0, 0.8 * size, count) / radius
+    x, y = radius * np.sin(turn), radius * (1.0 - np.cos(turn))
+    c, s = np.cos(heading), np.sin(heading)
+    start = rng.uniform(-0.3, 0.3, 2) * size
+    return np.column_stack([start[0] + c * x - s * y, start[1] + s * x + c * y, heading + turn])
+
+
 def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterator[Terrain]:
     """Yield maps with random height errors of the given standard deviations.
 

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics.files.config_files import find_config
 from rover_physics.names import WHEELS
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.traversability import judge_poses
 from rover_planner.cli import main
+from rover_planner.command import predict as predict_command
 from support.command_line import (
     N,
     assert_refused,
@@ -344,3 +347,95 @@ def test_a_disk_that_is_full_is_one_line_and_leaves_no_temporary_file(files, mon
     (files / "out.npz").symlink_to("/dev/full")
     assert_refused(capfd, main(predict_words(files)), "No space left on device")
     assert [path.name for path in files.iterdir() if path.name.startswith(".")] == []
+
+
+# Steering
+
+
+def write_poses(folder, curvature=None, count=5):
+    """Write poses along x, with curvatures if there are any."""
+    poses = np.column_stack([np.linspace(1.0, 3.0, count), np.full(count, 2.0), np.zeros(count)])
+    more = {} if curvature is None else {"curvature": np.array(curvature)}
+    np.savez(folder / "poses.npz", poses=poses, **more)
+
+
+def test_poses_with_curvature_are_taken_one_by_one(files):
+    write_poses(files, [0.0, 1.0, -1.0, np.inf, -np.inf])
+    assert main(predict_words(files)) == 0
+    with np.load(files / "out.npz") as out:
+        angles, speeds = out["steering_angle"], out["wheel_speed"]
+        assert bool(out["traversable"])
+        assert (angles[0] == 0.0).all() and speeds[0] == pytest.approx(np.full(6, 0.3))
+        assert angles[1, 5] == pytest.approx(np.arctan(0.4 / (1.0 - 0.31)))
+        assert angles[2] == pytest.approx(-angles[1, [3, 4, 5, 0, 1, 2]])
+        assert angles[3] == pytest.approx(angles[4])
+        assert speeds[3] == pytest.approx(-speeds[4]) and (speeds[3, :3] > 0.0).all()
+        assert out["time"].tolist() == [0.0] * 5 == out["energy"].tolist()
+
+
+def test_without_curvature_the_steering_follows_from_the_path(files):
+    turn = np.linspace(0.0, 1.0, 20)
+    poses = np.column_stack([2.0 + np.sin(turn), 2.0 - np.cos(turn), turn])
+    np.savez(files / "poses.npz", poses=poses)
+    assert main(predict_words(files)) == 0
+    with np.load(files / "out.npz") as path:
+        along = {name: path[name] for name in ("steering_angle", "wheel_speed", "wheel_loads")}
+        assert path["time"][-1] == pytest.approx(1.0 / 0.03)
+    np.savez(files / "poses.npz", poses=poses, curvature=np.ones(20))
+    assert main(predict_words(files)) == 0
+    with np.load(files / "out.npz") as single:
+        for name, values in along.items():
+            assert single[name] == pytest.approx(values), name
+
+
+@pytest.mark.parametrize(
+    ("curvature", "what"),
+    [
+        ([0.0, 0.0, np.nan, 0.0, 0.0], "curvature of pose 2 is nan"),
+        ([0.0, 0.0], "shape (2,); it must be numbers (5,)"),
+        (["a", "b", "c", "d", "e"], "it must be numbers (5,)"),
+    ],
+)
+def test_curvatures_that_are_none_are_refused(files, capfd, curvature, what):
+    write_poses(files, curvature)
+    assert_refused(capfd, main(predict_words(files)), what)
+
+
+def test_a_curve_tighter_than_the_wheels_allow_is_refused_at_its_pose(files):
+    rover = (find_config("rovers/lsr1.yaml")).read_text(encoding="utf-8")
+    (files / "stiff.yaml").write_text(rover.replace("limit: 1.57", "limit: 0.4"), encoding="utf-8")
+    write_poses(files, [0.0, 0.5, 1.0, -1.0, 0.0])
+    words = predict_words(files, rover=files / "stiff.yaml")
+    assert main([*words, "--classes", "--torque-ranges"]) == 0
+    with np.load(files / "out.npz") as out:
+        assert out["reason"].tolist() == [
+            "",
+            "",
+            "rear_left wheel needs a steering angle of -30.1 deg, limit 22.9 deg",
+            "rear_right wheel needs a steering angle of 30.1 deg, limit 22.9 deg",
+            "",
+        ]
+        assert int(out["first_failure"]) == 2
+        assert out["settled"].tolist() == [True, True, False, False, True]
+        for name in ("steering_angle", "wheel_speed", "wheel_loads", "torque_range"):
+            assert np.isnan(out[name][2:4]).all(), name
+        assert out["traversability_class"].tolist() == [
+            "passable", "passable", "impassable", "impassable", "passable",
+        ]  # fmt: skip
+        assert out["class_constraint"].tolist()[2] == "steering"
+
+
+def test_many_single_poses_are_predicted_part_by_part_as_a_few_are(files, monkeypatch):
+    bends = np.linspace(-2.0, 2.0, 50)
+    write_poses(files, bends, 50)
+    words = [*predict_words(files), "--friction", "0.3", "--policy", "optimal"]
+    assert main(words) == 0
+    with np.load(files / "out.npz") as out:
+        whole = {name: out[name] for name in out.files}
+    monkeypatch.setattr(predict_command, "MAX_IN_MEMORY", 10)
+    monkeypatch.setattr(judge_poses, "PART", 7)
+    assert main(words) == 0
+    with np.load(files / "out.npz") as out:
+        assert set(out.files) == whole.keys()
+        for name in out.files:
+            np.testing.assert_array_equal(out[name], whole[name], err_msg=name)

@@ -19,6 +19,7 @@ from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.verdict import judge
 from support.rough_grounds import fractal, plane, rocky
 from support.uncertain_grounds import (
+    arc_across,
     draw_path,
     path_across,
     step,
@@ -36,6 +37,32 @@ def bounds_on(rover, terrain, poses=PATH, sigmas=3.0, **arguments):
     return prediction, bound_path(
         rover, terrain, prediction, SweepOptions(**arguments), sigmas=sigmas
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
+def test_at_most_one_map_in_a_thousand_leaves_the_bounds_of_turned_wheels(rover):
+    size = rover.wheel.radius / LSR1.wheel.radius
+    waypoints = outside = 0
+    for terrain in uncertain_grounds(rover).values():
+        for seed, (length, std) in enumerate([(0.0, 0.005), (rover.wheel.radius, 0.003)]):
+            for policy in ("equal", "optimal"):
+                poses = arc_across(seed, size)
+                outcome = draw_path(rover, with_std(terrain, std), poses, length, 8, seed, policy)
+                waypoints += outcome.waypoints
+                outside += outcome.outside["any"]
+    assert waypoints > 2500
+    assert outside <= 1e-3 * waypoints
+
+
+def test_bounds_turn_the_wheels_as_the_prediction_does():
+    poses = arc_across(1, 1.0)
+    prediction, bounds = bounds_on(LSR1, with_std(fractal(2), 0.002), poses)
+    assert np.abs(prediction.steering_angle).max() > 0.3
+    assert bounds.bounded.all()
+    for name in BOUNDED_VALUES:
+        value, limit = getattr(prediction, name), getattr(bounds, name)
+        assert (limit[..., 0] <= value).all() and (value <= limit[..., 1]).all(), name
 
 
 @pytest.mark.slow

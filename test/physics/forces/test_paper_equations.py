@@ -207,7 +207,7 @@ def sides_of(rover: Rover, prediction: PathPrediction, i: int) -> Sides:
     """Cut both rockers off the body: eqs (12) to (15) give what they pass on."""
     placed, frame = place_rover(rover, prediction, i), frame_of(prediction, i)
     shares = [prediction.wheel_loads[i], prediction.tangential[i], prediction.lateral[i]]
-    on_wheels = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(prediction, i))
+    on_wheels = np.einsum("kw,wkx->wx", np.array(shares), contact_frames(rover, prediction, i))
     force, moment, bogie = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2)
     acting = [
         (on_wheels[k], prediction.contact_points[i, k], k // 3, placed.on_bogie[k])

@@ -1,0 +1,309 @@
+"""Motions along a path: arcs are arcs, however they are sampled, and unrelated poses are none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rover_physics.errors import PoseError
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.path_motion import motions_of
+from rover_physics.prediction.sweep import sweep_path, sweep_poses
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.model import Steering
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge_path import judge_path
+from support.rough_grounds import fractal, mirrored, plane, random_poses, smooth
+
+LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
+ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
+FIXED = replace(LSR1, steering=None)
+LEVEL = Terrain(np.zeros((401, 401)), 0.02, (-4.0, -4.0))
+SWAP = [3, 4, 5, 0, 1, 2]
+SPEED = LSR1.nominal_speed
+few = settings(max_examples=25)
+
+
+def motions(poses, rover=LSR1, backward=False, curvature=None):
+    model = pack_model(rover, LEVEL, SweepOptions(backward=backward))
+    return motions_of(model, np.array(poses, float), curvature)
+
+
+def straight(count=20, spacing=0.05, yaw=0.7):
+    way = spacing * np.arange(count)
+    return np.column_stack([way * np.cos(yaw), way * np.sin(yaw), np.full(count, yaw)])
+
+
+def arc(curvature, spacing=0.05, length=1.5, yaw=0.3):
+    turn = curvature * np.arange(0.0, length, spacing)
+    x, y = np.sin(turn) / curvature, (1.0 - np.cos(turn)) / curvature
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.column_stack([c * x - s * y, s * x + c * y, yaw + turn])
+
+
+def spot(turn=2.0 * np.pi, count=37):
+    return np.column_stack([np.zeros((count, 2)), np.linspace(0.0, turn, count)])
+
+
+def moved(poses, x):
+    """Return poses moved along the map's x."""
+    return np.column_stack([poses[:, 0] + x, poses[:, 1:]])
+
+
+def with_chord_headings(poses):
+    """Return poses that point to the next place, the last one as the one before it."""
+    ahead = np.arctan2(*np.diff(poses[:, :2], axis=0).T[::-1])
+    return np.column_stack([poses[:, :2], np.append(ahead, ahead[-1])])
+
+
+@few
+@given(st.floats(-3.1, 3.1), st.booleans())
+def test_a_straight_path_is_exactly_straight(yaw, backward):
+    poses = straight(yaw=yaw)[:: -1 if backward else 1]
+    speed = -SPEED if backward else SPEED
+    assert motions(poses, backward=backward).tolist() == [[speed, 0.0, 0.0]] * 20
+    prediction = sweep_path(LSR1, LEVEL, poses[5:15], SweepOptions(backward=backward))
+    assert (prediction.steering_angle == 0.0).all()
+    assert prediction.wheel_speed == pytest.approx(np.full((10, 6), speed / 0.1))
+
+
+def test_headings_from_the_differences_of_places_are_straight_too():
+    assert (motions(with_chord_headings(straight()))[:, 1:] == 0.0).all()
+
+
+@few
+@given(st.floats(0.2, 1.5), st.sampled_from([0.02, 0.05, 0.1, 0.3]), st.sampled_from([1.0, -1.0]))
+def test_an_arc_has_its_curvature_whatever_its_sampling(curvature, spacing, side):
+    found = motions(arc(side * curvature, spacing))
+    assert found[:, 0] == pytest.approx(np.full(len(found), SPEED))
+    assert (found[:, 1] == 0.0).all()
+    assert found[:, 2] == pytest.approx(np.full(len(found), side * curvature * SPEED))
+
+
+@few
+@given(st.floats(0.2, 1.5), st.sampled_from([0.05, 0.1, 0.3]))
+def test_an_arc_whose_headings_follow_its_chords_is_an_arc(curvature, spacing):
+    found = motions(with_chord_headings(arc(curvature, spacing)))
+    assert (found[:, 1] == 0.0).all()
+    assert found[1:-1, 2] == pytest.approx(np.full(len(found) - 2, curvature * SPEED), rel=0.02)
+
+
+def test_a_path_against_its_headings_is_driven_backwards():
+    poses = arc(0.8)
+    assert motions(poses[::-1]) == pytest.approx(-motions(poses))
+
+
+def test_the_same_place_with_other_headings_is_a_turn_on_the_spot():
+    found = motions(spot())
+    assert (found[:, :2] == 0.0).all()
+    fastest = SPEED / np.hypot(0.40, 0.31)
+    assert found[:, 2] == pytest.approx(np.full(37, fastest))
+    assert motions(spot(-2.0))[:, 2] == pytest.approx(np.full(37, -fastest))
+
+
+def test_repeated_waypoints_keep_the_motion_before_them():
+    poses = np.repeat(arc(0.8), 2, axis=0)
+    assert motions(poses)[1::2] == pytest.approx(motions(arc(0.8)))
+    assert motions(np.zeros((3, 3))).tolist() == [[SPEED, 0.0, 0.0]] * 3
+
+
+def test_a_single_pose_drives_ahead():
+    assert motions([[1.0, 2.0, 0.3]]).tolist() == [[SPEED, 0.0, 0.0]]
+
+
+def test_headings_a_few_degrees_off_are_no_crab():
+    poses = straight(yaw=0.0)
+    poses[:, 2] = np.radians(8.0)
+    assert motions(poses).tolist() == [[SPEED, 0.0, 0.0]] * 20
+
+
+def test_a_sideways_path_is_a_crab_for_a_rover_that_can():
+    poses = straight(yaw=0.0)
+    poses[:, 2] = -0.5
+    found = motions(poses, ALL_STEER)
+    expected = SPEED * np.array([np.cos(0.5), np.sin(0.5), 0.0])
+    assert found == pytest.approx(np.tile(expected, (20, 1)), abs=1e-15)
+    prediction, verdict = judge_path(ALL_STEER, LEVEL, poses)
+    assert verdict.traversable
+    assert prediction.steering_angle == pytest.approx(np.full((20, 6), 0.5))
+
+
+def test_a_crab_with_fixed_wheels_is_refused_by_wheel_and_angle():
+    poses = straight(yaw=0.0)
+    poses[:, 2] = -0.5
+    prediction, verdict = judge_path(LSR1, LEVEL, poses)
+    assert verdict.code == "steering" and verdict.first_failure == 0
+    assert verdict.reason == (
+        "middle_right wheel does not steer: the way leads 28.6 deg aside of its heading"
+    )
+    assert (prediction.status == PoseStatus.STEERING).all() and not prediction.settled.any()
+    assert np.isnan(prediction.wheel_loads).all() and np.isnan(prediction.wheel_speed).all()
+    assert judge_path(FIXED, LEVEL, poses)[1].traversable
+
+
+def test_a_curve_tighter_than_the_limit_is_refused_by_wheel_and_angle():
+    stiff = replace(LSR1, steering=Steering(("rear", "front"), 0.4, 0.35))
+    path = np.vstack([straight(10, yaw=0.0), moved(arc(1.0, yaw=0.0)[1:], 0.45)])
+    _, verdict = judge_path(stiff, LEVEL, path)
+    assert (verdict.code, verdict.first_failure) == ("steering", 10)
+    assert verdict.reason == (
+        "rear_left wheel needs a steering angle of -30.1 deg, limit 22.9 deg"
+    )
+    assert judge_path(stiff, LEVEL, arc(0.5))[1].traversable
+
+
+def test_the_swing_of_the_middle_axle_of_m2020_is_no_crab():
+    """Driven so that the fixed middle wheels, behind the origin, do not skid."""
+    turn = 0.6 * np.arange(0.0, 3.0, 0.2)
+    axle = np.column_stack([np.sin(turn), 1.0 - np.cos(turn)]) / 0.6
+    origin = axle + 0.304 * np.column_stack([np.cos(turn), np.sin(turn)])
+    found = motions(np.column_stack([origin, turn]), M2020)
+    assert (found[:, 1] == 0.0).all() and (found[:, 2] > 0.0).all()
+
+
+def test_poses_that_form_no_path_have_their_wheels_ahead():
+    for seed in range(50):
+        found = motions(random_poses(seed, 40, 0.5))
+        assert found.tolist() == [[SPEED, 0.0, 0.0]] * 40
+
+
+def test_a_long_step_leaves_the_way_open():
+    poses = np.vstack([arc(1.0), moved(arc(1.0), 5.0)])
+    found = motions(poses)
+    assert found[len(arc(1.0))].tolist() == [SPEED, 0.0, 0.0]
+    assert np.delete(found[:, 2], len(arc(1.0))) == pytest.approx(SPEED)
+
+
+def test_no_wheel_is_faster_than_its_drive():
+    fast = replace(LSR1, nominal_speed=0.1)
+    found = motions(arc(1.5), fast)
+    prediction = sweep_path(fast, LEVEL, arc(1.5))
+    assert found[0, 0] < 0.1 and found[0, 2] == pytest.approx(1.5 * found[0, 0])
+    assert np.abs(prediction.wheel_speed).max() == pytest.approx(LSR1.wheel.max_speed)
+
+
+# Given curvatures
+
+
+@few
+@given(st.floats(-3.0, 3.0))
+def test_a_given_curvature_is_the_one_of_the_arc(curvature):
+    found = motions([[0.0, 0.0, 0.3]], curvature=[curvature])[0]
+    assert found[2] == pytest.approx(curvature * found[0], abs=1e-7)
+
+
+def test_infinite_curvature_is_a_turn_on_the_spot_to_its_side():
+    left, right = motions(np.zeros((2, 3)), curvature=[np.inf, -np.inf])
+    assert left.tolist() == (-right).tolist() and left[2] > 0.0 and left[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("curvature", "what"),
+    [
+        ([0.0, np.nan, 0.0], "curvature of pose 1 is nan"),
+        ([0.0, 0.0], r"shape \(2,\); it must be \(3,\)"),
+        (["a", "b", "c"], "curvature is not numbers"),
+    ],
+)
+def test_curvatures_that_are_none_are_refused(curvature, what):
+    with pytest.raises(PoseError, match=what):
+        sweep_poses(LSR1, LEVEL, np.zeros((3, 3)), curvature)
+
+
+# What follows from the motions
+
+
+@few
+@given(st.integers(0, 10_000), st.floats(0.2, 1.5))
+def test_a_mirrored_curve_has_a_mirrored_result(seed, curvature):
+    ground, poses = smooth(seed), arc(curvature, length=0.5)
+    here = sweep_path(LSR1, ground, poses)
+    there = sweep_path(LSR1, *mirrored(ground, poses))
+    loose = 2e-3 * LSR1.weight
+    assert there.steering_angle == pytest.approx(-here.steering_angle[:, SWAP], abs=1e-9)
+    assert there.wheel_speed == pytest.approx(here.wheel_speed[:, SWAP], abs=1e-9)
+    assert there.wheel_loads == pytest.approx(here.wheel_loads[:, SWAP], abs=loose)
+    assert there.lateral == pytest.approx(-here.lateral[:, SWAP], abs=loose)
+    assert there.time == pytest.approx(here.time, rel=1e-3)
+
+
+def test_a_full_turn_on_level_ground_comes_back_with_equal_loads():
+    prediction, verdict = judge_path(LSR1, LEVEL, spot())
+    assert verdict.traversable
+    assert prediction.wheel_loads == pytest.approx(
+        np.tile(prediction.wheel_loads[0], (37, 1)), rel=1e-5
+    )
+    assert np.abs(prediction.tangential).max() <= 1e-4 * LSR1.weight
+
+
+def test_a_turn_on_the_spot_takes_the_time_of_its_outermost_wheel():
+    prediction = sweep_path(LSR1, LEVEL, spot())
+    assert prediction.time[-1] == pytest.approx(2.0 * np.pi * np.hypot(0.40, 0.31) / SPEED)
+    assert prediction.distance[-1] == 0.0
+
+
+def test_an_arc_takes_the_time_of_its_length():
+    prediction = sweep_path(LSR1, LEVEL, arc(1.0, spacing=0.3, length=1.6))
+    assert prediction.time[-1] == pytest.approx(1.5 / SPEED)
+
+
+def test_the_drive_waits_for_wheels_that_turn():
+    path = np.vstack([straight(11, yaw=0.0), moved(spot(np.pi, 19)[1:], 0.5)])
+    prediction = sweep_path(LSR1, LEVEL, path)
+    turning = np.arctan2(0.40, 0.31) / 0.35
+    step = np.pi / 18.0 * np.hypot(0.40, 0.31) / SPEED
+    assert np.diff(prediction.time)[10] == pytest.approx(max(turning, step))
+    quick = replace(LSR1, steering=replace(LSR1.steering, rate=0.01))
+    slow = sweep_path(quick, LEVEL, path)
+    assert np.diff(slow.time)[10] == pytest.approx(np.arctan2(0.40, 0.31) / 0.01)
+    assert slow.energy == pytest.approx(prediction.energy)
+
+
+def test_where_wheels_turn_the_rover_is_also_evaluated_with_turned_wheels():
+    path = np.vstack([straight(11, yaw=0.0), moved(spot(np.pi, 19)[1:], 0.5)])
+    between = sweep_path(LSR1, LEVEL, path).between
+    assert between.poses.tolist() == [[0.5, 0.0, 0.0]]
+    assert between.waypoint.tolist() == [11]
+    assert between.steering_angle[0, 2] == pytest.approx(np.arctan2(0.40, 0.31))
+
+
+def test_a_path_may_be_split_where_its_wheels_turn():
+    """The wheels turn at 0.5 m, where a turned wheel would be on the face of a step."""
+    x = np.tile(-3.0 + 0.02 * np.arange(301), (301, 1))
+    wall = Terrain(0.5 * np.clip((x - 1.01) / 0.02, 0.0, 1.0), 0.02, (-3.0, -3.0))
+    path = np.vstack([straight(11, yaw=0.0), moved(spot(1.0, 10)[1:], 0.5)])
+    whole = judge_path(LSR1, wall, path)[1]
+    halves = [judge_path(LSR1, wall, part)[1] for part in (path[:11], path[10:])]
+    assert halves[0].traversable
+    assert whole.traversable == halves[1].traversable
+
+
+def test_single_poses_have_no_way_between_them():
+    ground, poses = fractal(3), random_poses(2, 30, 1.0)
+    prediction = sweep_poses(LSR1, ground, poses, np.linspace(-2.0, 2.0, 30))
+    assert prediction.between is None and prediction.wheel_drop.max() == 0.0
+    assert (prediction.time[prediction.settled] == 0.0).all()
+    alone = sweep_poses(
+        LSR1, ground, poses[7:8], [prediction.motion[7, 2] / prediction.motion[7, 0]]
+    )
+    assert alone.wheel_loads[0] == pytest.approx(prediction.wheel_loads[7])
+
+
+@pytest.mark.parametrize("soil", ["dry_sand", None])
+def test_power_is_what_each_wheel_spends_on_its_own_way(soil):
+    prediction = sweep_path(LSR1, plane(0.05, 0.0), arc(1.0, length=0.6), SweepOptions(soil=soil))
+    speed = prediction.wheel_speed / (1.0 - prediction.slip_ratio)
+    spent = np.maximum(prediction.torque * speed, 0.0).sum(axis=1)
+    assert prediction.power == pytest.approx(spent)
+
+
+def test_on_soil_a_wheel_that_rolls_back_is_held_back_too():
+    on_the_spot = sweep_poses(
+        LSR1, LEVEL, np.zeros((1, 3)), [np.inf], SweepOptions(soil="dry_sand")
+    )
+    assert (np.sign(on_the_spot.torque[0]) == [1, 1, 1, -1, -1, -1]).all()
+    assert (on_the_spot.slip_ratio[0] > 0.0).all()
