@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rover_physics.errors import RoverError
     from rover_physics.prediction.map_sweep import PoseScores, score_poses, sweep_map
     from rover_physics.prediction.path_prediction import PathPrediction
-    from rover_physics.prediction.sweep import sweep_path, sweep_paths
+    from rover_physics.prediction.sweep import sweep_path, sweep_paths, sweep_poses
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.model import Rover
     from rover_physics.rover.rover_file import load_rover
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
     from rover_physics.traversability.classification import classify_path
     from rover_physics.traversability.judge_path import judge_path, judge_paths
+    from rover_physics.traversability.judge_poses import judge_poses
     from rover_physics.traversability.reach import judge_reach
     from rover_physics.traversability.torque_ranges import find_torque_ranges
     from rover_physics.traversability.verdict import Verdict
@@ -38,6 +39,7 @@ _HOMES = {
     "find_torque_ranges": "traversability.torque_ranges",
     "judge_path": "traversability.judge_path",
     "judge_paths": "traversability.judge_path",
+    "judge_poses": "traversability.judge_poses",
     "judge_reach": "traversability.reach",
     "load_rover": "rover.rover_file",
     "load_terrain": "terrain.grid",
@@ -46,6 +48,7 @@ _HOMES = {
     "sweep_map": "prediction.map_sweep",
     "sweep_path": "prediction.sweep",
     "sweep_paths": "prediction.sweep",
+    "sweep_poses": "prediction.sweep",
 }
 """Names of the API, and the module below this package that holds each."""
 
@@ -63,6 +66,7 @@ __all__ = [
     "find_torque_ranges",
     "judge_path",
     "judge_paths",
+    "judge_poses",
     "judge_reach",
     "load_rover",
     "load_terrain",
@@ -71,6 +75,7 @@ __all__ = [
     "sweep_map",
     "sweep_path",
     "sweep_paths",
+    "sweep_poses",
 ]
 
 

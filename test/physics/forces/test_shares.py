@@ -118,7 +118,7 @@ def test_in_a_crab_up_a_slope_the_tractions_carry_the_weight_along_it():
     assert prediction.steering_angle == pytest.approx(np.full((9, 6), np.pi / 2))
     expected = np.full((9, 6), LSR1.weight * np.sin(0.2) / 6.0)
     assert prediction.tangential == pytest.approx(expected, rel=1e-4)
-    assert np.abs(prediction.lateral).max() <= 1e-4 * LSR1.weight
+    assert np.abs(prediction.lateral).max() <= 1e-3 * LSR1.weight
 
 
 def test_contact_frames_are_those_of_the_turned_wheels():
