@@ -3,8 +3,9 @@
 The step from a waypoint to the next is a motion of constant speed and yaw rate, an arc. Waypoints
 have the motion of the step that leads to them, the first one that of the first step. Poses are
 sampled, and their headings may follow the chords of a curve. So a step counts as an arc without a
-sideways part if its direction is within SIDEWAYS plus half its turn of the heading halfway. Beyond
-this it is a sideways motion, a crab, if it hardly turns.
+sideways part if its direction is within SIDEWAYS plus half its turn of the heading halfway; steps
+on one straight line count together. Beyond this it is a sideways motion, a crab, if it hardly
+turns.
 
 Poses need not form a path. Long steps, and steps that turn and go sideways at once, are not
 driven, and the wheels point ahead. If no more than half the steps can be driven, the poses are
@@ -34,6 +35,8 @@ ON_THE_SPOT = 0.02
 """Radius of a curve [distances of the outermost wheel] up to which it is a turn on the spot."""
 AT_REST = 1e-6
 """Way of the wheels [wheelbases] up to which the rover rests."""
+COLLINEAR = 1e-6
+"""Angle between two steps [rad] up to which they are on one straight line."""
 STRAIGHT = 1e-6
 """Curvature [rad per wheelbase] up to which a step is straight."""
 
@@ -124,9 +127,12 @@ def write_curvature_motions(models, curvature, motions):
 def write_path_motions(models, poses, motions):
     """Write the motions of `path_motions`."""
     linkage, settings = models[0].linkage, models[0].settings
-    n, driven, open_steps = poses.shape[0], 0, 0
+    n, driven, open_steps, end, is_ahead = poses.shape[0], 0, 0, 0, False
     for i in range(1, n):
-        step = _find_motion(linkage, poses[i - 1], poses[i], motions[i])
+        if i > end:
+            end = _end_of_line(poses, i)
+            is_ahead = _is_line_ahead(poses[i - 1], poses[end])
+        step = _find_motion(linkage, poses[i - 1], poses[i], is_ahead, motions[i])
         if step == Step.DRIVEN:
             driven += 1
         elif step == Step.OPEN:
@@ -155,8 +161,38 @@ def write_path_motions(models, poses, motions):
 
 
 @kernel
-def _find_motion(linkage, here, there, motion):
-    """Write the motion of a step, of any speed: NaN at rest, zeros if open; return a Step."""
+def _end_of_line(poses, first):
+    """Return the last waypoint of the straight line that leads to waypoint `first` and beyond."""
+    dx, dy = poses[first, 0] - poses[first - 1, 0], poses[first, 1] - poses[first - 1, 1]
+    length, end = np.hypot(dx, dy), first
+    while end + 1 < poses.shape[0]:
+        x, y = poses[end + 1, 0] - poses[end, 0], poses[end + 1, 1] - poses[end, 1]
+        along, across = dx * x + dy * y, abs(dx * y - dy * x)
+        if not along > 0.0 or across > COLLINEAR * length * np.hypot(x, y):
+            break
+        end += 1
+    return end
+
+
+@kernel
+def _is_line_ahead(here, there):
+    """Return whether a straight line leads ahead or back, for the mean of its first and last yaw.
+
+    Headings may be interpolated along the line, such as between waypoints that are far apart.
+    """
+    dx, dy = there[0] - here[0], there[1] - here[1]
+    turn = (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
+    c, s = np.cos(here[2] + 0.5 * turn), np.sin(here[2] + 0.5 * turn)
+    aside = np.arctan2(abs(dy * c - dx * s), abs(dx * c + dy * s))
+    return abs(turn) <= MAX_TURN and aside <= SIDEWAYS + 0.5 * abs(turn)
+
+
+@kernel
+def _find_motion(linkage, here, there, is_ahead, motion):
+    """Write the motion of a step, of any speed: NaN at rest, zeros if open; return a Step.
+
+    `is_ahead` tells whether the line that the step is on leads ahead or back as a whole.
+    """
     dx, dy = there[0] - here[0], there[1] - here[1]
     turn = (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
     length, swing = np.hypot(dx, dy), linkage.reach * abs(turn)
@@ -175,7 +211,7 @@ def _find_motion(linkage, here, there, motion):
     c, s = np.cos(yaw), np.sin(yaw)
     ahead, aside = (dx * c + dy * s) / length, (dy * c - dx * s) / length
     rate = turn / (length * bulge(turn))
-    if abs(turn) <= MAX_TURN and _is_ahead(linkage, (ahead, aside, rate), turn):
+    if abs(turn) <= MAX_TURN and (is_ahead or _swings_out(linkage, (ahead, aside, rate), turn)):
         motion[0], motion[2] = (1.0 if ahead >= 0.0 else -1.0), rate
         return Step.DRIVEN
     if abs(turn) <= CRAB_TURN and length <= LONGEST_CRAB * linkage.length:
@@ -185,16 +221,13 @@ def _find_motion(linkage, here, there, motion):
 
 
 @kernel
-def _is_ahead(linkage, motion, turn):
-    """Return whether a motion (vx, vy, rate) of unit speed and a turn [rad] goes ahead or back.
+def _swings_out(linkage, motion, turn):
+    """Return whether the fixed wheels go ahead in a motion (vx, vy, rate) with a turn [rad].
 
-    The body origin may swing out if the fixed wheels do not, as in a car, whose rear axle follows
-    the curve.
+    The body origin may then swing out, as in a car, whose rear axle follows the curve.
     """
     ahead, aside, rate = motion
     allowed = SIDEWAYS + 0.5 * abs(turn)
-    if np.arctan2(abs(aside), abs(ahead)) <= allowed:
-        return True
     x, fixed = 0.0, 0
     for wheel in range(6):
         if not linkage.steers[wheel]:

@@ -121,6 +121,15 @@ def test_headings_a_few_degrees_off_are_no_crab():
     assert motions(poses).tolist() == [[SPEED, 0.0, 0.0]] * 20
 
 
+def test_headings_that_are_interpolated_along_a_line_are_no_crab():
+    """As between two waypoints far apart that follow a curve's chords."""
+    poses = straight(50, 0.02, yaw=0.0)
+    poses[:, 2] = np.linspace(0.0, 0.5, 50)
+    found = motions(poses)
+    assert (found[:, 1] == 0.0).all() and (found[:, 2] > 0.0).all()
+    assert judge_path(LSR1, LEVEL, poses)[1].traversable
+
+
 def test_a_sideways_path_is_a_crab_for_a_rover_that_can():
     poses = straight(yaw=0.0)
     poses[:, 2] = -0.5
