@@ -8,15 +8,15 @@ from rich.console import Console
 from rich.table import Table
 
 from rover_physics.rover.rover_file import load_rover
-from support.reference_cases import reference_predictions
+from support.reference_cases import reference_predictions, steered_predictions
 from support.reference_drives import PASSED, Drive, judge_drives
 
 
-def settled_errors() -> dict[str, np.ndarray]:
-    """Return absolute errors of all settled cases by quantity; the name has the unit."""
+def settled_errors(cases) -> dict[str, np.ndarray]:
+    """Return absolute errors of settled cases by quantity; the name has the unit."""
     errors: dict[str, list[np.ndarray]] = {}
     weight = load_rover("lsr1").weight
-    for case, prediction in reference_predictions():
+    for case, prediction in cases:
         centres = np.linalg.norm(prediction.wheel_centres - case.wheel_centres, axis=2)
         attitude = np.column_stack([prediction.roll, prediction.pitch]) - case.attitude
         joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle]) - case.joints
@@ -33,15 +33,15 @@ def settled_errors() -> dict[str, np.ndarray]:
     return {name: np.concatenate(parts) for name, parts in errors.items()}
 
 
-def settled_table() -> Table:
-    """Return the errors of the settled cases as a table."""
-    cases = sum(len(case.poses) for case, _ in reference_predictions())
-    settled = sum(int(prediction.settled.sum()) for _, prediction in reference_predictions())
-    table = Table(title=f"Settled cases: {settled} of {cases} settle")
+def settled_table(name: str, cases) -> Table:
+    """Return the errors of settled cases as a table."""
+    count = sum(len(case.poses) for case, _ in cases)
+    settled = sum(int(prediction.settled.sum()) for _, prediction in cases)
+    table = Table(title=f"{name}: {settled} of {count} settle")
     table.add_column("absolute error of")
     for heading in ("median", "95 %", "worst"):
         table.add_column(heading, justify="right")
-    for name, values in settled_errors().items():
+    for name, values in settled_errors(cases).items():
         found = np.median(values), np.percentile(values, 95), values.max()
         table.add_row(name, *(f"{value:.3f}" for value in found))
     return table
@@ -75,7 +75,8 @@ def _describe(drive: Drive) -> tuple[str, ...]:
 def main() -> None:
     """Print all tables."""
     console = Console()
-    console.print(settled_table())
+    console.print(settled_table("Settled cases", reference_predictions()))
+    console.print(settled_table("Settled with turned wheels", steered_predictions()))
     for policy in ("optimal", "equal"):
         with console.status(f"drives, {policy}"):
             table = drives_table(policy)

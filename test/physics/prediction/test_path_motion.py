@@ -280,15 +280,15 @@ def test_where_wheels_turn_the_rover_is_also_evaluated_with_turned_wheels():
     assert between.steering_angle[0, 2] == pytest.approx(np.arctan2(0.40, 0.31))
 
 
-def test_a_path_may_be_split_where_its_wheels_turn():
-    """The wheels turn at 0.5 m, where a turned wheel would be on the face of a step."""
-    x = np.tile(-3.0 + 0.02 * np.arange(301), (301, 1))
-    wall = Terrain(0.5 * np.clip((x - 1.01) / 0.02, 0.0, 1.0), 0.02, (-3.0, -3.0))
-    path = np.vstack([straight(11, yaw=0.0), moved(spot(1.0, 10)[1:], 0.5)])
+def test_wheels_that_turn_beside_a_wall_are_judged_whole_and_split_alike():
+    """The straight wheels pass the wall at 2 cm, the turned ones would be in it."""
+    y = np.tile(-3.0 + 0.02 * np.arange(301), (301, 1)).T
+    wall = Terrain(0.5 * np.clip((y - 0.37) / 0.02, 0.0, 1.0), 0.02, (-3.0, -3.0))
+    path = np.vstack([straight(11, yaw=0.0), moved(spot(0.3, 10)[1:], 0.5)])
     whole = judge_path(LSR1, wall, path)[1]
-    halves = [judge_path(LSR1, wall, part)[1] for part in (path[:11], path[10:])]
-    assert halves[0].traversable
-    assert whole.traversable == halves[1].traversable
+    before, after = (judge_path(LSR1, wall, part)[1] for part in (path[:11], path[10:]))
+    assert before.traversable and not after.traversable and after.first_failure == 0
+    assert (whole.first_failure, whole.code) == (11, after.code)
 
 
 def test_single_poses_have_no_way_between_them():
