@@ -137,27 +137,32 @@ def write_path_motions(models, poses, motions):
             driven += 1
         elif step == Step.OPEN:
             open_steps += 1
-    is_path = driven > open_steps
-    known = 0
+    first = 0  # first waypoint that a motion leads to
     for i in range(1, n):
         motion = motions[i]
         if motion[0] != motion[0]:
+            if first > 0:
+                _copy(motions[i - 1], motion)
             continue
-        if not is_path or (motion[0] == 0.0 and motion[1] == 0.0 and motion[2] == 0.0):
+        is_open = motion[0] == 0.0 and motion[1] == 0.0 and motion[2] == 0.0
+        if is_open or driven <= open_steps:
             motion[0], motion[1], motion[2] = settings.direction, 0.0, 0.0
         _take_nominal_speed(linkage, settings, motion)
-        first = known + 1 if known > 0 else 0
-        for k in range(first, i):
-            before = motions[known] if known > 0 else motion
-            motions[k, 0], motions[k, 1], motions[k, 2] = before[0], before[1], before[2]
-        known = i
-    for k in range(known + 1 if known > 0 else 0, n):
-        motions[k, 0], motions[k, 1], motions[k, 2] = settings.direction, 0.0, 0.0
-        if known > 0:
-            for j in range(3):
-                motions[k, j] = motions[known, j]
-        else:
-            _take_nominal_speed(linkage, settings, motions[k])
+        if first == 0:
+            first = i
+    if first == 0:
+        motions[0, 0], motions[0, 1], motions[0, 2] = settings.direction, 0.0, 0.0
+        _take_nominal_speed(linkage, settings, motions[0])
+        for i in range(1, n):
+            _copy(motions[0], motions[i])
+    for i in range(first):
+        _copy(motions[first], motions[i])
+
+
+@kernel
+def _copy(motion, to):
+    for k in range(3):
+        to[k] = motion[k]
 
 
 @kernel
