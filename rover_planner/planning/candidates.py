@@ -6,13 +6,15 @@ headings point along the chord. The fan adds cosine bumps across the chord. Thei
 both ends, so that both headings remain exact. Curves tighter than the smallest radius are dropped.
 If the direct connection is too tight (opposite headings, a goal behind the rover), the arcs and
 lines of Dubins (1957) are used instead. They connect any two poses with the smallest radius, so
-that at least one candidate exists.
+that at least one candidate exists. A rover that turns on the spot may also turn, drive straight
+ahead and turn again, if this is shorter than all curves.
 """
 
 import numpy as np
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.errors import PlanningError
+from rover_planner.planning.angles import wrap
 from rover_planner.planning.curve_kernels import (
     BumpedCurve,
     follow_curve,
@@ -20,6 +22,7 @@ from rover_planner.planning.curve_kernels import (
     turns_within,
 )
 from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.point_turn import turn_and_drive
 
 MIN_RADIUS = 0.8
 """Default smallest radius of a candidate [m]: the wheelbase of the LSR-1 preset.
@@ -50,6 +53,7 @@ def generate_candidates(
     spacing: float = 0.3,
     waypoint_spacing: float = 0.02,
     min_radius: float = MIN_RADIUS,
+    swing_radius: float | None = None,
 ) -> list[np.ndarray]:
     """Generate candidate paths from start to goal: the direct one first, then outwards.
 
@@ -60,12 +64,14 @@ def generate_candidates(
         spacing: Lateral distance between neighbouring candidates half-way [m].
         waypoint_spacing: Largest distance between waypoints along the path [m].
         min_radius: Radius of the tightest curve the rover may drive [m].
+        swing_radius: Distance of the outermost wheel from the body origin [m] if the rover turns
+            on the spot, None if not.
 
     Returns:
         One to `count` arrays (n, 3) of x, y [m] and yaw [rad, in -pi to pi], yaw along the
         tangent. The waypoints of a path are equidistant along it, at most `waypoint_spacing`
-        apart; the first is the start and the last the goal. A single pose if start and goal are
-        the same.
+        apart; the first is the start and the last the goal. A path with turns on the spot comes
+        last. A single pose if start and goal are the same.
 
     Raises:
         PlanningError: An argument is NaN or out of range, or the path has more than MAX_WAYPOINTS.
@@ -79,7 +85,7 @@ def generate_candidates(
     _check_length(start, goal, waypoint_spacing)
 
     chord = float(np.hypot(*(goal[:2] - start[:2])))
-    turn = abs(_wrap(goal[2] - start[2]))
+    turn = abs(wrap(goal[2] - start[2]))
     if chord <= _SAME_PLACE and turn <= _SAME_PLACE:
         return [goal[None, :].copy()]
 
@@ -88,6 +94,10 @@ def generate_candidates(
         paths = _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius)
     if not paths:
         paths = _build_arcs(start, goal, count, waypoint_spacing, min_radius)
+    if swing_radius is not None:
+        turned, length = turn_and_drive(start, goal, swing_radius, waypoint_spacing)
+        if length < min(path_length(path) for path in paths) - _SAME_PLACE:
+            paths = [*paths[: count - 1], turned]
     return [_pin_ends(path, start, goal) for path in paths]
 
 
@@ -181,16 +191,8 @@ class _Curve:
 def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """Replace the ends of a path by the exact start and goal, which removes rounding errors."""
     path[0], path[-1] = start, goal
-    path[:, 2] = _wrap(path[:, 2])
+    path[:, 2] = wrap(path[:, 2])
     return path
-
-
-def _wrap(angle):
-    """Wrap an angle [rad] into -pi to pi; angles inside stay unchanged."""
-    inside = np.abs(angle) <= np.pi
-    if inside.all():
-        return angle
-    return np.where(inside, angle, np.arctan2(np.sin(angle), np.cos(angle)))
 
 
 def _check_pose(name: str, pose) -> np.ndarray:
@@ -202,7 +204,7 @@ def _check_pose(name: str, pose) -> np.ndarray:
         raise PlanningError(f"{name} has shape {values.shape}; it is three numbers x, y, yaw")
     if not np.isfinite(values).all():
         raise PlanningError(f"{name} is {values.tolist()}; x, y and yaw must be finite")
-    values[2] = _wrap(values[2])
+    values[2] = wrap(values[2])
     return values
 
 

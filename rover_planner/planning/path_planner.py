@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.model import Rover
+from rover_physics.rover.turning import wheelbase
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
 from rover_planner.planning.path_geometry import rings_within
@@ -19,7 +20,6 @@ from rover_planner.planning.path_query import (
     PathQueryOptions,
     answer_path_query,
     check_path,
-    smallest_radius,
 )
 
 Pose = NDArray[np.float64]
@@ -90,7 +90,7 @@ class PathPlanner:
         It may if some path fails where the ground under the rover is also ground under a rover
         at an allowed goal. Other paths fail on the way, which leads to the other goals too.
         """
-        near = tolerance + smallest_radius(self.rover)
+        near = tolerance + wheelbase(self.rover)
         failures = [
             one.poses[one.verdict.first_failure] - goal
             for one in answer.candidates

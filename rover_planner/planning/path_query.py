@@ -12,6 +12,7 @@ from rover_physics.names import EQUAL
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
+from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
@@ -152,7 +153,7 @@ def answer_path_query(
     of it, as is done for a single candidate.
 
     Args:
-        rover: The rover; its wheelbase is the smallest radius of a candidate.
+        rover: The rover; its steering sets the smallest radius of a candidate.
         terrain: The ground, map frame.
         start: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
         goal: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
@@ -170,7 +171,8 @@ def answer_path_query(
         count=options.count,
         spacing=options.spacing,
         waypoint_spacing=options.waypoint_spacing,
-        min_radius=smallest_radius(rover),
+        min_radius=tightest_radius(rover),
+        swing_radius=swing_radius(rover) if can_turn_on_the_spot(rover) else None,
     )
     sweep_options = options.sweep_options(joint_angles)
     judged = judge_paths(
@@ -261,12 +263,3 @@ def path_risk(rover: Rover, verdict: Verdict) -> float:
         limits.tip_over_ratio / max(tip_over, 1e-9),
         limits.belly_clearance / max(belly, 1e-9),
     )
-
-
-def smallest_radius(rover: Rover) -> float:
-    """Return the smallest radius [m] of planned curves: the rover's wheelbase.
-
-    On such a curve the inner end wheels are steered by about 40 degrees.
-    """
-    wheels = rover.suspension.wheels
-    return float(wheels["front"][0] - wheels["rear"][0])

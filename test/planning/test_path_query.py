@@ -15,7 +15,6 @@ from rover_planner.planning.path_query import (
     check_path,
     choose,
     path_risk,
-    smallest_radius,
 )
 
 COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
@@ -142,11 +141,6 @@ def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):
     ]
     assert risks[0] == sure
     assert sure < risks[1] < risks[2] < 1.0
-
-
-def test_the_smallest_radius_is_the_wheelbase(rover):
-    assert smallest_radius(rover) == pytest.approx(0.8)
-    assert smallest_radius(load_rover("m2020")) == pytest.approx(2.26)
 
 
 def test_answers_are_frozen(rover):
