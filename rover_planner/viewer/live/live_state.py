@@ -88,6 +88,8 @@ class StateBuilder:
             attitude=np.array(values.attitude),
             rocker_angle=np.array(angles[:2]),
             bogie_angle=np.array(angles[2:]),
+            steering_angle=self._placement.steering.copy(),
+            motion=np.array([values.speed, 0.0, 0.0]),
             spin=np.array([values.joints.get(name, 0.0) for name in WHEEL_JOINTS]),
             wheel_centres=centres,
             contact_points=contacts,

@@ -31,7 +31,7 @@ MAX_MARGIN = 1.2
 
 
 def draw_dashboard(rover: Rover, state: RoverState, status: str) -> str:
-    """Return the dashboard as HTML: wheels from above, the front at the top.
+    """Return the dashboard as HTML: wheels from above, turned as steered, the front at the top.
 
     Beside each wheel are bars of its torque saturation and its slip ratio, below it its normal
     force; the wheel's colour is its friction utilisation.
@@ -70,10 +70,14 @@ def _wheel(state: RoverState, wheel: int, x: float, y: float, side: str) -> str:
     utilisation = float(state.friction_utilisation[wheel])
     bars = x - 45.0 if side == "left" else x + 17.0
     load = float(state.wheel_loads[wheel])
+    angle = math.degrees(float(state.steering_angle[wheel]))
+    turned = f", turned {angle:.0f} deg" if abs(angle) >= 0.5 else ""
     return (
         f'<rect x="{x - 11:.0f}" y="{y - 26:.0f}" width="22" height="52" rx="5" '
+        f'transform="rotate({-angle:.1f} {x:.0f} {y:.0f})" '
         f'fill="{to_css(colour_utilisation(utilisation))}" stroke="#333">'
-        f"<title>{WHEELS[wheel]}: friction utilisation {_number(utilisation, 2)}</title></rect>"
+        f"<title>{WHEELS[wheel]}: friction utilisation {_number(utilisation, 2)}{turned}"
+        "</title></rect>"
         + _bar(bars, y, float(state.torque_saturation[wheel]), to_css(LOAD), "torque saturation")
         + _bar(bars + 16, y, abs(float(state.slip_ratio[wheel])), to_css(TRACTION), "slip ratio")
         + f'<text x="{x:.0f}" y="{y + 38:.0f}" text-anchor="middle" fill="currentColor">'

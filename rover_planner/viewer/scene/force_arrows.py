@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.state.colours import LOAD, TRACTION
 from rover_planner.viewer.state.trajectory import RoverState
+from rover_planner.viewer.state.turning import find_axles
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""
@@ -18,6 +18,7 @@ class ForceArrows:
 
     def __init__(self, scene: Any, rover: Rover):
         """Add arrows of no length to the scene."""
+        self._rover = rover
         self._scale = WEIGHT_LENGTH * rover.wheel.radius / (rover.weight / 6.0)
         radius = rover.wheel.radius
         no_arrows = np.zeros((6, 2, 3))
@@ -31,10 +32,9 @@ class ForceArrows:
 
     def show(self, state: RoverState) -> None:
         """Draw the forces of a state, in proportion; one that is not known has no length."""
-        R = matrix_from_xyzw(xyzw_from_rpy(*state.attitude))
-        axis = R[:, 1]
+        axis = find_axles(self._rover, state)
         outwards = state.wheel_centres - state.contact_points
-        normal = outwards - np.outer(outwards @ axis, axis)
+        normal = outwards - (outwards * axis).sum(axis=1, keepdims=True) * axis
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         along = np.cross(axis, normal)
         points = state.contact_points

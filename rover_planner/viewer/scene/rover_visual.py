@@ -78,7 +78,8 @@ class RoverVisual:
             self._joints[f"rocker_{side}"].wxyz = wxyz_about_y(float(state.rocker_angle[k]))
             self._joints[f"bogie_{side}"].wxyz = wxyz_about_y(float(state.bogie_angle[k]))
         for k, wheel in enumerate(WHEELS):
-            self._joints[wheel].wxyz = wxyz_about_y(float(state.spin[k]))
+            turn = 0.0, float(state.spin[k]), float(state.steering_angle[k])
+            self._joints[wheel].wxyz = wxyz_from_rpy(*turn)
             self._tyres[k].color = colour_utilisation(float(state.friction_utilisation[k]))
 
     @property

@@ -12,6 +12,7 @@ from rover_planner.viewer.scene.force_arrows import ForceArrows
 from rover_planner.viewer.scene.ground_mesh import as_unlit_glb
 from rover_planner.viewer.scene.overlays import PathOverlay
 from rover_planner.viewer.scene.rover_visual import RoverVisual
+from rover_planner.viewer.scene.turning_centre import TurningCentre
 from rover_planner.viewer.state.trajectory import RoverState
 
 
@@ -42,6 +43,7 @@ class Scene:
         self._visual = RoverVisual(self._scene, rover, "/rover", arm_angles)
         self._forces = ForceArrows(self._scene, rover)
         self._forces.visible = self._forces_shown
+        self._centre = TurningCentre(self._scene, rover)
 
     def turn_arm(self, angles: Mapping[str, float]) -> None:
         """Show the arm at angles [rad] by joint name."""
@@ -58,11 +60,13 @@ class Scene:
         self._visual.visible = state is not None
         self._forces.visible = self._forces_shown and state is not None
         if state is None:
+            self._centre.show(None)
             self._last_position = None
             return
         with self._server.atomic():
             self._visual.show(state)
             self._forces.show(state)
+            self._centre.show(state)
             if self.follows and self._last_position is not None:
                 self._move_cameras(state.position - self._last_position)
         self._last_position = state.position

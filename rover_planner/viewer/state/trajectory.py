@@ -36,6 +36,10 @@ class RoverState:
     """(2,) [rad]."""
     bogie_angle: Floats
     """(2,) [rad]."""
+    steering_angle: Floats
+    """(6,) angles of the wheels about the z axes of their links [rad], positive to the left."""
+    motion: Floats
+    """(3,) motion of the body: forward and to the left [m/s], yaw rate [rad/s]."""
     spin: Floats
     """(6,) angles by which the wheels have turned [rad]."""
     wheel_centres: Floats
@@ -88,8 +92,9 @@ class Trajectory:
         rolled = (
             moves / rover.wheel.radius / (1.0 - np.clip(series["slip_ratio"], 0, MAX_SLIP))[1:]
         )
+        rolled *= np.where(prediction.wheel_speed[1:n] < 0.0, -1.0, 1.0)
         series["spin"] = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
-        series["speed"] = np.full(n, rover.nominal_speed)
+        series["speed"] = np.hypot(series["motion"][:, 0], series["motion"][:, 1])
         return {
             name: np.clip(np.nan_to_num(values), -MAX_VALUE, MAX_VALUE)
             for name, values in series.items()
