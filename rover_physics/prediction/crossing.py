@@ -176,7 +176,7 @@ class _Known:
 
 def limits_of(wheels: Wheels) -> JumpLimits:
     """Return the JumpLimits of a rover."""
-    radius, reach = wheels
+    radius, reach = wheels.radius, wheels.reach
     return JumpLimits(radius, MIN_SPACING, HEIGHT_JUMP * radius, reach)
 
 

@@ -1,9 +1,11 @@
 """Wheels that roll off an edge: where they fall, and how far they drop.
 
-A wheel slides down if its contact is behind it and steeper than friction can hold, whatever the
-motors do. If this lasts little more than a wheel's size, the wheel has rolled off an edge. Until
-it lands there is no equilibrium, and none is required; the height of the drop is a result. If it
-lasts longer, the wheel is on a slope that is too steep, and the usual limits apply.
+A wheel falls where its contact is behind it, and neither friction nor the motors balance it there.
+All wheels that are beyond their limits must be such wheels: else the rover cannot drive on. Where
+the forces balance, the wheel rolls down, held by the others. Down a face steeper than FACE it
+falls in any case: it would have to go down faster than the rover drives. Until it lands no balance
+is required; the height of the drop is a result. More friction or torque lets more wheels balance,
+so it never refuses a path that passes with less.
 """
 
 from dataclasses import dataclass
@@ -17,15 +19,13 @@ from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossing
 from rover_physics.prediction.path_kernels import Wheels, way_between
 
 MIN_ANGLE = np.radians(15.0)
-"""Least steepness [rad] of a contact from which a wheel falls, however low its friction."""
+"""Least steepness [rad] of a contact behind a wheel from which it falls."""
+FACE = np.radians(45.0)
+"""Steepness [rad] of a contact behind a wheel from which the ground is a face."""
 MAX_FALLING = 2
 """Most wheels that can fall at once: one axle. If there are more, the rover slides downhill."""
-ON_THE_EDGE = np.radians(-2.0)
-"""Contact angle [rad] below which a wheel rolls over an edge before it falls."""
 ROUNDING = 1e-9
 """Descent [m] below which it counts as zero."""
-MAX_FALL_LENGTH = 2.5
-"""Longest distance [wheel radii] the rover drives from before the edge to after the landing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ def find_falls(
     """Find where wheels fall along a path, and how far they drop.
 
     Args:
-        wheels: Size of wheels and rover.
+        wheels: Size of wheels and rover, and the limits of the forces.
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
         results: (n,) RESULT of each waypoint.
         crossings: Poses between the waypoints.
@@ -67,73 +67,67 @@ def find_falls(
 @allocating_kernel
 def _find_falls(wheels, poses, results, between):
     """Return the fields of `Falls`; `wheels` are Wheels, `between` holds PathPoints."""
-    radius = wheels.radius
     n, m = len(poses), len(between.place)
     order = np.empty(n + m, np.int64)
     _merge(n, between.place, order)
-    steps, distance = np.zeros(n + m), np.zeros(n + m)
-    angle, height = np.empty((n + m, 6)), np.empty((n + m, 6))
-    steep, turning = np.zeros((n + m, 6), np.bool_), np.zeros((n + m, 6), np.bool_)
-    last = poses[0]
+    steps = np.zeros(n + m)
+    height, falling = np.empty((n + m, 6)), np.zeros((n + m, 6), np.bool_)
+    angle, last = np.empty(6), poses[0]
     for k in range(n + m):
         i = order[k]
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
         steps[k] = way_between(last, here, wheels.reach)
-        distance[k] = steps[k] + (distance[k - 1] if k > 0 else 0.0)
-        if _read_contacts(result, angle[k], height[k]) < -MIN_ANGLE:
-            _find_steep(angle[k], result.friction, steep[k])
+        steepest = _read_contacts(result, angle, height[k])
+        if steepest < -MIN_ANGLE:
+            _find_falling(angle, result, wheels, falling[k])
         last = here
-    first_open = _find_first_open(distance, radius, angle, steep)
-    flat = np.empty(n + m, np.bool_)
-    for k in range(n + m):
-        flat[k] = not np.any(steep[k])
-    _keep_short_runs(distance, radius, steep)
-    _extend_to_edges(steep, angle, distance, radius, turning)
+    first_open = _find_first_open(falling)
+    _clear_open_runs(falling)
     fallen, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
-    _measure_drops(radius, height, steps, turning, fallen)
+    _measure_drops(wheels.radius, height, steps, falling, fallen)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
     decided, restart = 0, 0
     for k in range(n + m):
         i = order[k]
         if i < n and k < first_open:
             decided += 1
-            if flat[k] and not np.any(turning[k]) and not np.any(fallen[k] > 0.0):
+            if not np.any(falling[k]) and not np.any(fallen[k] > 0.0):
                 restart = i
         owner = i if i < n else between.waypoint[i - n]
         for wheel in range(6):
             drops[owner, wheel] = max(drops[owner, wheel], fallen[k, wheel])
             if i < n:
-                at_waypoints[i, wheel] = steep[k, wheel]
+                at_waypoints[i, wheel] = falling[k, wheel]
             else:
-                at_between[i - n, wheel] = steep[k, wheel]
+                at_between[i - n, wheel] = falling[k, wheel]
     return at_waypoints, at_between, drops, decided, restart
 
 
 @exact_kernel
-def _find_first_open(distance, radius, angle, steep):
-    """Return the first row whose falls depend on poses after the last row.
+def _is_held(result, wheels, wheel):
+    """Return whether a wheel is on the ground, within the limits of friction and torque."""
+    return (
+        result.wheel_loads[wheel] >= 0.0
+        and result.friction_utilisation[wheel] <= wheels.friction_limit
+        and result.torque_saturation[wheel] <= wheels.torque_limit
+    )
 
-    These are the rows of a run in `steep` (k, 6) that may still end as a short one, and the rows
-    before it, or before a run that may begin next, while a wheel rolls over.
+
+@exact_kernel
+def _find_first_open(falling):
+    """Return the first row (of k) whose falls depend on poses after the last row.
+
+    These are the rows of a run in `falling` (k, 6) that may still end with a landing.
     """
-    rows = distance.size
+    rows = falling.shape[0]
     first = rows
     for wheel in range(6):
-        before = rows - 1
-        while before >= 0 and steep[before, wheel]:
-            before -= 1
-        if before < rows - 1:
-            too_long = distance[rows - 1] - distance[before] > MAX_FALL_LENGTH * radius
-            if before < 0 or too_long:
-                continue
-            first = min(first, before + 1)
-        k = before
-        while (
-            k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[before] - distance[k] <= radius
-        ):
-            first = min(first, k)
-            k -= 1
+        start = rows
+        while start > 0 and falling[start - 1, wheel]:
+            start -= 1
+        if 0 < start < first:
+            first = start
     return first
 
 
@@ -168,55 +162,42 @@ def _read_contacts(result, angle, height):
 
 
 @exact_kernel
-def _find_steep(angle, friction, steep):
-    """Write (6,) True where the contact is behind the wheel and steeper than friction can hold.
+def _find_falling(angle, result, wheels, falling):
+    """Write (6,) True for wheels that fall.
 
-    All are False if the rover as a whole goes downhill: it then slides, and no wheel falls alone.
+    None falls if the rover as a whole goes downhill: it then slides.
     """
+    on_edges = True
+    for wheel in range(6):
+        if angle[wheel] >= -MIN_ANGLE and not _is_held(result, wheels, wheel):
+            on_edges = False
     count, others, least_held = 0, 0.0, np.inf
     for wheel in range(6):
-        mu = friction[wheel]
-        held = np.arctan(mu) if mu == mu else np.arctan(1.0)
-        least_held = min(least_held, held)
-        steep[wheel] = angle[wheel] < -max(held, MIN_ANGLE)
-        if steep[wheel]:
+        mu = result.friction[wheel]
+        least_held = min(least_held, np.arctan(mu) if mu == mu else np.arctan(1.0))
+        slips = angle[wheel] < -MIN_ANGLE and not _is_held(result, wheels, wheel)
+        falling[wheel] = angle[wheel] < -FACE or (on_edges and slips)
+        if falling[wheel]:
             count += 1
         elif angle[wheel] == angle[wheel]:
             others += angle[wheel]
     if count > MAX_FALLING or others / max(6 - count, 1) < -0.5 * least_held:
-        steep[:] = False
+        falling[:] = False
 
 
 @exact_kernel
-def _keep_short_runs(distance, radius, steep):
-    """Clear runs in `steep` (k, 6) that touch an end of the path or are longer than a fall."""
-    rows = distance.size
+def _clear_open_runs(falling):
+    """Clear runs in `falling` (k, 6) that touch an end of the path: no edge, or no landing."""
+    rows = falling.shape[0]
     for wheel in range(6):
-        start = 0
-        while start < rows:
-            end = start
-            while end < rows and steep[end, wheel]:
-                end += 1
-            inside = start > 0 and end < rows
-            if not inside or distance[end] - distance[start - 1] > MAX_FALL_LENGTH * radius:
-                steep[start:end, wheel] = False
-            start = end + 1
-
-
-@exact_kernel
-def _extend_to_edges(falling, angle, distance, radius, extended):
-    """Write `falling` (k, 6) into `extended`, with the rows before it while a wheel rolls over."""
-    rows = distance.size
-    for wheel in range(6):
-        for row in range(rows):
-            extended[row, wheel] = falling[row, wheel]
-        for row in range(rows - 1):
-            k = row if falling[row + 1, wheel] and not falling[row, wheel] else -1
-            while (
-                k >= 0 and angle[k, wheel] < ON_THE_EDGE and distance[row] - distance[k] <= radius
-            ):
-                extended[k, wheel] = True
-                k -= 1
+        k = 0
+        while k < rows and falling[k, wheel]:
+            falling[k, wheel] = False
+            k += 1
+        k = rows - 1
+        while k >= 0 and falling[k, wheel]:
+            falling[k, wheel] = False
+            k -= 1
 
 
 @exact_kernel

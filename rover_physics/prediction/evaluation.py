@@ -44,6 +44,7 @@ SETTINGS = record_type(
     ("friction", float),  # friction coefficient where the terrain has no friction layer
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
+    ("allowed_friction", float),  # largest friction utilisation within these
     ("control_margin", float),  # share of the limits left to the controller, for the results
     ("on_soil", np.bool_),  # whether the terrain or the options name soils; else Coulomb friction
     ("direction", float),  # 1 if the rover drives forwards, -1 if backwards

@@ -113,6 +113,7 @@ def _pack_request(
         allowed_torque=float(
             torque * rover.limits.torque_saturation * (1.0 - options.kept_margin)
         ),
+        allowed_friction=float(rover.limits.friction_utilisation * (1.0 - options.kept_margin)),
         control_margin=float(options.kept_margin),
         on_soil=on_soil,
         direction=options.direction,

@@ -17,12 +17,16 @@ STEEP_CONTACT = np.radians(25.0)
 
 
 class Wheels(NamedTuple):
-    """Size of a rover's wheels and of the rover."""
+    """Size of a rover's wheels and of the rover, and the limits of their forces."""
 
     radius: float
     """Wheel radius [m]."""
     reach: float
     """Distance of the outermost wheel from the body origin, seen from above [m]."""
+    friction_limit: float
+    """Largest friction utilisation with which the forces balance, at most 1."""
+    torque_limit: float
+    """Largest torque saturation with which the forces balance, at most 1."""
 
 
 class JumpLimits(NamedTuple):

@@ -15,7 +15,7 @@ from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import Crossings, Evaluate, find_crossings
-from rover_physics.prediction.drops import Falls, find_falls
+from rover_physics.prediction.drops import ROUNDING, Falls, find_falls
 from rover_physics.prediction.evaluation import AHEAD, NONE_HELD, RESULT, effort, evaluate
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Wheels, add_up
@@ -187,9 +187,18 @@ def evaluator(model: PackedModel) -> Evaluate:
 
 
 def wheels_of(model: PackedModel) -> Wheels:
-    """Return the wheel radius and the distance of the outermost wheel from the body origin."""
-    linkage = model.record.linkage
-    return Wheels(float(linkage.radius), float(linkage.reach))
+    """Return size and limits of the rover's wheels.
+
+    Forces beyond what friction and motors give never balance, whatever the safety limits.
+    """
+    linkage, settings = model.record.linkage, model.record.settings
+    torque = settings.allowed_torque / settings.max_torque
+    return Wheels(
+        float(linkage.radius),
+        float(linkage.reach),
+        min(float(settings.allowed_friction), 1.0) + ROUNDING,
+        min(float(torque), 1.0) + ROUNDING,
+    )
 
 
 def make_prediction(

@@ -146,7 +146,11 @@ def test_crossings_end_where_a_stretch_ends():
     """Rows of a stretch that ends at a waypoint come before those of the next one."""
     rows = np.array([2, 1])
     rest = crossing.find_crossings(
-        bouldered(3), Wheels(0.1, 0.5), np.zeros((1, 3)), crossing.new_results(1), lambda at: None
+        bouldered(3),
+        Wheels(0.1, 0.5, 1.0, 1.0),
+        np.zeros((1, 3)),
+        crossing.new_results(1),
+        lambda at: None,
     )
     tied = replace(rest, place=np.ones(2), waypoint=rows, climbing=np.ones(2, bool),
                    poses=np.zeros((2, 3)), results=crossing.new_results(2))  # fmt: skip

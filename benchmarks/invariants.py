@@ -1,0 +1,127 @@
+"""Verdicts of random rough paths with more friction or torque, in pieces, shifted, refined."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from rover_physics.names import EQUAL
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.verdict import Verdict
+from support.rough_grounds import bouldered, fractal, rocky
+
+GROUNDS = (bouldered, rocky, fractal)
+FRICTIONS = (0.3, 0.45, 0.6, 0.8, 1.0)
+"""Friction coefficients, from the least on."""
+TORQUES = (0.3, 0.6, 1.0, 2.0)
+"""Largest torques over that of the rover file, from the least on."""
+SHIFT = np.array([1234.56, -789.01, 0.0])
+"""Shift of map and path: x, y [m], and no turn."""
+
+
+def random_course(rover: Rover, seed: int) -> tuple[Terrain, np.ndarray]:
+    """Return a rough ground in the rover's size, and a straight path over it in any direction."""
+    rng = np.random.default_rng(seed)
+    ground = GROUNDS[seed % len(GROUNDS)](seed)
+    size = rover.wheel.radius / 0.1
+    terrain = Terrain(
+        ground.elevation * size, ground.resolution * size, tuple(np.multiply(ground.origin, size))
+    )
+    yaw, along = rng.uniform(-np.pi, np.pi), np.arange(-0.5, 0.5, 0.02) * size
+    x, y = rng.uniform(-0.4, 0.4, 2) * size
+    return terrain, np.column_stack(
+        [x + along * np.cos(yaw), y + along * np.sin(yaw), 0 * along + yaw]
+    )
+
+
+def ask(rover: Rover, terrain: Terrain, path: np.ndarray, options: SweepOptions) -> Verdict:
+    """Return the verdict of a path."""
+    return judge_path(rover, terrain, path, options)[1]
+
+
+def find_passing(
+    rover: Rover, terrain: Terrain, path: np.ndarray, options: SweepOptions
+) -> np.ndarray:
+    """Return (n,) True for waypoints without a reason at which no wheel is falling."""
+    prediction, verdict = judge_path(rover, terrain, path, options)
+    return np.array([not reason for reason in verdict.reasons]) & ~prediction.falling.any(axis=1)
+
+
+def count_changes(rover: Rover, count: int, first_seed: int, policy: str) -> Counter[str]:
+    """Return how often each change made a verdict worse, or another one, of so many courses."""
+    found: Counter[str] = Counter()
+    for seed in range(first_seed, first_seed + count):
+        found.update(changes_of(rover, seed, policy))
+    return found
+
+
+def changes_of(rover: Rover, seed: int, policy: str = EQUAL) -> Iterator[str]:
+    """Yield the names of the changes that a course did not stand, and "passes" if it passes."""
+    terrain, path = random_course(rover, seed)
+    friction = FRICTIONS[seed % len(FRICTIONS)]
+    options = SweepOptions(policy=policy, friction=friction)
+    verdict = ask(rover, terrain, path, options)
+    if verdict.traversable:
+        yield "passes"
+    by_friction = [
+        ask(rover, terrain, path, replace(options, friction=mu)).traversable for mu in FRICTIONS
+    ]
+    if by_friction != sorted(by_friction):
+        yield "more friction makes it worse"
+    by_torque = [
+        ask(
+            rover, terrain, path, replace(options, max_torque=share * rover.wheel.max_torque)
+        ).traversable
+        for share in TORQUES
+    ]
+    if by_torque != sorted(by_torque):
+        yield "more torque makes it worse"
+    if not all(_agrees_in_halves(rover, terrain, path, options, verdict)):
+        yield "splitting changes it"
+    place = (terrain.origin[0] + SHIFT[0], terrain.origin[1] + SHIFT[1])
+    shifted = ask(rover, replace(terrain, origin=place), path + SHIFT, options)
+    if shifted.traversable != verdict.traversable:
+        yield "shifting changes it"
+    middles = 0.5 * (path[1:] + path[:-1])
+    fine = np.insert(path, np.arange(1, len(path)), middles, axis=0)
+    if ask(rover, terrain, fine, options).traversable != verdict.traversable:
+        yield "refining changes it"
+
+
+def _agrees_in_halves(
+    rover: Rover, terrain: Terrain, path: np.ndarray, options: SweepOptions, verdict: Verdict
+) -> Iterator[bool]:
+    """Yield whether the two halves agree with the whole, split at waypoints that pass.
+
+    A path is trapped because of where it ends, so this verdict is not compared.
+    """
+    passing = find_passing(rover, terrain, path, options)
+    for row in (len(path) // 3, len(path) // 2, 2 * len(path) // 3):
+        if not passing[row]:
+            continue
+        parts = [ask(rover, terrain, part, options) for part in (path[: row + 1], path[row:])]
+        if "trapped" in {verdict.code, *(part.code for part in parts)}:
+            continue
+        yield all(part.traversable for part in parts) == verdict.traversable
+
+
+def main(
+    count: Annotated[int, typer.Option(help="Courses for each rover.")] = 1000,
+    seed: Annotated[int, typer.Option(help="First seed.")] = 0,
+    policy: Annotated[str, typer.Option(help="Torque policy.")] = EQUAL,
+) -> None:
+    """Print how many courses did not stand each change."""
+    for name in ("lsr1", "m2020"):
+        found = count_changes(load_rover(name), count, seed, policy)
+        print(f"{name}, {policy}: {count} courses, {found.pop('passes', 0)} pass; {dict(found)}")
+
+
+if __name__ == "__main__":
+    typer.run(main)
