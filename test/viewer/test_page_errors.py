@@ -139,7 +139,7 @@ def test_all_candidates_are_judged_after_a_change_though_drawing_has_stopped(pag
     friction = next(v for v in page.rover_tab._sliders._sliders if v.label == "friction [-]")
     do(page, lambda: page._change_value(friction, 0.4))
     wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
-    wait_until(lambda: "0 of 3 candidate paths" in page.drive_tab._verdict.content, "the answer")
+    wait_until(lambda: "0 of 5 candidate paths" in page.drive_tab._verdict.content, "the answer")
 
 
 def test_a_path_that_does_not_exist_is_refused_by_its_number(page):

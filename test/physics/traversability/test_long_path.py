@@ -52,6 +52,7 @@ CASES = {
     "margin": (GROUND, line(3.0), SweepOptions("optimal", control_margin=0.3, friction=0.5)),
     "stairs": (steps_down(0.03), line(0.0), SweepOptions(friction=0.9)),
     "high stairs": (steps_down(0.05), line(0.0), SweepOptions("optimal", friction=0.9)),
+    "ledges": (steps_down(0.16), line(0.0), SweepOptions()),
     "unknown ground": (unknown(8.0), line(), SweepOptions()),
     "unknown from the start": (unknown(0.0), line(), SweepOptions()),
 }
