@@ -9,7 +9,7 @@ import json
 import multiprocessing
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -44,8 +44,10 @@ MIN_LOAD = 0.02
 """Load above which the utilisation of a wheel counts, in sixths of the weight."""
 SERVO_CONTROLLER, EQUAL_CONTROLLER = "servo", "equal"
 MOTION_CONTROLLER, MAP_CONTROLLER = "optimal", "optimal, map"
+DROOP_CONTROLLER = "servo with droop"
 CONTROLLERS = (SERVO_CONTROLLER, EQUAL_CONTROLLER, MOTION_CONTROLLER, MAP_CONTROLLER)
-"""Speed servos, equal torques, and the QP with contact angles from motion or from the map."""
+"""Speed servos, equal torques, and the QP with contact angles from motion or from the map. The
+servos have an integral part; those with droop, of benchmarks.servos, have none."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,9 @@ def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain
     if name == SERVO_CONTROLLER:
         rates = np.full(6, SPEED / rover.wheel.radius)
         return lambda plant: plant.servo(rates, PERIOD)
+    if name == DROOP_CONTROLLER:
+        rates, droop = np.full(6, SPEED / rover.wheel.radius), rover.wheel.servo_droop
+        return lambda plant: plant.servo_with_droop(rates, droop, PERIOD)
     policy = EQUAL if name == EQUAL_CONTROLLER else OPTIMAL
     parameters = TractionControllerParameters(policy=policy, friction=obstacle.friction)
     service = TractionService(load_traction_settings(parameters))
@@ -122,7 +127,7 @@ def drive(obstacle: Obstacle, name: str, trace: list | None = None) -> Drive:
     If `trace` is given, each period appends a row to it: time [s], x [m], loads (6) [N],
     torques (6) [N m], peak utilisation.
     """
-    rover, ground = load_rover("lsr1"), make_ground(obstacle)
+    rover, ground = replace(load_rover("lsr1"), nominal_speed=SPEED), make_ground(obstacle)
     plant = MujocoRover(rover, ground, (START, 0.0, 0.0), obstacle.friction)
     control = make_controller(name, rover, obstacle, ground)
     sums, peaks = np.zeros(4), []

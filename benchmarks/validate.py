@@ -77,7 +77,7 @@ def main() -> None:
     console = Console()
     console.print(settled_table("Settled cases", reference_predictions()))
     console.print(settled_table("Settled with turned wheels", steered_predictions()))
-    for policy in ("optimal", "equal"):
+    for policy in ("optimal", "servo", "equal"):
         with console.status(f"drives, {policy}"):
             table = drives_table(policy)
         console.print(table)

@@ -25,6 +25,9 @@ SUSPENSION_JOINTS = ("rocker_right", "rocker_left", "bogie_right", "bogie_left")
 WHEEL_JOINTS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
 """Names of the wheel drive joints in joint messages, in wheel order."""
 
-EQUAL, OPTIMAL = "equal", "optimal"
-TORQUE_POLICIES = (EQUAL, OPTIMAL)
-"""Torque policies: equal torques on all wheels; the torques that need the least friction."""
+EQUAL, SERVO, OPTIMAL = "equal", "servo", "optimal"
+TORQUE_POLICIES = (EQUAL, SERVO, OPTIMAL)
+"""Torque policies: equal torques on all wheels; the torques of speed servos; the torques that need
+the least friction."""
+CONTROL_POLICIES = (EQUAL, OPTIMAL)
+"""Torque policies of the traction controller, which commands torques."""

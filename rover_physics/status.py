@@ -57,3 +57,5 @@ class TorquePolicy(IntEnum):
     """Equal traction on all wheels."""
     OPTIMAL = 1
     """The torques that need the least friction, as traction control can apply them."""
+    SERVO = 2
+    """What speed servos at the rate of the commanded motion bring about."""

@@ -13,12 +13,14 @@ from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.traversability import classification
 
 PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)
+WITH_SPEED_SERVOS = ColorRGBA(r=0.65, g=0.80, b=0.15, a=1.0)
 WITH_TRACTION_CONTROL = ColorRGBA(r=0.95, g=0.65, b=0.10, a=1.0)
 IMPASSABLE = ColorRGBA(r=0.85, g=0.15, b=0.10, a=1.0)
 CONTACT = ColorRGBA(r=0.15, g=0.35, b=0.85, a=0.8)
 
 _COLOURS = {
     classification.PASSABLE: PASSABLE,
+    classification.WITH_SPEED_SERVOS: WITH_SPEED_SERVOS,
     classification.WITH_TRACTION_CONTROL: WITH_TRACTION_CONTROL,
     classification.IMPASSABLE: IMPASSABLE,
 }

@@ -13,6 +13,7 @@ import numpy as np
 from rover_physics.bounds.forces import MAX_SOILS
 from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
 from rover_physics.errors import ModelError
+from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import forget_models, pack_model
 from rover_physics.prediction.path_bounds import PathBounds
@@ -77,13 +78,18 @@ def bound_path(
         layer or there are no standard deviations.
 
     Raises:
-        ModelError: `sigmas` is negative or not a number, an option that this rover cannot have, or
-            a terrain with too many soils.
+        ModelError: `sigmas` is negative or not a number, an option that this rover cannot have, a
+            terrain with too many soils, or policy "servo".
         SoilError: As `sweep_path`.
     """
     allowed = check_sigmas(sigmas)
     if terrain.elevation_std is None or allowed == 0.0:
         return None
+    if options.policy == SERVO:
+        raise ModelError(
+            f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
+            f"sigmas, or use {EQUAL!r} or {OPTIMAL!r}"
+        )
     if len(terrain.soil_names) >= MAX_SOILS:
         raise ModelError(
             f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "

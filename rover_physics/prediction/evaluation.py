@@ -9,6 +9,8 @@ from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS
 from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces
+from rover_physics.forces.servo_pose import balance_servos, write_servo_forces
+from rover_physics.forces.servo_record import SERVO
 from rover_physics.forces.soil import SoilWheel, coulomb_slip, effective_friction, solve_wheel
 from rover_physics.forces.soil_sharing import rolling_direction, share_forces_on_soil
 from rover_physics.forces.stability import CORNERS
@@ -30,8 +32,8 @@ from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
 CHUNK, MAX_CHUNKS = 16, 64
 """Least number of poses per chunk, and largest number of chunks, enough to keep all cores busy.
 The poses of a chunk share one work space."""
-OPTIMAL_EFFORT = 5
-"""Time of a pose with optimal torques over that of a pose with equal torques."""
+EFFORT = {TorquePolicy.EQUAL: 1, TorquePolicy.OPTIMAL: 5, TorquePolicy.SERVO: 2}
+"""Time of a pose with a policy over that of a pose with equal torques."""
 NONE_HELD = np.empty((0, 6, 2))
 """Value of `held` if no wheel climbs a face."""
 AHEAD = np.empty((0, 3))
@@ -40,12 +42,14 @@ of the settings."""
 
 
 SETTINGS = record_type(
-    ("policy", np.int64),  # TorquePolicy.EQUAL or OPTIMAL
+    ("policy", np.int64),  # a TorquePolicy
     ("friction", float),  # friction coefficient where the terrain has no friction layer
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
     ("allowed_friction", float),  # largest friction utilisation within these
     ("control_margin", float),  # share of the limits left to the controller, for the results
+    ("servo_droop", float),  # share of the nominal speed that a servo loses at full torque
+    ("friction_share", float),  # share of the friction that policy SERVO may use
     ("on_soil", np.bool_),  # whether the terrain or the options name soils; else Coulomb friction
     ("direction", float),  # 1 if the rover drives forwards, -1 if backwards
     ("speed", float),  # speed of the wheels over the ground [m/s]
@@ -83,6 +87,11 @@ RESULT = record_type(
     ("tip_over_force_angle", float),
     ("belly_clearance", float),
     ("power", float),
+    ("speed_share", float),
+    ("stalls", float),
+    ("deviation", float, (3,)),
+    ("lift_rate", float, (6,)),
+    ("slip_speed", float, (6,)),
     ("motion", float, (3,)),
     ("steering_angle", float, (6,)),
     ("wheel_speed", float, (6,)),
@@ -101,6 +110,7 @@ WORK = record_type(
     ("cells", CELL_SEARCH),  # search between the rims of a wheel
     ("balance", BALANCE),  # forces as linear functions of the torques
     ("search", TORQUE_SEARCH),  # the chosen forces
+    ("servo", SERVO),  # forces and motion under policy SERVO
     ("J", float, (6, 6)),  # derivatives of the gaps by q
     ("step", float, (6, 1)),  # Newton step
     ("lifts", float, (6, 6)),  # changes of q, one column for each wheel, that raise this wheel
@@ -178,7 +188,7 @@ def new_works(threads: int, poses: int) -> Any:
 
 def effort(settings, poses: int) -> int:
     """Return the time of a sweep over `poses` poses, relative to one pose with equal torques."""
-    return poses * (1 if settings["policy"] == TorquePolicy.EQUAL else OPTIMAL_EFFORT)
+    return poses * EFFORT[TorquePolicy(int(settings["policy"]))]
 
 
 @kernel
@@ -238,9 +248,7 @@ def evaluate_pose(model, work, result):
     status = settle(model, work) if work.can_follow else PoseStatus.STEERING
     if status == PoseStatus.SETTLED:
         place_masses(linkage, work.q, work.placement)
-        equal = model.settings.policy == TorquePolicy.EQUAL
-        columns = 1 if equal else 1 + FREE_FORCES
-        if not balance_forces(linkage, work.placement, work.contacts, columns, work.balance):
+        if not _balance(model, work):
             status = PoseStatus.NO_EQUILIBRIUM
     result.status = status
     if status != PoseStatus.SETTLED:
@@ -257,6 +265,16 @@ def evaluate_pose(model, work, result):
     if not _is_computable(result):
         result.status = PoseStatus.NOT_COMPUTABLE
         _forget(result)
+
+
+@kernel
+def _balance(model, work):
+    """Solve the equilibrium for the policy; return False if it is singular."""
+    linkage, policy = model.linkage, model.settings.policy
+    if policy == TorquePolicy.SERVO:
+        return balance_servos(model, work)
+    columns = 1 if policy == TorquePolicy.EQUAL else 1 + FREE_FORCES
+    return balance_forces(linkage, work.placement, work.contacts, columns, work.balance)
 
 
 @kernel
@@ -286,7 +304,11 @@ def _forget(result):
         result.torque_saturation[k] = result.sinkage[k] = np.nan
         result.motion_resistance[k] = np.nan
     result.tip_over_ratio = result.tip_over_force_angle = np.nan
-    result.belly_clearance = result.power = np.nan
+    result.belly_clearance = result.power = result.speed_share = np.nan
+    result.stalls = np.nan
+    result.deviation[:] = np.nan
+    result.lift_rate[:] = np.nan
+    result.slip_speed[:] = np.nan
 
 
 @kernel
@@ -310,6 +332,13 @@ def _write_geometry(placement, contacts, result):
 @kernel
 def _write_forces(model, work, result):
     ground, linkage, settings = model.ground, model.linkage, model.settings
+    if settings.policy == TorquePolicy.SERVO:
+        write_servo_forces(model, work, result)
+        return
+    result.speed_share, result.stalls = 1.0, 0.0
+    result.deviation[:] = 0.0
+    result.lift_rate[:] = 0.0
+    result.slip_speed[:] = 0.0
     search, point = work.search, work.contacts.point
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):

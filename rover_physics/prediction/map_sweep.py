@@ -43,7 +43,8 @@ class PoseScores:
     status: NDArray[np.int8]
     """PoseStatus of each pose."""
     friction_utilisation: SingleFloats
-    """Largest of the six wheels; infinite where a wheel lifts off."""
+    """Largest of the six wheels; infinite where a wheel lifts off, and with speed servos where no
+    forward speed balances."""
     torque_saturation: SingleFloats
     """Largest of the six wheels."""
     least_load: SingleFloats
@@ -168,6 +169,8 @@ def _write_score(result, i, numbers):
             numbers[k, i] = np.nan
         return
     use, saturation, least = 0.0, 0.0, np.inf
+    if not result.speed_share > 0.0:
+        use = np.inf
     for wheel in range(6):
         use = max(use, result.friction_utilisation[wheel])
         saturation = max(saturation, result.torque_saturation[wheel])

@@ -65,7 +65,7 @@ def sweep_in_parts(
             done = start + decided
         if falls.restart:
             reached = slice(falls.restart + 1)
-            sums = sum_up(model, here[reached], results[reached], sums)
+            sums = sum_up(model, here[reached], results[reached], crossings, sums)
             start, size = start + falls.restart, PART
         else:
             size *= 2  # no waypoint to begin from: the next part is longer

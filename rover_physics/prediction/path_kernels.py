@@ -219,6 +219,7 @@ def add_up(poses, results, rate, start, sums):
             duration = _drive_time(
                 step, climb, turn_between(poses[i - 1], poses[i]), result.motion
             )
+            duration /= 0.5 * (_speed_share(result) + _speed_share(before))
             distance += step
             energy += 0.5 * (_power(result) + _power(before)) * duration
             time += max(duration, _largest_change(before, result) / rate)
@@ -258,6 +259,13 @@ def _largest_change(before, after):
 @exact_kernel
 def _power(result):
     return result.power if result.status == PoseStatus.SETTLED else 0.0
+
+
+@exact_kernel
+def _speed_share(result):
+    """Return the share of the nominal speed at a pose; 1 where none is known."""
+    share = result.speed_share
+    return share if result.status == PoseStatus.SETTLED and share > 0.0 else 1.0
 
 
 @exact_kernel

@@ -52,10 +52,11 @@ class PathPrediction:
     """(n, 6) friction coefficient mu at the contact; on yielding soil: the largest drawbar pull
     over the wheel load."""
     friction_utilisation: Floats
-    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that lifts off. On
-    yielding soil: (T, S) relative to the largest forces in their direction."""
+    """(n, 6) sqrt(T^2 + S^2) / (mu N), the paper's S_r; infinite for a wheel that lifts off, 0
+    under policy "servo". On yielding soil: (T, S) relative to the largest forces in their
+    direction."""
     slip_ratio: Floats
-    """(n, 6) i = 1 - v / (r omega) from the soil model."""
+    """(n, 6) i = 1 - v / (r omega), from the soil model or from the servos."""
     torque_saturation: Floats
     """(n, 6) |torque| / largest torque."""
     sinkage: Floats
@@ -70,12 +71,32 @@ class PathPrediction:
     """(n,) smallest height of the underside above the ground [m]."""
     power: Floats
     """(n,) mechanical power of the wheel motors; braking motors count as 0 [W]."""
+    speed_share: Floats
+    """(n,) share of the commanded motion that the rover makes: 0 where no forward speed balances;
+    always 1 under other policies than "servo"."""
+    stalls: Floats
+    """(n,) why no forward speed balances: 0 the wheels slide, 1 the motors stall, 2 a wheel is
+    wedged between faces in front and behind; 0 where one does."""
+    slip_speed: Floats
+    """(n, 6) speed at which the treads slide over the ground under policy "servo" [m/s]."""
+    lift_rate: Floats
+    """(n, 6) speed at which wheels lift off the ground under policy "servo", over the nominal
+    speed."""
+    lift_height: Floats
+    """(n, 6) height to which wheels have lifted under policy "servo" [m]."""
+    deviation: Floats
+    """(n, 3) motion beyond the share of the commanded one under policy "servo": forward and to the
+    left, over the nominal speed, and turning left, [rad] per metre of nominal way."""
+    drift: Floats
+    """(n, 2) turn [rad] and way [m] off the path that build up within the last wheelbase under
+    policy "servo"."""
     energy: Floats
     """(n,) mechanical energy spent since the first waypoint; poses that are not settled count as
     0 W [J]."""
     time: Floats
-    """(n,) time since the first waypoint at nominal speed [s]. Where wheels take longer to turn
-    than the drive from a waypoint to the next, the drive waits for them."""
+    """(n,) time since the first waypoint at nominal speed, under policy "servo" at the share of it
+    that is made [s]. Where wheels take longer to turn than the drive from a waypoint to the next,
+    the drive waits for them."""
     motion: Floats
     """(n, 3) nominal motion of the body origin on the way to the waypoint, body frame: vx, vy
     [m/s] and yaw rate [rad/s]; that of the first waypoint leads on from there. It is also known
@@ -97,7 +118,7 @@ class PathPrediction:
     waypoint: NDArray[np.int64]
     """(n,) index of the waypoint of a row: its own, or the next one for a pose in between."""
     policy: str
-    """Torque policy: "equal" or "optimal"."""
+    """Torque policy: "equal", "servo" or "optimal"."""
     control_margin: float = 0.0
     """Share of the limits of friction and torque that is left to the controller."""
     bounds: PathBounds | None = None

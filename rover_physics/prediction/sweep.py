@@ -21,9 +21,15 @@ from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Wheels, add_up
 from rover_physics.prediction.path_motion import motions_of, path_motions
 from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.servo_path import (
+    climb_costs,
+    find_drift,
+    find_lift_heights,
+    stop_in_slots,
+)
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.rover.model import Rover
-from rover_physics.status import PoseStatus
+from rover_physics.status import PoseStatus, TorquePolicy
 from rover_physics.terrain.grid import Terrain
 
 POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
@@ -110,6 +116,8 @@ def sweep_poses(
         results,
         model,
         wheel_drop=np.zeros((len(places), 6)),
+        drift=np.zeros((len(places), 2)),
+        lift_height=np.zeros((len(places), 6)),
         falling=np.zeros((len(places), 6), bool),
         start=NO_SUMS,
         between=None,
@@ -212,12 +220,19 @@ def make_prediction(
 
     Distance, time and energy at the first pose are `start`.
     """
-    falls = find_falls(wheels_of(model), poses, results, crossings)
+    wheels = wheels_of(model)
+    falls = find_falls(wheels, poses, results, crossings)
+    if model.settings["policy"] == TorquePolicy.SERVO:
+        results, crossings = results.copy(), replace(crossings, results=crossings.results.copy())
+        stop_in_slots(poses, results, crossings)
+    lift, lift_between = find_lift_heights(wheels, poses, results, crossings)
     between = _collect(
         crossings.poses,
         crossings.results,
         model,
         wheel_drop=np.zeros((len(crossings.poses), 6)),
+        drift=np.zeros((len(crossings.poses), 2)),
+        lift_height=lift_between,
         falling=falls.between,
         start=NO_SUMS,
         between=None,
@@ -228,11 +243,18 @@ def make_prediction(
         results,
         model,
         wheel_drop=falls.drops,
+        lift_height=lift,
+        drift=find_drift(wheels, float(model.record.linkage.length), poses, results),
         falling=falls.at_waypoints,
         start=start,
         between=between,
         waypoint=np.arange(len(poses)),
     )
+    if model.settings["policy"] == TorquePolicy.SERVO:
+        time, energy = climb_costs(poses, results, crossings).T
+        prediction = replace(
+            prediction, time=prediction.time + time, energy=prediction.energy + energy
+        )
     return SweptPath(poses, prediction, results, crossings), falls
 
 
@@ -258,8 +280,14 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     return array
 
 
-def sum_up(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> Sums:
+def sum_up(
+    model: PackedModel, poses: np.ndarray, results: Any, crossings: Crossings, start: Sums
+) -> Sums:
     """Return distance [m], time [s] and energy [J] at the last pose from those at the first."""
+    if model.settings["policy"] == TorquePolicy.SERVO:
+        before = crossings.select(crossings.waypoint < len(poses))
+        time, energy = climb_costs(poses, results, before)[-1]
+        start = (start[0], start[1] + time, start[2] + energy)
     path, sums = (view_read_only(poses), view_read_only(results)), np.empty((3, len(poses)))
     return add_up(*path, model.record.linkage.steering_rate, start, sums)
 

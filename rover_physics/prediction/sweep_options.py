@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rover_physics.errors import ModelError
-from rover_physics.names import EQUAL, OPTIMAL
+from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.plausible import (
     MAX_FRICTION,
     MAX_TORQUE,
@@ -15,7 +15,11 @@ from rover_physics.numerics.plausible import (
 from rover_physics.rover.manipulator import as_vector
 from rover_physics.status import TorquePolicy
 
-POLICIES = {EQUAL: TorquePolicy.EQUAL, OPTIMAL: TorquePolicy.OPTIMAL}
+POLICIES = {
+    EQUAL: TorquePolicy.EQUAL,
+    SERVO: TorquePolicy.SERVO,
+    OPTIMAL: TorquePolicy.OPTIMAL,
+}
 """Torque policies by name."""
 
 JointAngles = tuple[tuple[str, float], ...]
@@ -31,10 +35,11 @@ class SweepOptions:
     """
 
     policy: str = EQUAL
-    """EQUAL: equal torques on all wheels; OPTIMAL: the torques that need the least friction."""
+    """EQUAL: equal torques on all wheels; SERVO: the torques of speed servos, on Coulomb ground;
+    OPTIMAL: the torques that need the least friction."""
     control_margin: float = 0.0
     """Share of the limits of friction and torque that policy OPTIMAL leaves to the controller,
-    0 to below 1; 0 is the physical limit. Policy EQUAL has none."""
+    0 to below 1; 0 is the physical limit. The other policies have none."""
     friction: float | None = None
     """Coulomb friction coefficient (default: that of the rover file). A friction layer of the
     terrain overrides it."""
@@ -87,7 +92,7 @@ class SweepOptions:
 
     @property
     def kept_margin(self) -> float:
-        """The control margin of the policy: 0 for EQUAL."""
+        """The control margin of the policy: 0 for all but OPTIMAL."""
         return self.control_margin if self.policy == OPTIMAL else 0.0
 
     @property

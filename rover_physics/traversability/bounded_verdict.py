@@ -10,7 +10,7 @@ from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus
-from rover_physics.traversability.limit_checks import NOT_COMPUTABLE
+from rover_physics.traversability.check import NOT_COMPUTABLE
 from rover_physics.traversability.verdict import Verdict, find_reasons
 
 _UNBOUNDED = {

@@ -1,4 +1,4 @@
-"""Traversability classes: passable, passable only with traction control, or impassable."""
+"""Traversability classes: what drive a rover needs to pass, or that it cannot."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.names import EQUAL, OPTIMAL, TORQUE_POLICIES, WHEELS
+from rover_physics.names import (
+    CONTROL_POLICIES,
+    EQUAL,
+    OPTIMAL,
+    SERVO,
+    TORQUE_POLICIES,
+    WHEELS,
+)
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
@@ -21,9 +28,10 @@ from rover_physics.traversability.limit_checks import check_limits
 from rover_physics.traversability.verdict import Verdict, find_reasons
 
 PASSABLE = "passable"
+WITH_SPEED_SERVOS = "passable with speed servos"
 WITH_TRACTION_CONTROL = "passable with traction control"
 IMPASSABLE = "impassable"
-TRAVERSABILITY_CLASSES = (PASSABLE, WITH_TRACTION_CONTROL, IMPASSABLE)
+TRAVERSABILITY_CLASSES = (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IMPASSABLE)
 """The classes, from best to worst."""
 WHEEL_CONSTRAINTS = ("wheel_lift", "friction", "torque")
 """The paper's three constraints, named by their codes in a verdict."""
@@ -34,9 +42,10 @@ class ClassifiedWaypoint:
     """Class of one waypoint, including the way to it, and the constraint that decides it."""
 
     traversability_class: str
-    """PASSABLE, WITH_TRACTION_CONTROL or IMPASSABLE."""
+    """One of TRAVERSABILITY_CLASSES."""
     policy: str
-    """Torque policy of the fields below: EQUAL if passable, else OPTIMAL."""
+    """Torque policy of the fields below: EQUAL if passable, SERVO if passable with speed servos,
+    else OPTIMAL."""
     constraint: str
     """Code of the broken limit; if none is broken, of the tightest of WHEEL_CONSTRAINTS."""
     wheel: str
@@ -44,7 +53,8 @@ class ClassifiedWaypoint:
     margin: float
     """Share of the limit that is left, negative if it is broken; NaN if it has no amount."""
     reason: str
-    """Why the waypoint is impassable, or why equal torques are not enough; empty if passable."""
+    """Why the waypoint is impassable, or why the simpler drives before its class are not enough;
+    empty if passable."""
 
 
 def classify_path(
@@ -55,9 +65,11 @@ def classify_path(
     *,
     sigmas: float | None = SIGMAS,
 ) -> tuple[ClassifiedWaypoint, ...]:
-    """Classify each waypoint of a path from its verdicts under both torque policies.
+    """Classify each waypoint of a path from its verdicts under all torque policies.
 
-    A waypoint that needs traction control leaves the control margin of the options.
+    On soil and on maps with uncertain heights no waypoint is passable with speed servos, as their
+    policy is not for these. A waypoint that needs traction control leaves the control margin of
+    the options.
 
     Args:
         rover: The rover.
@@ -91,13 +103,13 @@ def classify_judged(
 ) -> tuple[ClassifiedWaypoint, ...]:
     """Classify each waypoint of a path that `judge_path` has judged under one policy.
 
-    The path is judged under the other policy only if needed: a path that is traversable with
-    equal torques needs no optimal ones.
+    The path is judged under the other policies only if needed: a path that is traversable with
+    equal torques needs no others, nor does one with speed servos need optimal torques.
 
     Args:
         rover: The rover.
         terrain: The ground.
-        prediction: The path under either policy, from `judge_path`.
+        prediction: The path under any policy, from `judge_path`.
         verdict: The verdict on it, from `judge_path`.
         options: The options it was judged with; their policy is ignored.
         sigmas: The standard deviations of the map it was judged with.
@@ -110,7 +122,8 @@ def classify_judged(
         PoseError, ModelError, SoilError: As `judge_path`.
     """
     judged = {prediction.policy: (prediction, verdict)}
-    for policy in TORQUE_POLICIES:
+    decided: dict[str, list[_Decision]] = {}
+    for policy in _policies_on(terrain, options, sigmas):
         if policy not in judged:
             asked = replace(options, policy=policy)
             poses = prediction.poses
@@ -120,11 +133,19 @@ def classify_judged(
                 judged[policy] = judge_poses(
                     rover, terrain, poses, curvature, asked, sigmas=sigmas
                 )
+        decided[policy] = _decide(rover, *judged[policy])
         if judged[policy][1].traversable:
             break
-    equal = _decide(rover, *judged[EQUAL])
-    optimal = _decide(rover, *judged[OPTIMAL]) if OPTIMAL in judged else equal
-    return tuple(_classify(one, other) for one, other in zip(equal, optimal, strict=True))
+    rows = zip(*decided.values(), strict=True)
+    return tuple(_classify(dict(zip(decided, row, strict=True))) for row in rows)
+
+
+def _policies_on(terrain: Terrain, options: SweepOptions, sigmas: float | None) -> tuple[str, ...]:
+    """Return the policies that can be asked for on a terrain, in the order of the classes."""
+    on_soil = bool(terrain.soil_names) or options.soil is not None
+    if on_soil or (sigmas and terrain.elevation_std is not None):
+        return CONTROL_POLICIES
+    return TORQUE_POLICIES
 
 
 def deciding_waypoint(classes: Sequence[ClassifiedWaypoint]) -> int:
@@ -160,24 +181,18 @@ _NOTHING_ASKED = _Decision("", -1, float("nan"), "")
 """Decision while a wheel rolls off an edge: no wheel constraint counts, see UNNEEDED_IN_A_FALL."""
 
 
-def _classify(equal: _Decision, optimal: _Decision) -> ClassifiedWaypoint:
-    """Return the class of a waypoint from its decisions under both policies."""
-    if not equal.reason:
-        traversability_class, policy, decision, reason = PASSABLE, EQUAL, equal, ""
-    elif not optimal.reason:
-        traversability_class, policy, decision, reason = (
-            WITH_TRACTION_CONTROL,
-            OPTIMAL,
-            optimal,
-            equal.reason,
-        )
-    else:
-        traversability_class, policy, decision, reason = (
-            IMPASSABLE,
-            OPTIMAL,
-            optimal,
-            optimal.reason,
-        )
+_CLASS_OF = {EQUAL: PASSABLE, SERVO: WITH_SPEED_SERVOS, OPTIMAL: WITH_TRACTION_CONTROL}
+"""Class of a waypoint that is passable under a policy, and under none before it."""
+
+
+def _classify(decisions: dict[str, _Decision]) -> ClassifiedWaypoint:
+    """Return the class of a waypoint from its decisions by policy, in TORQUE_POLICIES order."""
+    traversability_class, reason = IMPASSABLE, ""
+    for policy, decision in decisions.items():
+        if not decision.reason:
+            traversability_class = _CLASS_OF[policy]
+            break
+        reason = decision.reason
     wheel = WHEELS[decision.wheel] if decision.wheel >= 0 else ""
     return ClassifiedWaypoint(
         traversability_class, policy, decision.constraint, wheel, decision.margin, reason

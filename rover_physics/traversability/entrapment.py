@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rover_physics.forces.soil import use_of_shear
-from rover_physics.names import EQUAL
+from rover_physics.names import EQUAL, SERVO
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import SweptPath
@@ -25,8 +25,8 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.prediction.way_back import predict_way_back
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.check import TOLERANCE, largest_of
 from rover_physics.traversability.first_failure import sweep_until_failure
-from rover_physics.traversability.limit_checks import TOLERANCE, largest_of
 from rover_physics.traversability.verdict import Verdict, judge
 
 LOOK_AHEAD = 1.5
@@ -143,11 +143,14 @@ def _resists_way_back(
 def _judge_way_back(
     rover: Rover, terrain: Terrain, swept: SweptPath, waypoints: slice, options: SweepOptions
 ) -> Verdict:
-    """Judge the way back over waypoints; without soil, from the results of the way in."""
+    """Judge the way back over waypoints; from the results of the way in where they do not differ.
+
+    They do on soil and with speed servos.
+    """
     reverse = replace(options, backward=not options.backward)
     poses = swept.prediction.poses[waypoints][::-1]
     model = pack_model(rover, terrain, reverse)
-    if model.settings.on_soil:
+    if model.settings.on_soil or reverse.policy == SERVO:
         return _judge_way(rover, terrain, poses, reverse)
     verdict = judge(rover, predict_way_back(rover, terrain, model, swept, waypoints))
     if verdict.traversable or reverse.policy == EQUAL:
@@ -159,7 +162,7 @@ def _judge_way_back(
 def _judge_way(
     rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
 ) -> Verdict:
-    """Judge a way; equal torques are tried first under either policy, which is much faster."""
+    """Judge a way; equal torques are tried first under any policy, which is faster."""
     equal = replace(options, policy=EQUAL)
     verdict = sweep_until_failure(rover, terrain, [poses], equal)[0][1]
     if verdict.traversable or options.policy == EQUAL:

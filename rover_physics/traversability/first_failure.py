@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rover_physics.forces.servo import MIN_SPEED_SHARE
 from rover_physics.forces.soil import MODERATE_SINKAGE
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.kernels import exact_kernel
@@ -38,7 +39,7 @@ from rover_physics.prediction.sweep import (
 )
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
-from rover_physics.status import PoseStatus
+from rover_physics.status import PoseStatus, TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict, find_first_failure, judge
 
@@ -74,6 +75,8 @@ class SuspectLimits(NamedTuple):
     """Largest friction utilisation, less the control margin."""
     torque: float
     """Largest torque saturation, less the control margin."""
+    speed_share: float
+    """Least share of the commanded motion."""
 
 
 @quiet
@@ -178,6 +181,7 @@ class _StartedPath:
 def _limits_of(rover: Rover, model: PackedModel) -> SuspectLimits:
     limits, suspension = rover.limits, rover.suspension
     kept = 1.0 - float(model.settings.control_margin)
+    on_servos = bool(model.settings.policy == TorquePolicy.SERVO)
     return SuspectLimits(
         least_rocker=float(suspension.rocker_limits[0]),
         most_rocker=float(suspension.rocker_limits[1]),
@@ -187,8 +191,9 @@ def _limits_of(rover: Rover, model: PackedModel) -> SuspectLimits:
         tip_over_ratio=float(limits.tip_over_ratio),
         belly_clearance=float(limits.belly_clearance),
         sinkage=float(MODERATE_SINKAGE * 2.0 * rover.wheel.radius),
-        friction=float(limits.friction_utilisation * kept),
-        torque=float(limits.torque_saturation * kept),
+        friction=float("inf") if on_servos else float(limits.friction_utilisation * kept),
+        torque=float("inf") if on_servos else float(limits.torque_saturation * kept),
+        speed_share=float(MIN_SPEED_SHARE),
     )
 
 
@@ -262,7 +267,12 @@ def _stands_safely(result, limits):
 
 @exact_kernel
 def _has_grip(result, limits):
-    """Return whether load, sinkage, friction and torque of all wheels keep their limits."""
+    """Return whether load, sinkage, friction and torque of all wheels keep their limits.
+
+    So must the speed of a rover with speed servos.
+    """
+    if not result.speed_share >= limits.speed_share:
+        return False
     for wheel in range(6):
         loaded = result.wheel_loads[wheel] >= 0.0
         use, torque = result.friction_utilisation[wheel], result.torque_saturation[wheel]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.errors import ModelError, PoseError
+from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.path_prediction import PathPrediction
@@ -105,6 +106,10 @@ def judge_reach(
     arm = rover.manipulator
     if arm is None:
         raise ModelError(f"rover {rover.name!r} has no manipulator to reach with")
+    if options.policy == SERVO:
+        raise ModelError(
+            f"policy {SERVO!r} is for a rover that drives; to stand, use {EQUAL!r} or {OPTIMAL!r}"
+        )
     poses = check_poses(np.atleast_2d(pose))
     if len(poses) != 1:
         raise PoseError(f"pose has shape {np.shape(pose)}; it must be one pose (3,): x, y, yaw")

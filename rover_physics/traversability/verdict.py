@@ -12,12 +12,8 @@ from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.limit_checks import (
-    NOT_COMPUTABLE,
-    check_limits,
-    compare,
-    largest_of,
-)
+from rover_physics.traversability.check import NOT_COMPUTABLE, compare, largest_of
+from rover_physics.traversability.limit_checks import check_limits
 
 CODES = (
     "steering",

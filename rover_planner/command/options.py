@@ -19,7 +19,7 @@ MaxTorque = Annotated[
     float | None, typer.Option(metavar="TAU", help="Largest wheel torque in N m.")
 ]
 Policy = Annotated[
-    str, typer.Option(metavar="equal|optimal", help="How the wheels share the traction.")
+    str, typer.Option(metavar="equal|servo|optimal", help="How the wheels share the traction.")
 ]
 SoilName = Annotated[
     str | None,

@@ -59,6 +59,13 @@ REPLAY_ARRAYS: dict[str, Shape] = {
     "distance": (),
     "wheel_drop": (6,),
     "falling": (6,),
+    "speed_share": (),
+    "stalls": (),
+    "slip_speed": (6,),
+    "lift_rate": (6,),
+    "lift_height": (6,),
+    "deviation": (3,),
+    "drift": (2,),
 }
 """Further arrays in the file that `rover_planner view` needs to replay it."""
 SOIL_ARRAYS = ("sinkage", "motion_resistance")

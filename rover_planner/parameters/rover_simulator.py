@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rover_physics.names import EQUAL, TORQUE_POLICIES, WHEEL_JOINTS
+from rover_physics.names import CONTROL_POLICIES, EQUAL, WHEEL_JOINTS
 from rover_planner.parameters.shared import max_map_cells_parameter
 from rover_planner.parameters.table import ParameterTable, parameter
 
@@ -55,7 +55,7 @@ class RoverSimulatorParameters(ParameterTable):
         EQUAL,
         "How the rover's own servos share the traction: equal torques, or optimal. Quasi-static "
         "engine only, and not with follow_commands.",
-        choices=TORQUE_POLICIES,
+        choices=CONTROL_POLICIES,
         read_only=True,
     )
     speed: float = parameter(

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rover_physics.names import OPTIMAL, TORQUE_POLICIES, WHEEL_JOINTS
+from rover_physics.names import CONTROL_POLICIES, OPTIMAL, WHEEL_JOINTS
 from rover_planner.parameters.shared import (
     cell_height_parameter,
     input_reliability_parameter,
@@ -97,7 +97,7 @@ class TractionControllerParameters(ParameterTable):
     policy: str = parameter(
         OPTIMAL,
         "How the wheels share the traction: smallest peak friction utilisation, or equal torques.",
-        choices=TORQUE_POLICIES,
+        choices=CONTROL_POLICIES,
     )
     torque_rate: float = parameter(
         0.0,

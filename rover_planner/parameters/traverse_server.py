@@ -40,7 +40,8 @@ class TraverseServerParameters(ParameterTable):
     payload: float = payload_parameter()
     policy: str = parameter(
         EQUAL,
-        "How the wheels share the traction: equal torques, or optimal with traction control.",
+        "How the wheels share the traction: equal torques, speed servos (servo), or optimal with "
+        "traction control.",
         choices=TORQUE_POLICIES,
     )
     control_margin: float = parameter(

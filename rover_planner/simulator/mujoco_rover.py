@@ -184,6 +184,30 @@ class MujocoRover:
             mujoco.mj_step(self._model, self._data)
         return torques
 
+    def servo_with_droop(self, rates: Floats, droop: float, duration: float) -> Floats:
+        """Drive the wheels at rates (6,) [rad/s] for a duration [s] with proportional servos.
+
+        A servo has its largest torque when its wheel is `droop` times the nominal wheel speed
+        slower than its rate. MuJoCo takes its gain into the implicit part of a step.
+
+        Returns:
+            Torques (6,) of the last step [N m].
+        """
+        model, wheel = self._model, self.rover.wheel
+        gain = wheel.max_torque * wheel.radius / (droop * self.rover.nominal_speed)
+        kinds = model.actuator_biastype.copy()
+        model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
+        model.actuator_gainprm[:, 0], model.actuator_biasprm[:, 2] = gain, -gain
+        model.actuator_forcerange[:] = -wheel.max_torque, wheel.max_torque
+        model.actuator_forcelimited[:] = 1
+        self._data.ctrl[:] = rates
+        for _ in range(max(round(duration / model.opt.timestep), 1)):
+            mujoco.mj_step(model, self._data)
+        torques = self._data.actuator_force.copy()
+        model.actuator_gainprm[:, 0], model.actuator_biasprm[:, 2] = 1.0, 0.0
+        model.actuator_biastype[:], model.actuator_forcelimited[:] = kinds, 0
+        return torques
+
     @property
     def time(self) -> float:
         """Time since the rover came to rest [s]."""

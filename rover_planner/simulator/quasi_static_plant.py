@@ -57,7 +57,7 @@ class QuasiStaticPlant:
             terrain: The ground.
             pose: x, y [m] and yaw [rad] of the body origin.
             friction: Coulomb friction; None takes that of the terrain or the rover.
-            policy: How the servos share the traction, one of TORQUE_POLICIES.
+            policy: How the servos share the traction, one of CONTROL_POLICIES.
             soil: Preset soil where the terrain names none; None: Coulomb friction.
 
         Raises:

@@ -39,7 +39,7 @@ class SimulationSettings:
     soil: str | None
     """Soil where the terrain names none; None: Coulomb friction."""
     policy: str
-    """How the rover's own servos share the traction, one of TORQUE_POLICIES."""
+    """How the rover's own servos share the traction, one of CONTROL_POLICIES."""
     speed: float
     """Speed along a path [m/s]."""
     follow_commands: bool

@@ -40,7 +40,7 @@ class TractionSettings:
     payload: float | None
     """Mass at the arm's tip [kg]; None takes that of the rover."""
     policy: str
-    """One of TORQUE_POLICIES."""
+    """One of CONTROL_POLICIES."""
     timeouts: InputTimeouts
     """Ages above which inputs are stale."""
     gains: LoopGains

@@ -58,6 +58,13 @@ REPLAY_SHAPES = {
     "distance": (N,),
     "wheel_drop": (N, 6),
     "falling": (N, 6),
+    "speed_share": (N,),
+    "stalls": (N,),
+    "slip_speed": (N, 6),
+    "lift_rate": (N, 6),
+    "lift_height": (N, 6),
+    "deviation": (N, 3),
+    "drift": (N, 2),
 }
 """What the file holds beside the contract's arrays, for a replay."""
 
@@ -252,14 +259,14 @@ def test_classes_and_torque_ranges_are_added_on_demand(files):
         assert (low < 0.0).all() and (high > 0.0).all()
 
 
-def test_what_only_traction_control_passes_is_classified_so_under_either_policy(files):
+def test_what_speed_servos_pass_is_classified_so_under_any_policy(files):
     rise = np.tile(0.45 * 0.05 * np.arange(120), (80, 1))
     save_terrain(files / "terrain.npz", Terrain(rise, 0.05, (0.0, 0.0)))
-    for policy, traversable in (("equal", False), ("optimal", True)):
+    for policy, traversable in (("equal", False), ("servo", True), ("optimal", True)):
         assert main([*predict_words(files), "--classes", "--policy", policy]) == 0
         with np.load(files / "out.npz") as out:
             assert bool(out["traversable"]) == traversable
-            assert set(out["traversability_class"]) == {"passable with traction control"}
+            assert set(out["traversability_class"]) == {"passable with speed servos"}
             assert (out["class_margin"] > 0.0).all()
 
 

@@ -84,7 +84,7 @@ def test_defaults_are_of_the_type_of_their_field_and_allowed(table):
         ("candidate_count", None, "candidate_count is None; it must be of type integer"),
         ("candidate_spacing", [0.3], r"candidate_spacing is \[0.3\]; it must be of type double"),
         ("waypoint_spacing", 0.0, r"waypoint_spacing is 0.0; it must be in 0.001 to 1 m"),
-        ("policy", "fair", "policy is 'fair'; it must be one of equal, optimal"),
+        ("policy", "fair", "policy is 'fair'; it must be one of equal, servo, optimal"),
         ("unknown_cells", "ask", "unknown_cells is 'ask'; it must be one of refuse, interpolate"),
         ("map_frame", "", "map_frame is empty; it must be a text such as 'map'"),
     ],
@@ -184,7 +184,7 @@ def test_a_bad_change_leaves_the_value_and_says_why(make_node):
         ("friction", math.nan, "value: nan"),
         ("friction", "rough", "Wrong parameter type"),
         ("friction", 99.0, "friction"),
-        ("policy", "fair", "one of equal, optimal"),
+        ("policy", "fair", "one of equal, servo, optimal"),
         ("map_frame", "odom", "read-only"),
     ]:
         result = change(name, value)

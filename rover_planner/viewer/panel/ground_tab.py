@@ -12,7 +12,11 @@ from rover_planner.viewer.state.visitor_requests import Action
 
 NO_SOIL = "none (Coulomb)"
 BEST = "best"
-POLICIES = {"equal on all wheels": "equal", "traction control": "optimal"}
+POLICIES = {
+    "equal on all wheels": "equal",
+    "speed servos": "servo",
+    "traction control": "optimal",
+}
 
 
 @dataclass(frozen=True)

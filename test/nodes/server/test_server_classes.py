@@ -6,12 +6,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from msg_adapters.results.markers import WITH_TRACTION_CONTROL as AMBER
+from msg_adapters.results.markers import WITH_SPEED_SERVOS as LIME
 from rover_physics.names import WHEELS
 from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
-    WITH_TRACTION_CONTROL,
+    WITH_SPEED_SERVOS,
 )
 from rover_planner.planning.verdict_report import WaypointLists
 from support.grounds import make_terrain, waves
@@ -22,7 +22,7 @@ PATH = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
 
 
 def slope(x, y):
-    """Return a slope that only traction control climbs, of 24 degrees."""
+    """Return a slope of 24 degrees: speed servos climb it, equal torques do not."""
     return 0.45 * x
 
 
@@ -30,19 +30,19 @@ def check(client, server, poses=PATH) -> dict:
     return json.loads(client.check_poses(server, poses).message)
 
 
-@pytest.mark.parametrize(("policy", "traversable"), [("equal", False), ("optimal", True)])
-def test_traction_control_is_named_whichever_policy_is_assumed(
-    server, client, policy, traversable
-):
+@pytest.mark.parametrize(
+    ("policy", "traversable"), [("equal", False), ("servo", True), ("optimal", True)]
+)
+def test_the_class_is_named_whichever_policy_is_assumed(server, client, policy, traversable):
     client.send_terrain(make_terrain(slope))
     assert client.set_parameter("policy", policy)[0]
     verdict = check(client, server)
     assert verdict["traversable"] == traversable and verdict["policy"] == policy
-    assert verdict["traversability_class"] == WITH_TRACTION_CONTROL
+    assert verdict["traversability_class"] == WITH_SPEED_SERVOS
     assert verdict["class_constraint"] == "friction" and verdict["class_wheel"] in WHEELS
     assert 0.0 < verdict["class_margin"] < 1.0
     assert {len(verdict[key]) for key in LISTS} == {verdict["waypoints"]}
-    assert set(verdict["traversability_classes"]) == {WITH_TRACTION_CONTROL}
+    assert set(verdict["traversability_classes"]) == {WITH_SPEED_SERVOS}
 
 
 def test_a_plan_has_a_pose_where_the_class_changes(server, client):
@@ -64,7 +64,7 @@ def test_the_drawn_path_is_coloured_by_class(server, client):
     line = next(marker for marker in results["markers"].markers if marker.ns == "path")
     drawn = {(colour.r, colour.g, colour.b) for colour in line.colors}
     assert len(drawn) == 1
-    assert drawn.pop() == pytest.approx((AMBER.r, AMBER.g, AMBER.b))
+    assert drawn.pop() == pytest.approx((LIME.r, LIME.g, LIME.b))
 
 
 def test_an_easy_path_is_passable_with_the_margin_of_its_worst_waypoint(mapped, client):

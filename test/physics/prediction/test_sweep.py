@@ -73,7 +73,7 @@ def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"policy": "best"}, "'best'.*equal, optimal"),
+        ({"policy": "best"}, "'best'.*equal, servo, optimal"),
         ({"friction": 0.0}, r"friction is 0.0.*above 0"),
         ({"friction": -0.5}, r"friction is -0.5.*above 0"),
         ({"friction": NAN}, r"friction is nan.*above 0"),

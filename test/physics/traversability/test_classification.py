@@ -1,10 +1,11 @@
-"""Classes: passable, passable with traction control, impassable, and what decides it."""
+"""Classes: passable, or with speed servos, or with traction control, or not; and why."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -15,6 +16,7 @@ from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
     WHEEL_CONSTRAINTS,
+    WITH_SPEED_SERVOS,
     WITH_TRACTION_CONTROL,
     classify_judged,
     classify_path,
@@ -22,17 +24,22 @@ from rover_physics.traversability.classification import (
 )
 from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.verdict import judge
+from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane, random_poses, rocky
 
 LSR1 = load_rover("lsr1")
 POSE = [[0.0, 0.0, 0.0]]
+ONTO_A_BUMP = drive_path()[54:59]
+"""Waypoints at which the right front wheel climbs a bump; the third one follows the climb."""
+WEAK = SweepOptions(friction=1.0, max_torque=1.0)
+"""Motors with which speed servos stall at the bump, and optimal torques do not."""
 
 
 @pytest.mark.parametrize(
     ("slope", "friction", "traversability_class"),
     [
         (0.2, 0.8, PASSABLE),
-        (0.45, 0.8, WITH_TRACTION_CONTROL),
+        (0.45, 0.8, WITH_SPEED_SERVOS),
         (0.45, 0.4, IMPASSABLE),
     ],
 )
@@ -52,13 +59,26 @@ def test_a_passable_waypoint_names_its_tightest_constraint():
     assert found.policy == "equal"
 
 
-def test_with_traction_control_the_margin_is_that_of_optimal_torques():
+def test_with_speed_servos_the_margin_is_that_of_the_whole_rover():
     found = classify_path(LSR1, plane(0.45, 0.0), POSE)[0]
-    optimal = sweep_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(policy="optimal"))
-    assert found.policy == "optimal"
-    assert found.margin == pytest.approx(1.0 - optimal.friction_utilisation[0].max())
+    servo = sweep_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(policy="servo"))
+    shear = np.hypot(servo.tangential[0], servo.lateral[0]).sum()
+    assert (found.policy, found.constraint) == ("servo", "friction")
+    assert found.margin == pytest.approx(1.0 - shear / (0.8 * servo.wheel_loads[0].sum()))
     assert found.margin > 0.0
-    assert "under" in found.reason or "slips" in found.reason
+    assert "slips" in found.reason
+
+
+def test_a_climb_that_stalls_servos_needs_traction_control_and_its_margin_is_that_of_optimal():
+    rover, bump = unlimited(LSR1), drive_ground("bump_one_side", 0.1)
+    found = classify_path(rover, bump, ONTO_A_BUMP, WEAK)
+    assert [waypoint.traversability_class for waypoint in found] == [
+        PASSABLE, PASSABLE, WITH_TRACTION_CONTROL, PASSABLE, PASSABLE,
+    ]  # fmt: skip
+    optimal = sweep_path(rover, bump, ONTO_A_BUMP, replace(WEAK, policy="optimal")).between
+    assert found[2].policy == "optimal"
+    assert found[2].margin == pytest.approx(1.0 - optimal.torque_saturation.max())
+    assert "motors stall" in found[2].reason
 
 
 def test_weak_motors_make_torque_the_constraint():
@@ -83,21 +103,24 @@ def test_a_waypoint_off_the_map_has_no_margin():
     assert np.isnan(found.margin)
 
 
-def test_classes_agree_with_the_verdicts_of_both_policies():
+def test_classes_agree_with_the_verdicts_of_all_policies():
     ground, poses = rocky(3), random_poses(3, 60, 1.8)
     classes = classify_path(LSR1, ground, poses, SweepOptions(friction=0.22))
     paths = [
         sweep_path(LSR1, ground, poses, SweepOptions(friction=0.22, policy=policy))
-        for policy in ("equal", "optimal")
+        for policy in ("equal", "servo", "optimal")
     ]
-    equal, optimal = (judge(LSR1, path) for path in paths)
+    equal, servo, optimal = (judge(LSR1, path) for path in paths)
     falls = np.any([path.falling.any(axis=1) for path in paths], axis=0)
     seen = set()
-    for waypoint, one, other, fall in zip(classes, equal.codes, optimal.codes, falls, strict=True):
+    codes = zip(equal.codes, servo.codes, optimal.codes, falls, strict=True)
+    for waypoint, (one, two, other, fall) in zip(classes, codes, strict=True):
         seen.add(waypoint.traversability_class)
         expected = IMPASSABLE
         if not one:
             expected = PASSABLE
+        elif not two:
+            expected = WITH_SPEED_SERVOS
         elif not other:
             expected = WITH_TRACTION_CONTROL
         assert waypoint.traversability_class == expected
@@ -107,7 +130,7 @@ def test_classes_agree_with_the_verdicts_of_both_policies():
         elif not fall:
             assert waypoint.constraint in WHEEL_CONSTRAINTS
             assert waypoint.margin >= -1e-9
-    assert len(seen) == 3
+    assert len(seen) >= 3
 
 
 def test_what_breaks_on_the_way_counts_at_the_waypoint_that_follows():
@@ -143,7 +166,7 @@ def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
 
 
 @pytest.mark.parametrize(("slope", "friction"), [(0.2, 0.8), (0.45, 0.8), (0.45, 0.4)])
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
+@pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
 def test_classes_do_not_depend_on_the_policy_that_was_judged_first(slope, friction, policy):
     ground = plane(slope, 0.0)
     judged = judge_path(LSR1, ground, POSE, SweepOptions(policy=policy, friction=friction))
@@ -151,7 +174,7 @@ def test_classes_do_not_depend_on_the_policy_that_was_judged_first(slope, fricti
     assert found == classify_path(LSR1, ground, POSE, SweepOptions(friction=friction))
 
 
-def test_what_equal_torques_pass_is_not_asked_about_again(monkeypatch):
+def test_what_a_simpler_drive_passes_is_not_asked_about_again(monkeypatch):
     asked = []
     monkeypatch.setattr(
         classification,
@@ -161,7 +184,24 @@ def test_what_equal_torques_pass_is_not_asked_about_again(monkeypatch):
     classify_path(LSR1, plane(0.2, 0.0), POSE)
     assert asked == ["equal"]
     classify_path(LSR1, plane(0.45, 0.0), POSE)
-    assert asked == ["equal", "equal", "optimal"]
+    assert asked == ["equal", "equal", "servo"]
+    classify_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(friction=0.4))
+    assert asked[3:] == ["equal", "servo", "optimal"]
+
+
+def test_on_soil_and_uncertain_ground_speed_servos_are_not_asked_about():
+    steep = plane(0.45, 0.0)
+    uncertain = replace(steep, elevation_std=np.full(steep.elevation.shape, 1e-4))
+    found = classify_path(LSR1, uncertain, POSE)
+    assert found[0].traversability_class == WITH_TRACTION_CONTROL
+    with pytest.raises(ModelError, match="policy 'servo' has no bounds"):
+        judge_path(LSR1, uncertain, POSE, SweepOptions(policy="servo"))
+    on_soil = SweepOptions(soil="dry_sand")
+    assert WITH_SPEED_SERVOS not in {
+        c.traversability_class for c in classify_path(LSR1, plane(0.2, 0.0), POSE, on_soil)
+    }
+    with pytest.raises(ModelError, match="policy 'servo' is for ground with Coulomb friction"):
+        judge_path(LSR1, steep, POSE, replace(on_soil, policy="servo"))
 
 
 def test_a_path_hangs_on_its_worst_waypoint():

@@ -12,6 +12,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
+    WITH_SPEED_SERVOS,
     WITH_TRACTION_CONTROL,
     classify_path,
 )
@@ -28,15 +29,24 @@ STEEP = plane(0.45, 0.0)
 """A slope on which equal torques slip and optimal ones use 0.58 of the friction of 0.8."""
 
 
-@pytest.mark.parametrize(("margin", "passes"), [(0.0, True), (0.3, True), (0.5, False)])
+@pytest.mark.parametrize(("margin", "passes"), [(0.0, True), (0.2, True), (0.3, False)])
 def test_a_waypoint_that_needs_traction_control_keeps_the_margin(margin, passes):
-    options = replace(OPTIMAL, control_margin=margin)
-    verdict = judge_path(LSR1, STEEP, POSE, options)[1]
-    found = classify_path(LSR1, STEEP, POSE, options)[0]
+    rover, bump = unlimited(LSR1), drive_ground("bump_one_side", 0.1)
+    options = replace(OPTIMAL, friction=1.0, max_torque=1.0, control_margin=margin)
+    verdict = judge_path(rover, bump, drive_path()[54:59], options)[1]
+    found = classify_path(rover, bump, drive_path()[54:59], options)[2]
     assert verdict.traversable is passes
     assert found.traversability_class == (WITH_TRACTION_CONTROL if passes else IMPASSABLE)
-    assert ("1 less control margin 0.5" in verdict.reason) is not passes
+    assert ("1 less control margin 0.3" in verdict.reason) is not passes
     assert found.reason == verdict.reason or passes
+
+
+@pytest.mark.parametrize(("margin", "passes"), [(0.3, True), (0.5, False)])
+def test_what_speed_servos_pass_is_classed_so_whatever_the_margin(margin, passes):
+    options = replace(OPTIMAL, control_margin=margin)
+    assert judge_path(LSR1, STEEP, POSE, options)[1].traversable is passes
+    found = classify_path(LSR1, STEEP, POSE, options)[0]
+    assert found.traversability_class == WITH_SPEED_SERVOS
 
 
 def test_the_margin_is_kept_in_torque_too():

@@ -1,0 +1,167 @@
+"""The motions that the contacts allow, and the equilibrium as a function of the wheel forces.
+
+A rover whose six wheels stay on the ground moves in three ways. The motions follow from the
+equilibrium by virtual work: M is the matrix whose columns are the wheel loads and three base
+forces, and row 6 + k of its inverse is a motion that lifts no wheel and on which base force l does
+work 1 if l = k, else 0. A base force has the components of the level velocity of each wheel in a
+unit motion, along the contact's tangents. On level ground the motions are thus forward, left and
+turn by one unit; on a face, where the body cannot move ahead while its wheel climbs, they remain
+regular: "one unit forward" means that the treads travel as far as on level ground.
+"""
+
+import numpy as np
+
+from rover_physics.forces.servo_record import COLUMNS, MOTIONS, SCRUB, UNKNOWNS, WEIGHTS
+from rover_physics.forces.servo_wheel import GAUSS_POINT
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.linear_solve import solve_in_place
+
+FLUSH = 0.02
+"""Angle [rad] between axle and ground from which a wheel stands on its rim; a flush wheel has its
+whole width on the ground."""
+
+
+@kernel
+def find_motions(linkage, placement, contacts, balance, servo):
+    """Write the motions and the equilibrium into a SERVO; return False if it is singular.
+
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT.
+        contacts: CONTACTS.
+        balance: BALANCE with the equations of `write_equations`.
+        servo: SERVO; `nominal` is read, and X, base, velocity, command and spread are written.
+    """
+    X = servo.X
+    _write_base(placement, servo)
+    for row in range(UNKNOWNS):
+        for wheel in range(6):
+            servo.M[row, wheel] = balance.A[row, wheel]
+        for k in range(MOTIONS):
+            servo.M[row, 6 + k] = 0.0
+        X[row, WEIGHTS] = balance.B[row, 0]
+    for wheel in range(6):
+        servo.spread[wheel] = _spread(linkage, contacts, balance, wheel)
+        contact = contacts.point[wheel], balance.frames[wheel]
+        _write_wheel(linkage, placement, contact, wheel, X)
+    for wheel in range(6):
+        for row in range(UNKNOWNS):
+            X[row, SCRUB + wheel] *= servo.spread[wheel] / linkage.length
+            for k in range(MOTIONS):
+                servo.M[row, 6 + k] += (
+                    servo.base[wheel, 0, k] * X[row, wheel]
+                    + servo.base[wheel, 1, k] * X[row, 6 + wheel]
+                )
+    columns = SCRUB
+    for wheel in range(6):
+        if servo.spread[wheel] > 0.0:
+            columns = COLUMNS
+    if not solve_in_place(servo.M, X, UNKNOWNS, columns):
+        return False
+    _write_velocities(servo)
+    return True
+
+
+@kernel
+def _write_base(placement, servo):
+    """Write the level velocities of the wheels in unit motions, and the commanded rim speeds.
+
+    A turning wheel rolls along its heading; one whose heading does not suit its way slides.
+    """
+    R, origin = placement.R, placement.origin
+    length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
+    c, s = R[0, 0] / length, R[1, 0] / length
+    for wheel in range(6):
+        x = placement.centres[wheel, 0] - origin[0]
+        y = placement.centres[wheel, 1] - origin[1]
+        fx, fy = placement.forward[wheel, 0], placement.forward[wheel, 1]
+        base = servo.base[wheel]
+        base[0, 0], base[1, 0] = fx * c + fy * s, -fy * c + fx * s
+        base[0, 1], base[1, 1] = -fx * s + fy * c, fy * s + fx * c
+        base[0, 2], base[1, 2] = -fx * y + fy * x, fy * y + fx * x
+        servo.command[wheel] = 0.0
+        for k in range(MOTIONS):
+            servo.command[wheel] += base[0, k] * servo.nominal[k]
+
+
+@kernel
+def _spread(linkage, contacts, balance, wheel):
+    """Return the distance [m] of the Gauss points of a contact line from its middle."""
+    axis, slope = balance.frames[wheel, 2], contacts.slope[wheel]
+    rise = axis[2] - slope[0] * axis[0] - slope[1] * axis[1]
+    tilt = abs(rise) / np.sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1])
+    return 0.5 * linkage.width * GAUSS_POINT * max(1.0 - tilt / FLUSH, 0.0)
+
+
+@kernel
+def _write_wheel(linkage, placement, contact, wheel, X):
+    """Write the terms of a wheel's unit forces in the nine equations into columns of X.
+
+    Column `wheel` is its traction, 6 + wheel its lateral force, SCRUB + wheel the moment -1 about
+    the contact normal, over the reference length. `contact` is its point and its frame.
+    """
+    point, frame = contact
+    origin, length, R = placement.origin, linkage.length, placement.R
+    side = wheel // 3
+    sign = 1.0 if side == 0 else -1.0
+    ax, ay, az = R[0, 1], R[1, 1], R[2, 1]
+    rx, ry, rz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    for kind in range(3):
+        column = SCRUB + wheel if kind == 2 else 6 * kind + wheel
+        for row in range(UNKNOWNS):
+            X[row, column] = 0.0
+        if kind == 2:
+            mx, my, mz = -frame[0, 0], -frame[0, 1], -frame[0, 2]
+            about_bogie = about_rocker = mx * ax + my * ay + mz * az
+        else:
+            fx, fy, fz = frame[1 + kind, 0], frame[1 + kind, 1], frame[1 + kind, 2]
+            X[0, column], X[1, column], X[2, column] = fx, fy, fz
+            mx = (ry * fz - rz * fy) / length
+            my = (rz * fx - rx * fz) / length
+            mz = (rx * fy - ry * fx) / length
+            force = fx, fy, fz
+            about_rocker = _moment(placement, placement.rocker_pivots[side], point, force) / length
+            about_bogie = _moment(placement, placement.bogie_pivots[side], point, force) / length
+        X[3, column], X[4, column], X[5, column] = mx, my, mz
+        X[8, column] = sign * about_rocker
+        if linkage.on_bogie[wheel]:
+            X[6 + side, column] = about_bogie
+
+
+@kernel
+def _moment(placement, pivot, point, force):
+    """Return the moment of a force at a point about the pivot axis through `pivot`."""
+    R = placement.R
+    fx, fy, fz = force
+    x, y, z = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
+    return (y * fz - z * fy) * R[0, 1] + (z * fx - x * fz) * R[1, 1] + (x * fy - y * fx) * R[2, 1]
+
+
+@kernel
+def _write_velocities(servo):
+    """Write the velocities of the contacts in the motions that equal unit motions on level ground.
+
+    The work of wheel i's forces on motion k of the inverse is in row 6 + k; a unit motion is the
+    combination that has on the base forces the work of a level unit motion.
+    """
+    X, base, velocity = servo.X, servo.base, servo.velocity
+    for motion in range(MOTIONS):
+        for wheel in range(6):
+            for kind in range(3):
+                velocity[wheel, kind, motion] = 0.0
+        for k in range(MOTIONS):
+            work = level_work(base, k, motion)
+            for wheel in range(6):
+                velocity[wheel, 0, motion] += work * X[6 + k, wheel]
+                velocity[wheel, 1, motion] += work * X[6 + k, 6 + wheel]
+                velocity[wheel, 2, motion] += work * X[6 + k, SCRUB + wheel]
+
+
+@kernel
+def level_work(base, k, motion):
+    """Return the work of base force k on a level unit motion."""
+    work = 0.0
+    for wheel in range(6):
+        for i in range(2):
+            work += base[wheel, i, k] * base[wheel, i, motion]
+    return work
