@@ -36,7 +36,7 @@ class PathDisplay:
         session, shown = self._session, self._session.shown
         verdict = shown.verdict
         text = describe_verdict(
-            verdict.traversable, verdict.reason, session.refusal, shown.summary
+            verdict.traversable, verdict.reason, session.refusal, shown.summary, shown.by_policy
         )
         self._tab.show_verdict(text)
         return text

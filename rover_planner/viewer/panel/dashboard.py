@@ -2,6 +2,7 @@
 
 import html
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from rover_planner.viewer.state.colours import (
     colour_utilisation,
     to_css,
 )
+from rover_planner.viewer.state.comparison import POLICY_TITLES, PolicyVerdict
 from rover_planner.viewer.state.trajectory import RoverState
 
 WIDTH, HEIGHT = 330, 250
@@ -189,7 +191,13 @@ def draw_empty_dashboard(status: str) -> str:
     )
 
 
-def describe_verdict(traversable: bool | None, reason: str, refusal: str, summary: str) -> str:
+def describe_verdict(
+    traversable: bool | None,
+    reason: str,
+    refusal: str,
+    summary: str,
+    by_policy: Sequence[PolicyVerdict] = (),
+) -> str:
     """Return a verdict as HTML.
 
     Args:
@@ -197,11 +205,14 @@ def describe_verdict(traversable: bool | None, reason: str, refusal: str, summar
         reason: The reason of the verdict, or a hint; empty for none.
         refusal: Why the last change was refused, empty if it was not.
         summary: What was judged and how long that took, empty for none.
+        by_policy: The verdicts under all torque policies, side by side below it.
     """
     colour = to_css(UNKNOWN if traversable is None else PASSABLE if traversable else REFUSED)
     word = {None: "no verdict", True: "traversable", False: "not traversable"}[traversable]
     text = f"<b>{word}</b>" + (f": {html.escape(reason)}" if reason else "")
     lines = [f'<div style="border-left:5px solid {colour};padding-left:.5em">{text}</div>']
+    if by_policy:
+        lines.append(_compare_policies(by_policy))
     if refusal:
         lines.append(
             f'<div id="refusal" style="border-left:5px solid {to_css(NOTICE)};padding-left:.5em">'
@@ -210,3 +221,21 @@ def describe_verdict(traversable: bool | None, reason: str, refusal: str, summar
     if summary:
         lines.append(f'<div style="opacity:.7;font-size:11px">{html.escape(summary)}</div>')
     return f'<div id="verdict" style="font-size:13px;padding:0 8px">{"".join(lines)}</div>'
+
+
+def _compare_policies(by_policy: Sequence[PolicyVerdict]) -> str:
+    """Return a box for each policy, with its reason as a tool tip."""
+    boxes = []
+    for one in by_policy:
+        known = one.traversable is not None
+        colour = (PASSABLE if one.traversable else REFUSED) if known else UNKNOWN
+        word = ("passes" if one.traversable else "refused") if known else "not judged"
+        boxes.append(
+            f'<div title="{html.escape(one.reason or word)}" '
+            f'style="border-top:4px solid {to_css(colour)};padding:.1em .3em">'
+            f"{POLICY_TITLES[one.policy]}<br><b>{word}</b></div>"
+        )
+    return (
+        '<div id="policies" style="display:grid;grid-template-columns:1fr 1fr 1fr;gap:.4em;'
+        f'font-size:11px;margin-top:.3em">{"".join(boxes)}</div>'
+    )

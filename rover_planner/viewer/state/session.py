@@ -25,6 +25,7 @@ from rover_planner.planning.path_query import (
     choose,
 )
 from rover_planner.studies.rover_values import with_value
+from rover_planner.viewer.state.comparison import PolicyVerdict, judge_by_policy
 from rover_planner.viewer.state.trajectory import Trajectory
 
 REFUSALS = (RoverError, PlanningError)
@@ -44,6 +45,8 @@ class ShownPath:
     """The drive along it."""
     summary: str
     """What was judged and how long that took; empty for a recorded path."""
+    by_policy: tuple[PolicyVerdict, ...] = ()
+    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
 
     @property
     def verdict(self) -> Verdict:
@@ -115,7 +118,12 @@ class ViewSession:
 
     def _show(self, index: int, candidate: Candidate, summary: str) -> None:
         trajectory = Trajectory(self.rover, candidate.prediction, candidate.verdict)
-        self.shown = ShownPath(index, candidate, trajectory, summary)
+        by_policy: tuple[PolicyVerdict, ...] = ()
+        if not self.recorded:
+            by_policy = judge_by_policy(
+                self.rover, self.terrain, candidate, self.options, self.arm_angles
+            )
+        self.shown = ShownPath(index, candidate, trajectory, summary, by_policy)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
