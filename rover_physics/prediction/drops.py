@@ -2,10 +2,11 @@
 
 A wheel falls where its contact is behind it, and neither friction nor the motors balance it there.
 All wheels that are beyond their limits must be such wheels: else the rover cannot drive on. Where
-the forces balance, the wheel rolls down, held by the others. Down a face steeper than FACE it
-falls in any case: it would have to go down faster than the rover drives. Until it lands no balance
-is required; the height of the drop is a result. More friction or torque lets more wheels balance,
-so it never refuses a path that passes with less.
+the forces balance, the wheel rolls down, held by the others. Down a FACE it falls in any case: it
+would have to go down faster than the rover drives. Until it lands no balance is required; the
+height of the drop is a result. A wheel that would come down farther than its limit without a WALL
+does not fall: it slips on a slope, and friction is what is missing. More friction or torque lets
+more wheels balance, so it never refuses a path that passes with less.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,9 @@ from rover_physics.prediction.path_kernels import Wheels, way_between
 MIN_ANGLE = np.radians(15.0)
 """Least steepness [rad] of a contact behind a wheel from which it falls."""
 FACE = np.radians(45.0)
-"""Steepness [rad] of a contact behind a wheel from which the ground is a face."""
+"""Steepness [rad] of a contact behind a wheel from which a wheel falls anyway."""
+WALL = np.radians(60.0)
+"""Steepness [rad] of such a contact from which the ground is no slope."""
 MAX_FALLING = 2
 """Most wheels that can fall at once: one axle. If there are more, the rover slides downhill."""
 ROUNDING = 1e-9
@@ -72,18 +75,25 @@ def _find_falls(wheels, poses, results, between):
     _merge(n, between.place, order)
     steps = np.zeros(n + m)
     height, falling = np.empty((n + m, 6)), np.zeros((n + m, 6), np.bool_)
-    angle, last = np.empty(6), poses[0]
+    at_wall = np.zeros((n + m, 6), np.bool_)
+    angle, last = np.empty((n + m, 6)), poses[0]
     for k in range(n + m):
         i = order[k]
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
         steps[k] = way_between(last, here, wheels.reach)
-        steepest = _read_contacts(result, angle, height[k])
-        if steepest < -MIN_ANGLE:
-            _find_falling(angle, result, wheels, falling[k])
+        if _read_contacts(result, angle[k], height[k]) < -WALL:
+            for wheel in range(6):
+                at_wall[k, wheel] = angle[k, wheel] < -WALL
         last = here
+    for k in range(n + m):
+        i = order[k]
+        if angle[k].min() < -MIN_ANGLE:
+            result = results[i] if i < n else between.results[i - n]
+            _find_falling(angle[k], result, wheels, falling[k])
     first_open = _find_first_open(falling)
     _clear_open_runs(falling)
+    _clear_slides(height, at_wall, wheels.drop_limit, falling)
     fallen, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
     _measure_drops(wheels.radius, height, steps, falling, fallen)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
@@ -198,6 +208,27 @@ def _clear_open_runs(falling):
         while k >= 0 and falling[k, wheel]:
             falling[k, wheel] = False
             k -= 1
+
+
+@exact_kernel
+def _clear_slides(height, at_wall, limit, falling):
+    """Clear runs in `falling` (k, 6) without a wall that go down by more than `limit` [m]."""
+    rows = falling.shape[0]
+    for wheel in range(6):
+        start = 0
+        while start < rows:
+            end, walls = start, False
+            while end < rows and falling[end, wheel]:
+                walls = walls or at_wall[end, wheel]
+                end += 1
+            if start < end < rows and start > 0 and not walls:
+                fallen, most = 0.0, 0.0
+                for k in range(start, end + 1):
+                    fallen = max(fallen + height[k - 1, wheel] - height[k, wheel], 0.0)
+                    most = max(most, fallen)
+                if most > limit:
+                    falling[start:end, wheel] = False
+            start = end + 1
 
 
 @exact_kernel

@@ -47,6 +47,7 @@ SETTINGS = record_type(
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
     ("allowed_friction", float),  # largest friction utilisation within these
+    ("allowed_drop", float),  # largest drop of a wheel [m]
     ("control_margin", float),  # share of the limits left to the controller, for the results
     ("servo_droop", float),  # share of the nominal speed that a servo loses at full torque
     ("friction_share", float),  # share of the friction that policy SERVO may use

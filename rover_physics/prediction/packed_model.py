@@ -120,6 +120,7 @@ def _pack_request(
             torque * rover.limits.torque_saturation * (1.0 - options.kept_margin)
         ),
         allowed_friction=float(rover.limits.friction_utilisation * (1.0 - options.kept_margin)),
+        allowed_drop=float(rover.limits.wheel_drop),
         control_margin=float(options.kept_margin),
         servo_droop=float(rover.wheel.servo_droop),
         friction_share=float(rover.limits.friction_utilisation),

@@ -27,6 +27,8 @@ class Wheels(NamedTuple):
     """Largest friction utilisation with which the forces balance, at most 1."""
     torque_limit: float
     """Largest torque saturation with which the forces balance, at most 1."""
+    drop_limit: float
+    """Largest drop of a wheel [m]."""
 
 
 class JumpLimits(NamedTuple):

@@ -206,6 +206,7 @@ def wheels_of(model: PackedModel) -> Wheels:
         float(linkage.reach),
         min(float(settings.allowed_friction), 1.0) + ROUNDING,
         min(float(torque), 1.0) + ROUNDING,
+        float(settings.allowed_drop) + ROUNDING,
     )
 
 
