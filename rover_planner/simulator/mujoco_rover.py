@@ -15,6 +15,7 @@ from rover_physics.names import SIDES, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_wxyz
 from rover_physics.rover.model import Part, Rover
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 
@@ -30,10 +31,15 @@ SERVO_RATE = 5.0
 """Integral gain of a servo over its gain [1/s]."""
 MOTOR_INERTIA = 1.0
 """Inertia of a geared motor at the wheel, over (wheel radius)^2 times a sixth of the mass."""
+STEERING_FREQUENCY = 60.0
+"""Natural frequency of a steering actuator with the inertia of a wheel's motor [rad/s]."""
 MIN_LOAD = 1e-3
 """Load above which a wheel has ground contact, as a share of the rover's weight."""
 DERATING_SHARE = 0.2
 """Share of the maximum speed, at its upper end, over which the motor torque falls to zero."""
+
+_WHEELS = slice(len(SUSPENSION_JOINTS), len(SUSPENSION_JOINTS) + len(WHEEL_JOINTS))
+"""The wheel joints among the joints of the rover."""
 
 _MODEL = """
 <mujoco model={name}>
@@ -112,15 +118,17 @@ class MujocoRover:
         heights = (elevation - elevation.min()) / (span if span > 0.0 else 1.0)
         self._model.hfield_data[:] = heights.ravel()
         self._data = mujoco.MjData(self._model)
-        joints = [*SUSPENSION_JOINTS, *WHEEL_JOINTS]
-        numbers = [self._model.joint(name).id for name in joints]
+        self._steered = steered_wheels(rover)
+        self._joints = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *steering_joints(rover))
+        numbers = [self._model.joint(name).id for name in self._joints]
         self._positions = self._model.jnt_qposadr[numbers]
         self._velocities = self._model.jnt_dofadr[numbers]
         geoms = {self._model.geom(name).id: k for k, name in enumerate(WHEELS)}
         self._wheel_of = np.full(self._model.ngeom, -1)
         for geom, wheel in geoms.items():
             self._wheel_of[geom] = wheel
-        self._inertia = float(self._model.dof_M0[self._velocities[-1]])
+        self._inertia = float(self._model.dof_M0[self._velocities[_WHEELS][-1]])
+        self._aims = np.zeros(len(self._steered))
         self._integral = np.zeros(6)
         self._bodies = np.array([self._model.body(name).id for name in WHEELS])
         self._drop(pose)
@@ -153,8 +161,20 @@ class MujocoRover:
     def step(self, torques: Floats, duration: float) -> None:
         """Apply torques (6,) [N m] in wheel order for a duration [s]; motor limits apply."""
         for _ in range(max(round(duration / self._model.opt.timestep), 1)):
-            self._data.ctrl[:] = self._limit(torques)
-            mujoco.mj_step(self._model, self._data)
+            self._advance(self._limit(torques))
+
+    def steer(self, angles: Floats) -> None:
+        """Turn the steered wheels to angles (6,) [rad] from now on, at their largest rate."""
+        self._aims = np.asarray(angles)[self._steered]
+
+    def _advance(self, torques: Floats) -> None:
+        """Advance by a step of the simulation, with torques (6,) [N m] within the limits."""
+        control = self._data.ctrl
+        control[:6] = torques
+        if self.rover.steering is not None:
+            most = self.rover.steering.rate * self._model.opt.timestep
+            control[6:] += np.clip(self._aims - control[6:], -most, most)
+        mujoco.mj_step(self._model, self._data)
 
     def _limit(self, torques: Floats) -> Floats:
         """Limit torques (6,) [N m] to those of the motors, zero above their maximum speed."""
@@ -180,8 +200,7 @@ class MujocoRover:
             wanted = gain * error + self._integral
             torques = self._limit(wanted)
             self._integral += np.where(wanted == torques, SERVO_RATE * gain * step * error, 0.0)
-            self._data.ctrl[:] = torques
-            mujoco.mj_step(self._model, self._data)
+            self._advance(torques)
         return torques
 
     def servo_with_droop(self, rates: Floats, droop: float, duration: float) -> Floats:
@@ -244,20 +263,27 @@ class MujocoRover:
 
     @property
     def joint_positions(self) -> dict[str, float]:
-        """Angles [rad] of suspension and wheels by joint name."""
+        """Angles [rad] of suspension, wheels and steering by joint name."""
         values = self._data.qpos[self._positions].tolist()
-        return dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), values, strict=True))
+        return dict(zip(self._joints, values, strict=True))
 
     @property
     def joint_velocities(self) -> dict[str, float]:
-        """Rates [rad/s] of suspension and wheels by joint name."""
+        """Rates [rad/s] of suspension, wheels and steering by joint name."""
         values = self._data.qvel[self._velocities].tolist()
-        return dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), values, strict=True))
+        return dict(zip(self._joints, values, strict=True))
+
+    @property
+    def steering_angles(self) -> Floats:
+        """Steering angles (6,) [rad], 0 for fixed wheels."""
+        angles = np.zeros(6)
+        angles[self._steered] = self._data.qpos[self._positions[_WHEELS.stop :]]
+        return angles
 
     @property
     def wheel_rates(self) -> Floats:
         """Rates (6,) of the wheel joints in wheel order [rad/s]."""
-        return self._data.qvel[self._velocities[len(SUSPENSION_JOINTS) :]].copy()
+        return self._data.qvel[self._velocities[_WHEELS]].copy()
 
     @property
     def tilt(self) -> float:
@@ -294,16 +320,21 @@ def _write_model(rover: Rover, terrain: Terrain, friction: float, timestep: floa
     rows, columns = _thin_out(terrain.elevation).shape
     middle = np.array(terrain.origin) + half
     span = float(np.ptp(terrain.elevation))
-    motors = "\n".join(
+    motors = [
         f'<motor name="{joint}" joint="{joint}" ctrllimited="false"/>' for joint in WHEEL_JOINTS
-    )
+    ]
+    stiffness = STEERING_FREQUENCY**2 * _motor_inertia(rover)
+    motors += [
+        f'<position name="{joint}" joint="{joint}" kp="{stiffness}" dampratio="1"/>'
+        for joint in steering_joints(rover)
+    ]
     return _MODEL.format(
         name=quoteattr(rover.name), timestep=timestep,
         contact_time=2.5 * timestep, gravity=rover.gravity, friction=friction,
         rows=rows, columns=columns, half_x=half[0], half_y=half[1],
         height=span if span > 0.0 else 1.0, middle_x=middle[0], middle_y=middle[1],
         lowest=float(terrain.elevation.min()), body=_write_inertia(rover.masses.body, 1.0),
-        sides="\n".join(_write_side(rover, side) for side in SIDES), motors=motors,
+        sides="\n".join(_write_side(rover, side) for side in SIDES), motors="\n".join(motors),
     )  # fmt: skip
 
 
@@ -347,14 +378,22 @@ def _write_side(rover: Rover, side: str) -> str:
 
 
 def _write_wheel(rover: Rover, name: str, place: tuple[float, ...], mirror: float) -> str:
-    wheel = rover.wheel
-    inertia = MOTOR_INERTIA * rover.total_mass / 6.0 * wheel.radius**2
+    """Return the MJCF text of a wheel; one that steers first turns about z of its link."""
+    wheel, inertia = rover.wheel, _motor_inertia(rover)
+    joint = f"{name}_steering"
+    steering = f'<joint name="{joint}" type="hinge" axis="0 0 1" armature="{inertia}"/>'
     return f"""
           <body name="{name}" pos={_point(place, mirror)}>
+            {steering if joint in steering_joints(rover) else ""}
             <joint name="{name}_wheel" type="hinge" axis="0 1 0" armature="{inertia}"/>
             <geom name="{name}" type="cylinder" size="{wheel.radius} {0.5 * wheel.width}"
               euler="90 0 0" mass="{wheel.mass}"/>
           </body>"""
+
+
+def _motor_inertia(rover: Rover) -> float:
+    """Return the inertia of a geared motor at a wheel [kg m^2]."""
+    return MOTOR_INERTIA * rover.total_mass / 6.0 * rover.wheel.radius**2
 
 
 def _write_inertia(part: Part, mirror: float) -> str:
