@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 
 from benchmarks.measure import Figure
 from benchmarks.planner_process import DOMAIN, SERVER, Planner, planner_and_processes
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.contact_ekf import Motion
 from rover_planner.nodes.traction_controller import TractionController
@@ -112,6 +112,7 @@ def _take(node: TractionController, motion: Motion) -> None:
     """Give a node the measurements of a rover."""
     now, rocker = time.monotonic(), (motion.rocker_angle, -motion.rocker_angle)
     positions = dict(zip(SUSPENSION_JOINTS, (*rocker, *motion.bogie_angles), strict=True))
+    positions |= dict(zip(STEERING_JOINTS, motion.steering, strict=True))
     rates = (motion.rocker_rate, -motion.rocker_rate, *motion.bogie_rates, *motion.wheel_rates)
     velocities = dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), rates, strict=True))
     node.service.take_joints(positions, velocities, now)

@@ -15,13 +15,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray, String
 
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.ros.qos import sensor_qos, topic_qos
 
 RATE = 50.0
 """Messages per second of each sensor."""
 NANOSECONDS = 1_000_000_000
-JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 CONTROLLER = "traction_controller"
 
 Stamp = Callable[[], int]
@@ -43,7 +43,7 @@ class DrivenRover(Node):
         super().__init__("rover", context=context, namespace=namespace, **arguments)
         self.joints = JointState(name=list(JOINTS))
         self.joints.position = [0.0] * len(JOINTS)
-        self.joints.velocity = [0.0] * len(SUSPENSION_JOINTS) + [0.2] * len(WHEEL_JOINTS)
+        self.joints.velocity = [0.2 if name in WHEEL_JOINTS else 0.0 for name in JOINTS]
         self.imu = Imu()
         self.twist: TwistStamped | Twist = TwistStamped()
         self.speed = 0.03

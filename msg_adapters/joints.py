@@ -1,11 +1,13 @@
-"""Reads joint state messages: measured joint angles and rates by name."""
+"""Reads joint state messages: measured joint angles and rates by name; the steering's sign."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from sensor_msgs.msg import JointState
 
 from msg_adapters.errors import MessageError
+from rover_physics.names import STEERING_JOINTS
+from rover_physics.rover.steering_joints import STEERING_SIGNS
 
 _PLURALS = {"position": "positions", "velocity": "velocities"}
 
@@ -30,6 +32,21 @@ def joint_velocities(state: JointState, wanted: Collection[str]) -> dict[str, fl
         MessageError: As in `joint_positions`, about velocity.
     """
     return _read_by_name(state, state.velocity, "velocity", "rate in rad/s", wanted)
+
+
+def convert_steering(values: Mapping[str, float], positive: str) -> dict[str, float]:
+    """Return angles or rates by joint name with the sign of steering joints of messages or ours.
+
+    The conversion is the same both ways. Other joints keep their values.
+
+    Args:
+        values: Angles [rad] or rates [rad/s] by joint name.
+        positive: One of STEERING_SIGNS: the side to which positive angles of the messages turn.
+    """
+    sign = STEERING_SIGNS[positive]
+    return {
+        name: sign * value if name in STEERING_JOINTS else value for name, value in values.items()
+    }
 
 
 def _read_by_name(

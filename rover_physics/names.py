@@ -25,6 +25,10 @@ SUSPENSION_JOINTS = ("rocker_right", "rocker_left", "bogie_right", "bogie_left")
 WHEEL_JOINTS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
 """Names of the wheel drive joints in joint messages, in wheel order."""
 
+STEERING_JOINTS = tuple(f"{wheel}_steering" for wheel in WHEELS)
+"""Names of the steering joints in joint messages, in wheel order; a rover has those of its steered
+wheels. Their angles are positive to the left."""
+
 EQUAL, SERVO, OPTIMAL = "equal", "servo", "optimal"
 TORQUE_POLICIES = (EQUAL, SERVO, OPTIMAL)
 """Torque policies: equal torques on all wheels; the torques of speed servos; the torques that need

@@ -9,10 +9,10 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
 from support.rough_grounds import fractal, random_poses, rocky
-from support.rover_geometry import attitude_of
+from support.rover_geometry import wheel_axes
 
 
-def state_of(prediction: PathPrediction, i: int) -> MeasuredState:
+def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
     """Return the measured state at waypoint i."""
     arms = prediction.contact_points[i] - prediction.wheel_centres[i]
     return MeasuredState(
@@ -21,7 +21,8 @@ def state_of(prediction: PathPrediction, i: int) -> MeasuredState:
         prediction.rocker_angle[i, 0],
         prediction.bogie_angle[i],
         prediction.contact_angle[i],
-        arms @ attitude_of(prediction, i)[:, 1],
+        np.sum(arms * wheel_axes(rover, prediction, i), axis=1),
+        prediction.steering_angle[i],
     )
 
 

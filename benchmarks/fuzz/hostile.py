@@ -15,7 +15,7 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2, PointField
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 
 NUMBERS = (
@@ -130,7 +130,7 @@ class HostileMaker:
 
     def joint_state(self) -> JointState:
         """Return joint states with hostile names, numbers and lengths."""
-        names = [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *ARM_JOINTS]
+        names = [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS, *ARM_JOINTS]
         names = names if self.rng.random() < 0.7 else list(ARM_JOINTS)
         if self.rng.random() < 0.3:
             names[self.rng.integers(len(names))] = self.name()

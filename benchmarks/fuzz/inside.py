@@ -19,7 +19,7 @@ from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, stamped_pose_to_array
 from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_physics.warm_up import warm_up
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -154,7 +154,7 @@ class ControllerTarget:
     def _feed(self) -> None:
         """Take good inputs, 10 ms later."""
         self._now += 0.01
-        joints = dict.fromkeys((*SUSPENSION_JOINTS, *WHEEL_JOINTS), 0.0)
+        joints = dict.fromkeys((*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS), 0.0)
         self.service.take_joints(joints, joints, self._now)
         self.service.take_attitude(0.0, 0.0, np.zeros(3), self._now)
         self.service.take_command(0.02, 0.0, self._now)
@@ -162,7 +162,7 @@ class ControllerTarget:
     def _take(self, kind: str, message: Any, resolution: float) -> None:
         service, now = self.service, self._now
         if kind == "joint_states":
-            positions = joint_positions(message, SUSPENSION_JOINTS)
+            positions = joint_positions(message, (*SUSPENSION_JOINTS, *STEERING_JOINTS))
             velocities = joint_velocities(message, (*SUSPENSION_JOINTS, *WHEEL_JOINTS))
             service.take_joints(positions, velocities, now)
         elif kind == "imu":

@@ -18,7 +18,7 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.demo.child_process import ChildProcess
 from rover_planner.parameters.table import specs_of
@@ -153,7 +153,7 @@ class FuzzClient:
 
     def _good_inputs(self) -> dict[str, Any]:
         now = self._node.get_clock().now().to_msg()
-        names = [*SUSPENSION_JOINTS, *WHEEL_JOINTS]
+        names = [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS]
         zeros = [0.0] * len(names)
         imu, twist = Imu(), TwistStamped()
         joints = JointState(name=names, position=zeros, velocity=zeros)

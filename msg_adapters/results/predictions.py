@@ -10,13 +10,20 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from msg_adapters.errors import MessageError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import (
+    LEFT,
+    STEERING_SIGNS,
+    steered_wheels,
+    steering_joints,
+)
 
 MEASURES = ("tip_over_ratio", "tip_over_force_angle")
 """Columns of the tip-over margin: the paper's ratio, and the force-angle measure over its
 value on flat ground."""
 
 JOINTS = SUSPENSION_JOINTS + WHEEL_JOINTS
-"""Joints of the predicted trajectory, in order."""
+"""First joints of the predicted trajectory, in order; those of the steered wheels follow."""
 
 
 def waypoint_array(values: ArrayLike, column_label: str = "wheel") -> Float64MultiArray:
@@ -59,47 +66,59 @@ def tip_over_array(prediction: PathPrediction) -> Float64MultiArray:
 
 def joint_trajectory(
     prediction: PathPrediction,
-    wheel_radius: float,
+    rover: Rover,
     frame_id: str,
     stamp,
     stock: list[JointTrajectoryPoint] | None = None,
+    *,
+    positive_steering: str = LEFT,
 ) -> JointTrajectory:
     """Return the joints along a path, up to the first waypoint that did not settle.
 
-    Positions are the suspension angles and the wheels' rolling angles without slip [rad]. Efforts
-    [N m] are zero for the passive suspension and the drive torques for the wheels. The points are
-    the waypoints in order, at their predicted time from start.
+    Positions are the suspension angles, the wheels' rolling angles without slip and the angles of
+    the steered wheels [rad]. Velocities [rad/s] are the wheels' rates without slip; for suspension
+    and steering, the mean rates since the waypoint before. Efforts [N m] are the drive torques for
+    the wheels and zero for the other joints. The points are the waypoints in order, at their
+    predicted time from start.
 
     Args:
         prediction: Prediction of n waypoints.
-        wheel_radius: Radius of the rover's wheels [m].
+        rover: The rover.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
         stock: Points to reuse, because making them takes most of the time. The list grows as
             needed. One message must be sent before the next one is made from it.
+        positive_steering: One of STEERING_SIGNS: where positive angles of the message turn.
     """
     count = len(prediction.settled)
     if not prediction.settled.all():
         count = int(np.argmin(prediction.settled))
-    trajectory = empty_trajectory(frame_id, stamp)
-    positions = np.hstack(
-        [suspension_angles(prediction)[:count], _rolled_angles(prediction, wheel_radius, count)]
+    trajectory = empty_trajectory(rover, frame_id, stamp)
+    suspension = suspension_angles(prediction)[:count]
+    sign, wheels = STEERING_SIGNS[positive_steering], steered_wheels(rover)
+    steering = sign * prediction.steering_angle[:count, wheels]
+    times = prediction.time[:count]
+    rolled = _rolled_angles(prediction, rover.wheel.radius, count)
+    positions = np.hstack([suspension, rolled, steering])
+    velocities = np.hstack(
+        [_rates(suspension, times), prediction.wheel_speed[:count], _rates(steering, times)]
     )
-    efforts = np.hstack([np.zeros((count, len(SUSPENSION_JOINTS))), prediction.torque[:count]])
+    efforts = np.zeros_like(positions)
+    efforts[:, len(SUSPENSION_JOINTS) : len(JOINTS)] = prediction.torque[:count]
     stock = [] if stock is None else stock
     stock.extend(JointTrajectoryPoint() for _ in range(count - len(stock)))
     trajectory.points = stock[:count]
-    rows = zip(trajectory.points, _rows(positions), _rows(efforts), strict=True)
-    for (point, angles, torques), time in zip(rows, prediction.time[:count].tolist(), strict=True):
-        point.positions, point.effort = angles, torques
+    rows = zip(_rows(positions), _rows(velocities), _rows(efforts), strict=True)
+    for point, row, time in zip(trajectory.points, rows, times.tolist(), strict=True):
+        point.positions, point.velocities, point.effort = row
         start = point.time_from_start
         start.sec, start.nanosec = divmod(round(time * 1e9), 1_000_000_000)
     return trajectory
 
 
-def empty_trajectory(frame_id: str, stamp) -> JointTrajectory:
-    """Return a trajectory of the JOINTS without points."""
-    trajectory = JointTrajectory(joint_names=list(JOINTS))
+def empty_trajectory(rover: Rover, frame_id: str, stamp) -> JointTrajectory:
+    """Return a trajectory of the JOINTS and the rover's steering joints without points."""
+    trajectory = JointTrajectory(joint_names=[*JOINTS, *steering_joints(rover)])
     trajectory.header.frame_id = frame_id
     trajectory.header.stamp = stamp
     return trajectory
@@ -117,12 +136,20 @@ def _rolled_angles(
 ) -> NDArray[np.float64]:
     """Return rolling angles (count, 6) [rad] of the wheels, negative backwards."""
     steps = np.diff(prediction.wheel_centres[:count], axis=0)
-    yaw = prediction.poses[1:count, 2]
-    forward = steps[:, :, 0] * np.cos(yaw)[:, None] + steps[:, :, 1] * np.sin(yaw)[:, None]
+    heading = prediction.poses[1:count, 2, None] + prediction.steering_angle[1:count]
+    forward = steps[:, :, 0] * np.cos(heading) + steps[:, :, 1] * np.sin(heading)
     lengths = np.copysign(np.linalg.norm(steps, axis=2), forward)
     rolled = np.zeros((count, len(WHEEL_JOINTS)))
     rolled[1:] = np.cumsum(lengths, axis=0) / wheel_radius
     return rolled
+
+
+def _rates(values: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean rates (n, k) of values since the row before, 0 in the first row."""
+    rates = np.zeros_like(values)
+    steps = np.diff(times)[:, None]
+    np.divide(np.diff(values, axis=0), steps, out=rates[1:], where=steps > 0.0)
+    return rates
 
 
 def _doubles(values: NDArray[np.float64]) -> array.array:

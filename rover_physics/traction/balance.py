@@ -4,6 +4,11 @@ The nine equations of `equilibrium` are solved for six loads, two lateral terms 
 the last wheel, as linear functions of the other wheels' tractions relative to the last one. The
 wanted push enters as d'Alembert's force, backward at the centre of mass. The tractions together
 then hold the rover against gravity and add the push.
+
+Wheels may be turned. They then roll along the motion of `rolling`: tractions count along the
+wheels' own headings, "equal" ones have the sign with which each wheel rolls in this motion, and a
+push accelerates the rover along it. A push is a generalised force: its work per mean way of the
+wheels.
 """
 
 from dataclasses import dataclass, field
@@ -19,7 +24,7 @@ from rover_physics.forces.equilibrium import (
     solve_equations,
     write_equations,
 )
-from rover_physics.names import WHEEL_COUNT, WHEELS
+from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place, place_masses
@@ -32,17 +37,17 @@ from rover_physics.traction.layout import (
     LATERAL_SHARE,
     LATERAL_SHARE_EQUATION,
     LATERAL_SLOPE,
-    LATERAL_SLOPE_EQUATION,
     LOAD,
     TRACTION,
     TRACTION_EQUATION,
     TRACTIONS,
 )
+from rover_physics.traction.rolling import ROLLING, Rolling, write_rolling
 
 FORCE_ROW, MOMENT_ROW = 0, 3
 """First row of the forces and of the moments in the equations of `equilibrium`."""
-REAR, FRONT = WHEELS.index("rear_right"), WHEELS.index("front_right")
-"""Two wheels whose lateral forces determine those of all wheels, which are linear along x."""
+FIRST_LATERAL, COMMON_TRACTION = 6, 8
+"""Rows of the two lateral terms and of the common traction in the solution of `equilibrium`."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +66,15 @@ class MeasuredState:
     """(6,) angles from the lowest point of a wheel to its contact in [rad], positive in front."""
     contact_offsets: np.ndarray = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
     """(6,) distances of the contacts from the wheels' middle planes, positive to the left [m]."""
+    steering: np.ndarray = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
+    """(6,) steering angles in [rad], positive to the left."""
 
 
 MEASURED_BALANCE = record_type(
     ("A", float, (EQUATIONS, FORCES)),  # coefficients, of order 1
     ("b", float, (EQUATIONS,)),  # right-hand sides
-    ("along", float, (WHEEL_COUNT,)),  # places of the wheels along the body, in rover lengths
+    ("lateral_shares", float, (WHEEL_COUNT, 2)),  # of the wheels in s0 and s1
+    ("directions", float, (WHEEL_COUNT,)),  # 1 where a wheel rolls forward, -1 where backward
     ("force_unit", float),  # a sixth of the weight [N]
 )
 """The equations of `BalanceRows`, for kernels."""
@@ -93,12 +101,23 @@ class BalanceRows:
         return self.packed["b"][0]
 
     @property
-    def along(self) -> np.ndarray:
-        """Positions (6,) of the wheels along the body, in rover lengths: S_i = s0 + s1 along_i.
+    def lateral_shares(self) -> np.ndarray:
+        """Shares (6, 2) of the wheels in the lateral terms: S_i = s0 share_i0 + s1 share_i1.
 
-        The rover length is from rear to front axle.
+        With wheels straight ahead they are 1 and the wheel's position along the body in rover
+        lengths, from rear to front axle.
         """
-        return self.packed["along"][0]
+        return self.packed["lateral_shares"][0]
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Signs (6,): 1 where a wheel rolls forward in the motion of `rolling`, -1 backward."""
+        return self.packed["directions"][0]
+
+    def lateral_forces(self, x: np.ndarray) -> np.ndarray:
+        """Return the lateral forces (6,) of x (14,), in its unit."""
+        shares = self.lateral_shares
+        return x[LATERAL_SHARE] * shares[:, 0] + x[LATERAL_SLOPE] * shares[:, 1]
 
     @property
     def force_unit(self) -> float:
@@ -107,22 +126,24 @@ class BalanceRows:
 
     @property
     def wheel_speeds(self) -> np.ndarray:
-        """Speeds (6,) of the wheels' centres over their mean while the rover drives.
+        """Speeds (6,) of the wheels' centres along their headings while the rover drives.
 
-        They are the coefficients of the traction equation, which is the principle of virtual work.
+        They are over the mean of all wheels' speeds in their `directions`. They are the
+        coefficients of the traction equation, which is the principle of virtual work.
         """
         return WHEEL_COUNT * self.A[TRACTION_EQUATION, TRACTIONS]
 
     @property
     def equal_pull(self) -> float:
-        """Traction of each wheel if all are equal, in force units."""
+        """Traction of each wheel in its direction if all are equal, in force units."""
         return float(self.b[TRACTION_EQUATION])
 
     def complete(self, tractions: np.ndarray) -> np.ndarray:
         """Return x (14,) that keeps all nine equations and the differences between tractions.
 
         Args:
-            tractions: (6,) in force units; their common part is replaced to keep the equations.
+            tractions: (6,) in force units; their common part, along `directions`, is replaced to
+                keep the equations.
         """
         x = np.empty(FORCES)
         _complete(self.packed, tractions, x)
@@ -142,7 +163,8 @@ MEASUREMENT = record_type(
     ),  # z [m], roll, pitch, right rocker, right and left bogie [rad], for `place`
     ("contact_angles", float, (WHEEL_COUNT,)),  # [rad]
     ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
-    ("push", float),  # wanted push along body +x [N]
+    ("steering", float, (WHEEL_COUNT,)),  # [rad]
+    ("push", float),  # wanted push along the motion of `rolling` [N]
     ("resistance", float),  # resistance to the travel of the wheels [N]
 )
 """A `MeasuredState` and the wanted push, for kernels; x, y, z and yaw are 0."""
@@ -153,6 +175,7 @@ BALANCE_WORK = record_type(
     ("placement", PLACEMENT),
     ("contacts", CONTACTS),
     ("balance", BALANCE),
+    ("rolling", ROLLING),
 )
 """Input and work space of `BalanceWriter`."""
 
@@ -180,8 +203,25 @@ class BalanceWriter:
         self._resistance = measured["resistance"]
         self._contact_angles = measured["contact_angles"][0]
         self._contact_offsets = measured["contact_offsets"][0]
+        self._steering = measured["steering"][0]
         self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
+        self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
+        """(6,) whether each wheel hangs on a bogie."""
+
+    def find_rolling(self, state: MeasuredState) -> Rolling:
+        """Return how the wheels roll at a measured state; contact angles are not used."""
+        self._take(state)
+        _find_rolling(self._linkages, self._works)
+        return Rolling(self._works["rolling"].copy())
+
+    def _take(self, state: MeasuredState) -> None:
+        q = self._q
+        q[1], q[2], q[3] = state.roll, state.pitch, state.rocker_angle
+        q[4:] = state.bogie_angles
+        self._contact_angles[:] = state.contact_angles
+        self._contact_offsets[:] = state.contact_offsets
+        self._steering[:] = state.steering
 
     def write(
         self, state: MeasuredState, net_traction: float, resistance: float = 0.0
@@ -189,9 +229,9 @@ class BalanceWriter:
         """Return the balance at a measured state.
 
         Args:
-            state: Attitude, suspension and contact angles.
-            net_traction: Push along body +x in [N], in addition to the force that holds the rover
-                against gravity.
+            state: Attitude, suspension, steering and contact angles.
+            net_traction: Push along the motion of `find_rolling` in [N], in addition to the force
+                that holds the rover against gravity.
             resistance: Resistance to travel that the tractions overcome too, in [N]. A wheel's
                 share is in proportion to its speed as all wheels roll.
 
@@ -199,11 +239,7 @@ class BalanceWriter:
             ModelError: The equations are singular: the contact angles contradict each other, so
                 that the rover could not roll.
         """
-        q = self._q
-        q[1], q[2], q[3] = state.roll, state.pitch, state.rocker_angle
-        q[4:] = state.bogie_angles
-        self._contact_angles[:] = state.contact_angles
-        self._contact_offsets[:] = state.contact_offsets
+        self._take(state)
         self._push[0], self._resistance[0] = net_traction, resistance
         packed = np.zeros(1, MEASURED_BALANCE)
         if not _write_balance(self._linkages, self._works, packed):
@@ -227,16 +263,34 @@ def _centre_of_mass(linkage: Any) -> np.ndarray:
 def _complete(balances, tractions, x):
     """Write x (14,) that keeps all nine equations and the differences between tractions (6,)."""
     balance = balances[0]
-    A, b = balance.A, balance.b
-    last = tractions[LAST_WHEEL]
+    A, b, directions = balance.A, balance.b, balance.directions
+    last = directions[LAST_WHEEL] * tractions[LAST_WHEEL]
     for row in range(EQUATIONS):
         rest = b[row]
         for wheel in range(WHEEL_COUNT):
-            rest -= A[row, TRACTION + wheel] * (tractions[wheel] - last)
+            own = tractions[wheel] - directions[wheel] * last
+            rest -= A[row, TRACTION + wheel] * own
         if row < TRACTION_EQUATION:
             x[LOAD + row] = rest
     for wheel in range(WHEEL_COUNT):
-        x[TRACTION + wheel] = tractions[wheel] - last + rest
+        common = directions[wheel]
+        x[TRACTION + wheel] = tractions[wheel] - common * last + common * rest
+
+
+@kernel
+def _find_rolling(linkages, works):
+    """Place the wheels of the state in `works` and write how they roll."""
+    _place_wheels(linkages[0], works[0])
+
+
+@kernel
+def _place_wheels(linkage, work):
+    """Place wheels and linkage, and write how the wheels roll."""
+    measured, placement = work.measured, work.placement
+    for wheel in range(WHEEL_COUNT):
+        placement.steering[wheel] = measured.steering[wheel]
+    place(linkage, measured.pose, measured.q, placement)
+    write_rolling(linkage, placement, work.com, work.balance.shares, work.rolling)
 
 
 @kernel
@@ -245,7 +299,7 @@ def _write_balance(linkages, works, balances):
     linkage, work, rows = linkages[0], works[0], balances[0]
     placement, balance, measured = work.placement, work.balance, work.measured
     columns = 1 + FREE_TORQUES
-    place(linkage, measured.pose, measured.q, placement)
+    _place_wheels(linkage, work)
     place_masses(linkage, measured.q, placement)
     _write_contacts(linkage.radius, work)
     write_equations(linkage, placement, work.contacts, columns, balance)
@@ -253,7 +307,6 @@ def _write_balance(linkages, works, balances):
     if not solve_equations(columns, balance):
         return False
     rows.force_unit = linkage.mass * linkage.gravity / WHEEL_COUNT
-    _write_places(linkage.length, placement, rows.along)
     _write_rows(balance, rows)
     _add_resistance(measured.resistance / rows.force_unit, rows)
     return True
@@ -280,54 +333,52 @@ def _write_contacts(radius, work):
 def _add_push(linkage, work):
     """Add d'Alembert's force of the wanted push to the right-hand sides of the equations.
 
-    It acts on the body at the centre of mass, against the push: along body -x.
+    It acts on the body at the centre of mass, against the acceleration of the rolling motion:
+    straight ahead along body -x, in a curve with a moment about body z.
     """
-    R, com, B = work.placement.R, work.com, work.balance.B
+    R, com, B, thrust = work.placement.R, work.com, work.balance.B, work.rolling.thrust
     weight = linkage.mass * linkage.gravity
-    force = -work.measured.push
-    moment_y, moment_z = com[2] * force, -com[1] * force
+    ahead = -work.measured.push * thrust[0]
+    left = -work.measured.push * thrust[1]
+    moment_x = -com[2] * left
+    moment_y = com[2] * ahead
+    moment_z = com[0] * left - com[1] * ahead - work.measured.push * thrust[2]
     for i in range(3):
-        B[FORCE_ROW + i, 0] -= R[i, 0] * force / weight
-        moment = R[i, 2] * moment_z + R[i, 1] * moment_y
+        B[FORCE_ROW + i, 0] -= (R[i, 0] * ahead + R[i, 1] * left) / weight
+        moment = R[i, 2] * moment_z + R[i, 1] * moment_y + R[i, 0] * moment_x
         B[MOMENT_ROW + i, 0] -= moment / (weight * linkage.length)
 
 
 @kernel
-def _write_places(length, placement, along):
-    """Write the positions (6,) of the wheels along the body, in rover lengths."""
-    R, origin, centres = placement.R, placement.origin, placement.centres
-    for wheel in range(WHEEL_COUNT):
-        along[wheel] = 0.0
-        for k in range(3):
-            along[wheel] += R[k, 0] * (centres[wheel, k] - origin[k])
-        along[wheel] /= length
-
-
-@kernel
 def _write_rows(balance, rows):
-    """Write A x = b from the solved balance, whose forces are over the weight; A must be zeros."""
-    A, b, along = rows.A, rows.b, rows.along
-    span = along[FRONT] - along[REAR]
+    """Write A x = b from the solved balance, whose forces are over the weight; A must be zeros.
+
+    The free tractions of the solution are those beyond the common one, T_k - d_k d_last T_last
+    with the directions d.
+    """
+    A, b, common = rows.A, rows.b, balance.shares.common
+    for wheel in range(WHEEL_COUNT):
+        rows.directions[wheel] = common[wheel, 2]
+        for term in range(2):
+            rows.lateral_shares[wheel, term] = common[wheel, term]
+    last = common[LAST_WHEEL, 2]
     for column in range(1 + FREE_TORQUES):
-        slope = (balance.lateral[FRONT, column] - balance.lateral[REAR, column]) / span
         for row in range(EQUATIONS):
             if row < LATERAL_SHARE_EQUATION:
                 value = balance.normal[row, column]
                 A[row, LOAD + row] = 1.0
-            elif row == LATERAL_SHARE_EQUATION:
-                value = balance.lateral[REAR, column] - slope * along[REAR]
-                A[row, LATERAL_SHARE] = 1.0
-            elif row == LATERAL_SLOPE_EQUATION:
-                value = slope
-                A[row, LATERAL_SLOPE] = 1.0
+            elif row < TRACTION_EQUATION:
+                term = row - LATERAL_SHARE_EQUATION
+                value = balance.B[FIRST_LATERAL + term, column]
+                A[row, LATERAL_SHARE + term] = 1.0
             else:
-                value = balance.tangential[LAST_WHEEL, column]
+                value = balance.B[COMMON_TRACTION, column]
             if column == 0:
                 b[row] = WHEEL_COUNT * value
             else:
                 A[row, TRACTION + column - 1] = -value
-                A[row, LAST_WHEEL] += value
-    A[TRACTION_EQUATION, LAST_WHEEL] += 1.0
+                A[row, LAST_WHEEL] += value * common[column - 1, 2] * last
+    A[TRACTION_EQUATION, LAST_WHEEL] += last
 
 
 @kernel

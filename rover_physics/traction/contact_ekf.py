@@ -11,7 +11,7 @@ Source: Iagnemma and Dubowsky, "Vehicle wheel-ground contact angle estimation: w
 mobile robot traction control", Advances in Robot Kinematics, 2000.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -78,6 +78,8 @@ class Motion:
     """(6,) rates of the wheel joints [rad/s]."""
     body_rates: np.ndarray
     """(3,) angular velocity, body frame [rad/s]."""
+    steering: np.ndarray = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
+    """(6,) steering angles [rad], positive to the left."""
 
 
 def level_estimate() -> ContactEstimate:
@@ -94,7 +96,9 @@ FILTER = record_type(
     ("bogies", float, (2, 2)),  # bogie pivots, body x and z [m]
     ("turning", float, (WHEEL_COUNT,)),  # turning rate of the link that carries each wheel [rad/s]
     ("speeds", float, (WHEEL_COUNT,)),  # rolling speeds [m/s]
-    ("slopes", float, (WHEEL_COUNT,)),  # slopes of the lines between neighbouring wheels [rad]
+    ("slopes", float, (WHEEL_COUNT,)),  # slopes of the ground between wheels, see `_write_slopes`
+    ("headings", float, (WHEEL_COUNT, 2)),  # cosine and sine of the steering angles
+    ("levels", float, (WHEEL_COUNT,)),  # directions of the horizontal in the wheels' planes [rad]
     ("first", np.int64, (PAIRS,)),  # wheel whose velocity counts positive
     ("second", np.int64, (PAIRS,)),  # wheel whose velocity counts negative
     ("known", float, (PAIRS, 2)),  # difference of their velocities by the links [m/s]
@@ -108,6 +112,7 @@ MOTION = record_type(
     ("joint_rates", float, (3,)),  # of the same [rad/s]
     ("wheel_rates", float, (WHEEL_COUNT,)),  # [rad/s]
     ("body_rates", float, (3,)),  # [rad/s]
+    ("steering", float, (WHEEL_COUNT,)),  # [rad]
 )
 """A `Motion`, for kernels."""
 
@@ -136,6 +141,7 @@ class MotionContactEstimator:
         self._attitude, self._joints = motion.attitude, motion.joints
         self._joint_rates = motion.joint_rates
         self._wheel_rates, self._body_rates = motion.wheel_rates, motion.body_rates
+        self._steering = motion.steering
 
     @property
     def estimate(self) -> ContactEstimate:
@@ -153,6 +159,7 @@ class MotionContactEstimator:
         self._joints[0], self._joints[1:] = motion.rocker_angle, motion.bogie_angles
         self._joint_rates[0], self._joint_rates[1:] = motion.rocker_rate, motion.bogie_rates
         self._wheel_rates[:], self._body_rates[:] = motion.wheel_rates, motion.body_rates
+        self._steering[:] = motion.steering
         if not self._started:
             _start(self._linkages, self._motions, self._filters)
             self._started = True
@@ -164,10 +171,22 @@ class MotionContactEstimator:
 def _start(linkages, motions, filters):
     """Start from the slopes between neighbouring wheels, which a rover at rest can measure."""
     motion, state = motions[0], filters[0]
+    _write_headings(motion, state)
     _place(linkages[0], motion, state)
-    level = _find_level(motion)
     for wheel in range(WHEEL_COUNT):
-        state.angles[wheel] = state.slopes[wheel] - level
+        state.angles[wheel] = state.slopes[wheel]
+
+
+@kernel
+def _write_headings(motion, state):
+    """Write the headings of the wheels, and the horizontal in the planes of heading and body z."""
+    roll, pitch = motion.attitude[0], motion.attitude[1]
+    for wheel in range(WHEEL_COUNT):
+        angle = motion.steering[wheel]
+        c, s = np.cos(angle), np.sin(angle)
+        state.headings[wheel, 0], state.headings[wheel, 1] = c, s
+        nose_down = np.sin(pitch) * c - np.cos(pitch) * np.sin(roll) * s
+        state.levels[wheel] = np.arctan2(nose_down, np.cos(pitch) * np.cos(roll))
 
 
 @kernel
@@ -181,22 +200,26 @@ def _find_level(motion):
 def _update(linkages, motions, duration, filters):
     """Place the wheels; if the rover moves, let the angles drift and correct them."""
     linkage, motion, state = linkages[0], motions[0], filters[0]
-    level = _find_level(motion)
+    _write_headings(motion, state)
     _place(linkage, motion, state)
     max_speed = 0.0
     for wheel in range(WHEEL_COUNT):
-        rate = motion.wheel_rates[wheel] + state.turning[wheel]
+        # The link's rate about the axle.
+        turning = state.headings[wheel, 0] * state.turning[wheel]
+        turning -= state.headings[wheel, 1] * motion.body_rates[0]
+        rate = motion.wheel_rates[wheel] + turning
         state.speeds[wheel] = linkage.radius * rate
         max_speed = max(max_speed, abs(state.speeds[wheel]))
     if max_speed > MIN_ROLLING_RATE * linkage.radius:
-        _drift(linkage.radius, level, duration, state)
-        _correct(linkage.length, level, state)
+        _drift(linkage.radius, duration, state)
+        _correct(linkage.length, state)
 
 
 @kernel
 def _place(linkage, motion, state):
     """Write places, turning rates, slopes and the velocity differences given by the links."""
     wheels, places, known = linkage.wheels, state.places, state.known
+    level = _find_level(motion)
     for side in range(2):
         angle = rocker_sign(side) * motion.joints[0]
         rocker_rate = motion.body_rates[1] + rocker_sign(side) * motion.joint_rates[0]
@@ -216,7 +239,7 @@ def _place(linkage, motion, state):
                 dx, dz = dx + px, dz + pz
                 state.turning[wheel] = rocker_rate
             places[wheel, 0], places[wheel, 1] = dx, dz
-        _write_slopes(places, side, state.slopes)
+        _write_slopes(motion.attitude[0], level, side, state)
         low, high = state.second[2 * side], state.first[2 * side]
         own = state.first[2 * side + 1]
         for i, sign in ((0, 1.0), (1, -1.0)):
@@ -230,8 +253,17 @@ def _place(linkage, motion, state):
                 known[ROCKER_PAIR, i] if side == 1 else 0.0
             )
     width = linkage.rocker_pivots[1, 1] - linkage.rocker_pivots[0, 1]
-    known[ROCKER_PAIR, 0] -= width * motion.body_rates[2]
     known[ROCKER_PAIR, 1] += width * motion.body_rates[0]
+    turned = False
+    for wheel in range(WHEEL_COUNT):
+        turned |= motion.steering[wheel] != 0.0
+    if not turned:
+        known[ROCKER_PAIR, 0] -= width * motion.body_rates[2]
+        return
+    # In a curve the yaw rate is more than noise: the places of the wheels themselves count.
+    for pair in range(PAIRS):
+        apart = wheels[state.first[pair], 1] - wheels[state.second[pair], 1]
+        known[pair, 0] -= apart * motion.body_rates[2]
 
 
 @kernel
@@ -242,8 +274,13 @@ def _rotate(angle, x, z):
 
 
 @kernel
-def _write_slopes(places, side, slopes):
-    """Write for each wheel of a side the mean slope [rad] of the lines to its neighbours."""
+def _write_slopes(roll, level, side, state):
+    """Write for each wheel of a side the slope [rad] of the ground in its heading.
+
+    Along the body it is the mean slope of the lines to the neighbouring wheels against the
+    horizontal, `level`; across the body it is the roll.
+    """
+    places, slopes, headings = state.places, state.slopes, state.headings
     rear = 3 * side
     behind = np.arctan2(
         places[rear + 1, 1] - places[rear, 1], places[rear + 1, 0] - places[rear, 0]
@@ -252,15 +289,17 @@ def _write_slopes(places, side, slopes):
         places[rear + 2, 1] - places[rear + 1, 1], places[rear + 2, 0] - places[rear + 1, 0]
     )
     slopes[rear], slopes[rear + 1], slopes[rear + 2] = behind, 0.5 * (behind + before), before
+    for wheel in range(rear, rear + 3):
+        slopes[wheel] = headings[wheel, 0] * (slopes[wheel] - level) + headings[wheel, 1] * roll
 
 
 @kernel
-def _drift(radius, level, duration, state):
+def _drift(radius, duration, state):
     """Move the angles towards the slopes between wheels, by the distance each wheel has rolled."""
     P = state.covariance
     for i in range(WHEEL_COUNT):
         kept = np.exp(-abs(state.speeds[i]) * duration / (MEMORY_DISTANCE * radius))
-        slope = state.slopes[i] - level
+        slope = state.slopes[i]
         state.angles[i] = slope + kept * (state.angles[i] - slope)
         for j in range(WHEEL_COUNT):
             P[i, j] *= kept
@@ -269,13 +308,13 @@ def _drift(radius, level, duration, state):
 
 
 @kernel
-def _correct(length, level, state):
+def _correct(length, state):
     """Correct the angles by each equation in turn, all linearised at the same angles.
 
-    `length` is the rover's length [m], `level` the direction of the horizontal in the body's x-z
-    plane [rad].
+    `length` is the rover's length [m].
     """
     angles, prior, speeds = state.angles, state.prior, state.speeds
+    levels, headings = state.levels, state.headings
     for i in range(WHEEL_COUNT):
         prior[i] = angles[i]
     for pair in range(PAIRS):
@@ -283,8 +322,8 @@ def _correct(length, level, state):
         noise = SLIP_DEVIATION * SLIP_DEVIATION * (speeds[a] * speeds[a] + speeds[b] * speeds[b])
         noise += GYRO_DEVIATION * GYRO_DEVIATION * length * length
         for axis in range(2):
-            va, sa = _resolve(speeds[a], prior[a] + level, axis)
-            vb, sb = _resolve(speeds[b], prior[b] + level, axis)
+            va, sa = _resolve(speeds[a], prior[a] + levels[a], headings[a, 0], axis)
+            vb, sb = _resolve(speeds[b], prior[b] + levels[b], headings[b, 0], axis)
             residual = state.known[pair, axis] - (va - vb)
             residual -= sa * (angles[a] - prior[a]) - sb * (angles[b] - prior[b])
             _take_equation((a, b), (sa, -sb), residual, noise, state)
@@ -293,11 +332,14 @@ def _correct(length, level, state):
 
 
 @kernel
-def _resolve(speed, direction, axis):
-    """Return the velocity along body x (axis 0) or z (1), and its derivative by the direction."""
+def _resolve(speed, direction, ahead, axis):
+    """Return the velocity along body x (axis 0) or z (1), and its derivative by the direction.
+
+    `direction` is in the plane of the wheel [rad], `ahead` the cosine of the steering angle.
+    """
     along, up = speed * np.cos(direction), speed * np.sin(direction)
     if axis == 0:
-        return along, -up
+        return ahead * along, -ahead * up
     return up, along
 
 

@@ -11,13 +11,13 @@ LAST_WHEEL = WHEEL_COUNT - 1
 
 # Variables. The first FORCES of them are also the variables of the balance.
 TRACTION = 0
-"""First of the tractions T (6): forces along the ground, positive forward."""
+"""First of the tractions T (6): forces along the ground in the wheels' headings."""
 LOAD = TRACTION + WHEEL_COUNT
 """First of the wheel loads N (6): forces normal to the ground, positive if the ground pushes."""
 LATERAL_SHARE = LOAD + WHEEL_COUNT
-"""s0 of the lateral forces S_i = s0 + s1 along_i, the same for all wheels."""
+"""s0 of the lateral forces; straight ahead it is the same for all wheels."""
 LATERAL_SLOPE = LATERAL_SHARE + 1
-"""s1 of the lateral forces, their change along the body per rover length."""
+"""s1 of the lateral forces; straight ahead their change along the body per rover length."""
 FORCES = LATERAL_SLOPE + 1
 """Number of forces: tractions, loads and the two lateral terms."""
 PEAK = FORCES

@@ -29,7 +29,7 @@ ROUNDING = 1e-4
 
 def measure_utilisation(rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray) -> np.ndarray:
     """Return sqrt(T^2 + S^2) / (mu N) (6,) of x (14,), with loads of MIN_LOAD at least."""
-    across = np.hypot(x[TRACTIONS], x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along)
+    across = np.hypot(x[TRACTIONS], rows.lateral_forces(x))
     return across / (inputs.friction * np.maximum(x[LOADS], MIN_LOAD))
 
 
@@ -71,10 +71,10 @@ def _measure_first_peak(balances, all_inputs, x):
 @kernel
 def _measure_peak(balance, inputs, x):
     """Return the peak utilisation of forces x (14,)."""
-    along, friction = balance.along, inputs.friction
+    shares, friction = balance.lateral_shares, inputs.friction
     peak = 0.0
     for wheel in range(WHEEL_COUNT):
-        lateral = x[LATERAL_SHARE] + x[LATERAL_SLOPE] * along[wheel]
+        lateral = x[LATERAL_SHARE] * shares[wheel, 0] + x[LATERAL_SLOPE] * shares[wheel, 1]
         across = np.sqrt(x[TRACTION + wheel] * x[TRACTION + wheel] + lateral * lateral)
         peak = max(peak, across / (friction[wheel] * max(x[LOAD + wheel], MIN_LOAD)))
     return peak

@@ -3,7 +3,8 @@
 Attitude and suspension angles are measured, so the relative places of the wheels are more accurate
 than from the map. The height of the body comes from the map, because odometry drifts. A wheel at
 the foot of a face touches both ground and face, and has to climb the face. Of several places that
-are about equally near, the one farthest ahead therefore counts.
+are about equally near, the one farthest ahead in the direction in which the wheel rolls therefore
+counts.
 """
 
 import numpy as np
@@ -45,7 +46,7 @@ MAP_SEARCH = record_type(
         float,
         (6,),
     ),  # z [m], roll, pitch, right rocker, right and left bogie [rad], for `place`
-    ("direction", float),  # 1 where the rover drives forward, -1 where backward
+    ("directions", float, (WHEEL_COUNT,)),  # 1 where a wheel rolls forward, -1 where backward
     ("placement", PLACEMENT),
     ("distance", float, (PROFILES, MAX_PLACES)),  # of near places from the wheel's centre [m]
     ("angle", float, (PROFILES, MAX_PLACES)),  # contact angles of the same [rad]
@@ -67,23 +68,29 @@ class MapContactFinder:
         self._searches = array_of(new_record(MAP_SEARCH))
         # Views are kept because looking up a field of a record is as slow as writing it.
         search = self._searches
-        self._pose, self._q, self._direction = (
+        self._pose, self._q, self._directions = (
             search["pose"][0],
             search["q"][0],
-            search["direction"],
+            search["directions"][0],
         )
+        self._steering = search["placement"]["steering"][0]
         self._gaps, self._angles = search["gaps"][0], search["angles"][0]
 
     def find(
-        self, state: MeasuredState, pose: np.ndarray, deviation: float, forward: bool = True
+        self,
+        state: MeasuredState,
+        pose: np.ndarray,
+        deviation: float,
+        directions: np.ndarray | float = 1.0,
     ) -> ContactEstimate:
         """Find the contact angles.
 
         Args:
-            state: Attitude and suspension; its contact angles are not used.
+            state: Attitude, suspension and steering; its contact angles are not used.
             pose: (4,) x, y, z [m] and yaw [rad] of the body's origin in the map frame.
             deviation: Standard deviation of x and y [m].
-            forward: Whether the rover drives forward, so that "ahead" is in front.
+            directions: (6,) 1 for wheels that roll forward, so that "ahead" is in front, -1 for
+                those that roll backward; one number for all.
 
         Raises:
             ModelError: A wheel is beyond the map, over unknown ground, or not near the ground.
@@ -91,7 +98,8 @@ class MapContactFinder:
         self._pose[:] = pose[0], pose[1], pose[3]
         self._q[:4] = pose[2], state.roll, state.pitch, state.rocker_angle
         self._q[4:] = state.bogie_angles
-        self._direction[0] = 1.0 if forward else -1.0
+        self._directions[:] = directions
+        self._steering[:] = state.steering
         _find_angles(self._ground.records, self._linkages, self._searches)
         known = np.isfinite(self._gaps) & np.isfinite(self._angles)
         if not known.all():
@@ -145,8 +153,9 @@ def _measure_gaps(ground, linkage, search):
 @kernel
 def _find_nearest(ground, linkage, search):
     """Write for each wheel the angle of the place farthest ahead among its nearest places."""
-    direction, angles = search.direction, search.angles
+    angles = search.angles
     for wheel in range(WHEEL_COUNT):
+        direction = search.directions[wheel]
         nearest = np.inf
         for profile in range(PROFILES):
             _scan_profile(ground, linkage, search, wheel, profile)

@@ -1,12 +1,12 @@
 """The quadratic program (QP) that shares the torques: no wheel slips before all give their part.
 
 Variables, x = scale * y + shift in sixths of the weight: tractions T (6), loads N (6), lateral
-terms s0 and s1 with S_i = s0 + s1 along_i, the peak friction utilisation u, and three slacks: of
-the friction limit, of contact and of the torque limit. Rows: the nine equations of the balance;
-for each wheel the friction cone that u opens; u <= 1, N >= 0 and |T| <= largest torque over wheel
-radius, each with its slack; u and slacks >= 0. So an answer always exists, and the slacks say by
-how much a limit is exceeded. `scale` makes tractions and peak of order one: a peak of 0.1 matters
-as much as one of 1. `layout.py` names all variables and rows.
+terms s0 and s1, the peak friction utilisation u, and three slacks: of the friction limit, of
+contact and of the torque limit. T and S are along and across each wheel's own heading. Rows: the
+nine equations of the balance; for each wheel the friction cone that u opens; u <= 1, N >= 0 and
+|T| <= largest torque over wheel radius, each with its slack; u and slacks >= 0. So an answer
+always exists, and the slacks say by how much a limit is exceeded. `scale` makes tractions and peak
+of order one: a peak of 0.1 matters as much as one of 1. `layout.py` names all variables and rows.
 
 A quadratic program cannot hold the cone sqrt(T^2 + S^2) <= u mu N itself:
 
@@ -158,7 +158,8 @@ def _write_program(balances, all_inputs, last, last_peak, programs):
         qp.lower[row], qp.upper[row] = -np.inf, np.inf
     _write_balance_rows(balance, unit, qp)
     for wheel in range(WHEEL_COUNT):
-        _write_cone(balance.along[wheel], inputs.friction[wheel], last, wheel, qp)
+        shares = balance.lateral_shares[wheel, 0], balance.lateral_shares[wheel, 1]
+        _write_cone(shares, inputs.friction[wheel], last, wheel, qp)
     _write_limit_rows(max_pull_of(inputs, balance.force_unit), qp)
 
 
@@ -200,17 +201,20 @@ def _write_balance_rows(balance, unit, qp):
 
 
 @kernel
-def _write_cone(along, friction, last, wheel, qp):
-    """Write the tangents of one wheel's cone, one of them where the last forces (14,) point."""
+def _write_cone(shares, friction, last, wheel, qp):
+    """Write the tangents of one wheel's cone, one of them where the last forces (14,) point.
+
+    `shares` are those of the wheel in the two lateral terms.
+    """
     A, unit, peak, load = qp.A, qp.scale[TRACTION], qp.scale[PEAK], qp.shift[LOAD + wheel]
-    lateral = last[LATERAL_SHARE] + last[LATERAL_SLOPE] * along
+    lateral = last[LATERAL_SHARE] * shares[0] + last[LATERAL_SLOPE] * shares[1]
     direction = np.arctan2(lateral, last[TRACTION + wheel])
     for side in range(CONE_SIDES):
         row = CONE_ROWS + wheel * CONE_SIDES + side
         angle = direction + 2.0 * np.pi * side / CONE_SIDES
         A[row, TRACTION + wheel] = np.cos(angle)
-        A[row, LATERAL_SHARE] = np.sin(angle)
-        A[row, LATERAL_SLOPE] = np.sin(angle) * along
+        A[row, LATERAL_SHARE] = np.sin(angle) * shares[0]
+        A[row, LATERAL_SLOPE] = np.sin(angle) * shares[1]
         A[row, LOAD + wheel] = -friction * peak
         A[row, PEAK] = -friction * load * peak / unit
         qp.upper[row] = 0.0

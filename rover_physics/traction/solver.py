@@ -107,7 +107,9 @@ class TractionWorkspace:
 
 def _find_pattern() -> tuple[np.ndarray, sparse.csc_matrix]:
     """Return where the entries of a sparse A are in a full one, and a sparse A."""
-    ones = new_record(MEASURED_BALANCE, A=1.0, b=1.0, along=1.0, force_unit=1.0)
+    ones = new_record(
+        MEASURED_BALANCE, A=1.0, b=1.0, lateral_shares=1.0, directions=1.0, force_unit=1.0
+    )
     inputs = ProgramInputs(np.ones(WHEEL_COUNT), 1.0, 1.0)
     reference = Reference(np.full(FORCES, 0.5), 0.5)
     A = build_traction_qp(BalanceRows(array_of(ones)), inputs, reference).A

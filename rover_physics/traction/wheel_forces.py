@@ -36,7 +36,8 @@ def write_wheel_forces(balances, all_inputs, x, table):
     peak, min_load, max_traction = 0.0, np.inf, 0.0
     for wheel in range(WHEEL_COUNT):
         traction, load = unit * x[TRACTION + wheel], unit * x[LOAD + wheel]
-        lateral = unit * (x[LATERAL_SHARE] + x[LATERAL_SLOPE] * balance.along[wheel])
+        shares = balance.lateral_shares[wheel]
+        lateral = unit * (x[LATERAL_SHARE] * shares[0] + x[LATERAL_SLOPE] * shares[1])
         across = np.sqrt(traction * traction + lateral * lateral)
         used = across / (inputs.friction[wheel] * load) if load > 0.0 else np.inf
         torques[wheel] = min(max(inputs.radius * traction, -limit), limit)

@@ -62,7 +62,10 @@ _KINDS = {
 class ResultTopics:
     """Makes the plan of a judgement at once and publishes all results after the answer is sent."""
 
-    def __init__(self, node: Node, deferred_work: DeferredWork, map_frame: str):
+    def __init__(
+        self, node: Node, deferred_work: DeferredWork, map_frame: str, positive_steering: str
+    ):
+        self._positive_steering = positive_steering
         self._node, self._deferred_work, self._frame = node, deferred_work, map_frame
         self._poses = PoseStock()
         self._points: list[JointTrajectoryPoint] = []
@@ -101,6 +104,7 @@ class ResultTopics:
             ns_to_stamp(self._next_stamp()),
             self._poses,
             self._points,
+            self._positive_steering,
         )
         plan = results.plan()
         if judgement.traversable and not identity.path_hash:
@@ -160,6 +164,7 @@ class _Results:
     stamp: Time
     poses: PoseStock
     points: list[JointTrajectoryPoint]
+    positive_steering: str
 
     @cached_property
     def report(self) -> VerdictReport:
@@ -191,7 +196,7 @@ class _Results:
     def _nothing(self, topic: str) -> object:
         """Return the empty message that is published if no path was judged."""
         if topic == "predicted_joints":
-            return empty_trajectory(self.frame, self.stamp)
+            return empty_trajectory(self.rover, self.frame, self.stamp)
         if topic == "markers":
             return cleared_markers(self.frame, self.stamp)
         if topic == "tip_over_margin":
@@ -204,8 +209,10 @@ class _Results:
         assert candidate is not None
         prediction = candidate.prediction
         if topic == "predicted_joints":
-            radius = self.rover.wheel.radius
-            return joint_trajectory(prediction, radius, self.frame, self.stamp, self.points)
+            return joint_trajectory(
+                prediction, self.rover, self.frame, self.stamp, self.points,
+                positive_steering=self.positive_steering,
+            )  # fmt: skip
         if topic == "markers":
             classes = [waypoint.traversability_class for waypoint in self.judgement.classes]
             reasons, rows = candidate.verdict.reasons, self._rows_to_show()

@@ -23,6 +23,7 @@ from std_msgs.msg import Float64MultiArray
 from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
+from msg_adapters.joints import convert_steering
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
@@ -53,7 +54,7 @@ class RoverSimulator(Node):
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
         parameters = declare_parameters(self, RoverSimulatorParameters)
-        self._frame = parameters.map_frame
+        self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
         self._simulation = Simulation(self._settings)
@@ -128,8 +129,11 @@ class RoverSimulator(Node):
         self._state = state = self._simulation.advance(time.monotonic(), self._period)
         stamp = self.get_clock().now().to_msg()
         efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
-        positions = state.joint_positions | self._arm_angles()
-        self._joints.publish(joint_state(positions, state.joint_velocities, efforts, stamp))
+        positions, velocities = (
+            convert_steering(values, self._steering_sign)
+            for values in (state.joint_positions | self._arm_angles(), state.joint_velocities)
+        )
+        self._joints.publish(joint_state(positions, velocities, efforts, stamp))
         self._odometry.publish(
             odometry_message(
                 state.position, state.orientation, state.velocity, state.body_rates,

@@ -11,9 +11,9 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import joint_positions, joint_velocities
+from msg_adapters.joints import convert_steering, joint_positions, joint_velocities
 from msg_adapters.odometry import odometry_to_pose
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import MapIntake
@@ -32,6 +32,8 @@ from rover_planner.traction.traction_service import (
 )
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
+"""Joints whose positions are read; a rover has the steering joints of its steered wheels."""
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 CLOUD = "elevation_cloud"
 
@@ -50,6 +52,7 @@ class TractionInputs:
         """Subscribe to all inputs of a node; `guard` counts unexpected errors."""
         self._node, self._service, self._maps = node, service, maps
         self._errors = guard
+        self._steering_sign = parameters.steering_sign
         self._map_frame, self._base_frame = parameters.map_frame, parameters.base_frame
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
@@ -122,11 +125,11 @@ class TractionInputs:
         return self.stamps.find_time(name, stamp, clock, now, merged=merged)
 
     def _take_joints(self, state: JointState, now: float) -> None:
-        if not set(JOINTS).intersection(state.name):  # an arm's message, for example
+        if not {*JOINTS, *ANGLES}.intersection(state.name):  # an arm's message, for example
             return
         stamp = _stamp_of(state)
         measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
-        positions = joint_positions(state, SUSPENSION_JOINTS)
+        positions = convert_steering(joint_positions(state, ANGLES), self._steering_sign)
         self._service.take_joints(positions, joint_velocities(state, JOINTS), measured, stamp)
 
     def _take_imu(self, imu: Imu, now: float) -> None:

@@ -80,7 +80,7 @@ class TraverseServer(Node):
         self.guard = Guard(self.get_logger())
         """Takes unexpected errors."""
         frame, reliability = self._values.map_frame, self._values.input_reliability
-        self._results = ResultTopics(self, DeferredWork(self), frame)
+        self._results = ResultTopics(self, DeferredWork(self), frame, self._values.steering_sign)
         self._maps = MapTopics(
             self, self._service, self._values, self.guard, lambda error: self._note_map(error)
         )

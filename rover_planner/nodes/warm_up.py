@@ -3,7 +3,7 @@
 import numpy as np
 
 from rover_physics.compilation import Step
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_physics.warm_up import EXACT, SCORES, UNCERTAIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -18,7 +18,7 @@ TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_tra
 GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES))
 """All kernels; groups have hardly any in common."""
 
-JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 
 
 def plan_candidates() -> None:

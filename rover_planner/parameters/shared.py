@@ -1,6 +1,7 @@
 """Parameters that several nodes share."""
 
 from msg_adapters.gridding import CELL_HEIGHTS
+from rover_physics.rover.steering_joints import LEFT, STEERING_SIGNS
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.parameters.table import ParameterError, parameter
 
@@ -24,6 +25,28 @@ def max_torque_parameter() -> float:
         "Largest torque of a wheel; 0 uses that of the rover file.",
         unit="N m",
         bounds=(0.0, 1e6),
+    )
+
+
+def steering_sign_parameter() -> str:
+    """Return the field of the parameter steering_sign."""
+    return parameter(
+        LEFT,
+        "Side to which positive angles of the steering joints turn in messages; left as in "
+        "REP-103.",
+        choices=tuple(STEERING_SIGNS),
+        read_only=True,
+    )
+
+
+def steering_limit_parameter() -> float:
+    """Return the field of the parameter steering_limit [rad]."""
+    return parameter(
+        0.0,
+        "Largest angle that the steering joints reach, as in the rover's URDF; 0 takes that of "
+        "the rover file. The node refuses a rover file that asks for more.",
+        unit="rad",
+        bounds=(0.0, 3.2),
     )
 
 

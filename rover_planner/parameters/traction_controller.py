@@ -10,6 +10,8 @@ from rover_planner.parameters.shared import (
     map_resolution_parameter,
     max_torque_parameter,
     payload_parameter,
+    steering_limit_parameter,
+    steering_sign_parameter,
 )
 from rover_planner.parameters.table import ParameterTable, parameter
 
@@ -121,6 +123,8 @@ class TractionControllerParameters(ParameterTable):
         unit="s/m",
         bounds=(0.0, 1e3),
     )
+    steering_limit: float = steering_limit_parameter()
+    steering_sign: str = steering_sign_parameter()
     map_frame: str = parameter(
         "map", "Frame of map and odometry; messages in another frame are refused.", read_only=True
     )

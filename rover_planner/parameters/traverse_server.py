@@ -13,6 +13,8 @@ from rover_planner.parameters.shared import (
     max_map_cells_parameter,
     max_torque_parameter,
     payload_parameter,
+    steering_limit_parameter,
+    steering_sign_parameter,
 )
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 
@@ -69,6 +71,8 @@ class TraverseServerParameters(ParameterTable):
         unit="m",
         bounds=(0.0, 100.0),
     )
+    steering_limit: float = steering_limit_parameter()
+    steering_sign: str = steering_sign_parameter()
     map_frame: str = parameter(
         "map", "Frame of the map; requests in another frame are refused.", read_only=True
     )

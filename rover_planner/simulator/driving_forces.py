@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.names import SIDES, WHEEL_COUNT, WHEELS
+from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
-from rover_physics.traction.layout import LATERAL_SHARE, LATERAL_SLOPE, LOADS, TRACTIONS
+from rover_physics.traction.layout import LOADS, TRACTIONS
 
 ROUNDS = 6
 """Fixed-point iterations of loads and tractions, which depend on each other by friction."""
@@ -23,9 +24,9 @@ class DrivingForces:
     """The forces on a rover, moving or at rest, under given torques."""
 
     push: float
-    """Net force along body +x that accelerates the rover [N]."""
+    """Net force along the rolling motion of the wheels that accelerates the rover [N]."""
     tractions: Floats
-    """(6,) tractions along the ground, positive forward, limited by friction [N]."""
+    """(6,) tractions along the ground in the wheels' headings, limited by friction [N]."""
     loads: Floats
     """(6,) normal forces, at least 0 [N]."""
     utilisation: Floats
@@ -48,15 +49,17 @@ def find_driving_forces(
         radius: Wheel radius [m].
         here: Prediction of one waypoint, the rover's pose.
         torques: (6,) motor torques [N m], positive forward.
-        direction: 1 if the rover moves forward, -1 backward, 0 at rest.
+        direction: 1 if the rover moves along the rolling motion of the wheels, -1 against it, 0 at
+            rest.
 
     Returns:
         The forces; zero push and the loads of `here` if the balance has no unique solution.
     """
     friction, loads, lateral = here.friction[0], here.wheel_loads[0], here.lateral[0]
     resistance = np.nan_to_num(here.motion_resistance[0])
-    wanted = torques / radius - direction * resistance
-    state = _measure_state(here)
+    state = measure_state(here, writer.on_bogie)
+    rolls = direction * writer.find_rolling(state).directions
+    wanted = torques / radius - rolls * resistance
     tractions, push, sliding = wanted, 0.0, np.zeros(WHEEL_COUNT, dtype=bool)
     for _ in range(ROUNDS):
         loads = np.maximum(loads, 0.0)
@@ -68,8 +71,8 @@ def find_driving_forces(
         except ModelError:
             return DrivingForces(0.0, tractions, loads, here.friction_utilisation[0], sliding)
         x = rows.complete(tractions / rows.force_unit) * rows.force_unit
-        push += float((tractions - x[TRACTIONS]).sum())
-        loads, lateral = x[LOADS], x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along
+        push += float((rows.directions * (tractions - x[TRACTIONS])).sum())
+        loads, lateral = x[LOADS], rows.lateral_forces(x)
     loads = np.maximum(loads, 0.0)
     used = np.hypot(tractions, lateral) / np.maximum(friction * loads, MIN_CAPACITY)
     if not direction:  # at rest, a push below the soil's resistance has no effect
@@ -78,16 +81,25 @@ def find_driving_forces(
     return DrivingForces(push, tractions, loads, utilisation, sliding)
 
 
-def _measure_state(here: PathPrediction) -> MeasuredState:
-    """Return the measured state of a rover at the waypoint, including its contacts."""
-    offsets = (here.contact_points[0] - here.wheel_centres[0]) @ _find_wheel_axis(here)
+def measure_state(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> MeasuredState:
+    """Return the measured state of a rover at the waypoint, including its contacts.
+
+    `on_bogie` (6,) says which wheels hang on a bogie.
+    """
+    arms = here.contact_points[0] - here.wheel_centres[0]
     return MeasuredState(
         float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
-        here.bogie_angle[0], here.contact_angle[0], offsets,
+        here.bogie_angle[0], here.contact_angle[0],
+        np.sum(arms * _find_axles(here, on_bogie), axis=1), here.steering_angle[0],
     )  # fmt: skip
 
 
-def _find_wheel_axis(here: PathPrediction) -> Floats:
-    """Return the direction (3,) of the wheel axes from right to left, map frame."""
-    right, left = here.wheel_centres[0].reshape(len(SIDES), -1, 3).mean(axis=1)
-    return np.asarray((left - right) / np.linalg.norm(left - right))
+def _find_axles(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> Floats:
+    """Return the directions (6, 3) of the axles, positive to the left, map frame."""
+    yaw = float(here.poses[0, 2])
+    R = matrix_from_xyzw(xyzw_from_rpy(float(here.roll[0]), float(here.pitch[0]), yaw))
+    bogies = np.repeat(here.bogie_angle[0], 3)
+    links = np.repeat(here.rocker_angle[0], 3) + np.where(on_bogie, bogies, 0.0)
+    ahead = np.cos(links)[:, None] * R[:, 0] - np.sin(links)[:, None] * R[:, 2]
+    angles = here.steering_angle[0][:, None]
+    return np.asarray(np.cos(angles) * R[:, 1] - np.sin(angles) * ahead)

@@ -5,6 +5,7 @@ import numpy as np
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.terrain.grid import Terrain
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.plant import PlantState
@@ -14,7 +15,7 @@ MAX_TILT = 1.2
 
 
 class MujocoPlant:
-    """A `MujocoRover` driven by speeds or torques; it steers by different wheel speeds (skid)."""
+    """A `MujocoRover` driven by speeds or torques; with fixed wheels it skids in curves."""
 
     def __init__(
         self,
@@ -29,7 +30,8 @@ class MujocoPlant:
             PlanningError: The terrain has unknown cells, or the pose is outside the terrain.
         """
         self._plant = MujocoRover(rover, terrain, pose, friction)
-        self._rover = rover
+        self._rover, self._drive = rover, SteeredDrive(rover)
+        self._refusal = ""
         sides = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
         self._arms = sides * abs(rover.suspension.wheels["middle"][1])
         self._torques = np.zeros(6)
@@ -42,12 +44,31 @@ class MujocoPlant:
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with speed servos."""
-        rates = (speed + yaw_rate * self._arms) / self._rover.wheel.radius
-        self._torques = self._plant.servo(rates, duration)
+        if self._rover.steering is None:
+            speeds = speed + yaw_rate * self._arms
+        else:
+            speeds = self._steer((speed, yaw_rate))
+        self._torques = self._plant.servo(speeds / self._rover.wheel.radius, duration)
         self._measure(duration)
 
-    def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
-        """Apply torques (6,) [N m] for a duration [s]; they also steer; `yaw_rate` is not used."""
+    def _steer(self, command: tuple[float, float]) -> Floats:
+        """Steer towards a command; return the speeds (6,) [m/s] of the wheels meanwhile.
+
+        A rover that is to stand, or cannot follow the command, keeps its steering angles.
+        """
+        aims = self._drive.aim(*command)
+        self._refusal = aims.refusal
+        if self._refusal or not any(command):
+            return np.zeros(6)
+        self._plant.steer(aims.angles)
+        return self._drive.share(self._plant.steering_angles, aims.angles) * aims.speeds
+
+    def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
+        """Apply torques (6,) [N m] for a duration [s]; speed and yaw rate set the steering.
+
+        With fixed wheels the torques also steer.
+        """
+        self._steer(command)
         self._torques = np.asarray(torques, dtype=float)
         self._plant.step(self._torques, duration)
         self._measure(duration)
@@ -69,5 +90,5 @@ class MujocoPlant:
             joint_positions=plant.joint_positions,
             joint_velocities=plant.joint_velocities,
             wheel_torques=self._torques,
-            stopped="the rover has tipped over" if plant.tilt > MAX_TILT else "",
+            stopped="the rover has tipped over" if plant.tilt > MAX_TILT else self._refusal,
         )

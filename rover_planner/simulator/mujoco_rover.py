@@ -6,17 +6,18 @@ cylindrical wheels on a height field, and dry friction.
 """
 
 from dataclasses import dataclass
-from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
 
-from rover_physics.names import SIDES, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_wxyz
-from rover_physics.rover.model import Part, Rover
+from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.simulator.mujoco_model import thin_out, write_model
 
 TIMESTEP = 0.004
 """Time step of the simulation [s]."""
@@ -28,41 +29,13 @@ SERVO_SHARE = 0.5
 """Share of a speed error that a servo corrects in one step of the simulation."""
 SERVO_RATE = 5.0
 """Integral gain of a servo over its gain [1/s]."""
-MOTOR_INERTIA = 1.0
-"""Inertia of a geared motor at the wheel, over (wheel radius)^2 times a sixth of the mass."""
 MIN_LOAD = 1e-3
 """Load above which a wheel has ground contact, as a share of the rover's weight."""
 DERATING_SHARE = 0.2
 """Share of the maximum speed, at its upper end, over which the motor torque falls to zero."""
 
-_MODEL = """
-<mujoco model={name}>
-  <option timestep="{timestep}" gravity="0 0 -{gravity}" integrator="implicitfast" cone="elliptic"
-    impratio="20" iterations="50" tolerance="1e-10"/>
-  <default>
-    <geom friction="{friction} 0 0" condim="3" solref="{contact_time} 1"
-      solimp="0.97 0.995 0.0005"/>
-  </default>
-  <asset>
-    <hfield name="ground" nrow="{rows}" ncol="{columns}" size="{half_x} {half_y} {height} 0.5"/>
-  </asset>
-  <worldbody>
-    <geom name="ground" type="hfield" hfield="ground" pos="{middle_x} {middle_y} {lowest}"/>
-    <body name="body">
-      <freejoint/>
-      {body}
-      {sides}
-    </body>
-  </worldbody>
-  <equality>
-    <joint joint1="rocker_right" joint2="rocker_left" polycoef="0 -1 0 0 0"
-      solref="{contact_time} 1" solimp="0.99 0.999 0.0005"/>
-  </equality>
-  <actuator>
-    {motors}
-  </actuator>
-</mujoco>
-"""
+_WHEELS = slice(len(SUSPENSION_JOINTS), len(SUSPENSION_JOINTS) + len(WHEEL_JOINTS))
+"""The wheel joints among the joints of the rover."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,22 +78,24 @@ class MujocoRover:
         self.rover, self.terrain = rover, terrain
         self.friction = rover.friction if friction is None else friction
         self._model = mujoco.MjModel.from_xml_string(
-            _write_model(rover, terrain, self.friction, timestep)
+            write_model(rover, terrain, self.friction, timestep)
         )
-        elevation = _thin_out(terrain.elevation)
+        elevation = thin_out(terrain.elevation)
         span = np.ptp(elevation)
         heights = (elevation - elevation.min()) / (span if span > 0.0 else 1.0)
         self._model.hfield_data[:] = heights.ravel()
         self._data = mujoco.MjData(self._model)
-        joints = [*SUSPENSION_JOINTS, *WHEEL_JOINTS]
-        numbers = [self._model.joint(name).id for name in joints]
+        self._steered = steered_wheels(rover)
+        self._joints = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *steering_joints(rover))
+        numbers = [self._model.joint(name).id for name in self._joints]
         self._positions = self._model.jnt_qposadr[numbers]
         self._velocities = self._model.jnt_dofadr[numbers]
         geoms = {self._model.geom(name).id: k for k, name in enumerate(WHEELS)}
         self._wheel_of = np.full(self._model.ngeom, -1)
         for geom, wheel in geoms.items():
             self._wheel_of[geom] = wheel
-        self._inertia = float(self._model.dof_M0[self._velocities[-1]])
+        self._inertia = float(self._model.dof_M0[self._velocities[_WHEELS][-1]])
+        self._aims = np.zeros(len(self._steered))
         self._integral = np.zeros(6)
         self._bodies = np.array([self._model.body(name).id for name in WHEELS])
         self._drop(pose)
@@ -153,8 +128,20 @@ class MujocoRover:
     def step(self, torques: Floats, duration: float) -> None:
         """Apply torques (6,) [N m] in wheel order for a duration [s]; motor limits apply."""
         for _ in range(max(round(duration / self._model.opt.timestep), 1)):
-            self._data.ctrl[:] = self._limit(torques)
-            mujoco.mj_step(self._model, self._data)
+            self._advance(self._limit(torques))
+
+    def steer(self, angles: Floats) -> None:
+        """Turn the steered wheels to angles (6,) [rad] from now on, at their largest rate."""
+        self._aims = np.asarray(angles)[self._steered]
+
+    def _advance(self, torques: Floats) -> None:
+        """Advance by a step of the simulation, with torques (6,) [N m] within the limits."""
+        control = self._data.ctrl
+        control[:6] = torques
+        if self.rover.steering is not None:
+            most = self.rover.steering.rate * self._model.opt.timestep
+            control[6:] += np.clip(self._aims - control[6:], -most, most)
+        mujoco.mj_step(self._model, self._data)
 
     def _limit(self, torques: Floats) -> Floats:
         """Limit torques (6,) [N m] to those of the motors, zero above their maximum speed."""
@@ -180,8 +167,7 @@ class MujocoRover:
             wanted = gain * error + self._integral
             torques = self._limit(wanted)
             self._integral += np.where(wanted == torques, SERVO_RATE * gain * step * error, 0.0)
-            self._data.ctrl[:] = torques
-            mujoco.mj_step(self._model, self._data)
+            self._advance(torques)
         return torques
 
     def servo_with_droop(self, rates: Floats, droop: float, duration: float) -> Floats:
@@ -244,20 +230,27 @@ class MujocoRover:
 
     @property
     def joint_positions(self) -> dict[str, float]:
-        """Angles [rad] of suspension and wheels by joint name."""
+        """Angles [rad] of suspension, wheels and steering by joint name."""
         values = self._data.qpos[self._positions].tolist()
-        return dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), values, strict=True))
+        return dict(zip(self._joints, values, strict=True))
 
     @property
     def joint_velocities(self) -> dict[str, float]:
-        """Rates [rad/s] of suspension and wheels by joint name."""
+        """Rates [rad/s] of suspension, wheels and steering by joint name."""
         values = self._data.qvel[self._velocities].tolist()
-        return dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), values, strict=True))
+        return dict(zip(self._joints, values, strict=True))
+
+    @property
+    def steering_angles(self) -> Floats:
+        """Steering angles (6,) [rad], 0 for fixed wheels."""
+        angles = np.zeros(6)
+        angles[self._steered] = self._data.qpos[self._positions[_WHEELS.stop :]]
+        return angles
 
     @property
     def wheel_rates(self) -> Floats:
         """Rates (6,) of the wheel joints in wheel order [rad/s]."""
-        return self._data.qvel[self._velocities[len(SUSPENSION_JOINTS) :]].copy()
+        return self._data.qvel[self._velocities[_WHEELS]].copy()
 
     @property
     def tilt(self) -> float:
@@ -286,85 +279,3 @@ class MujocoRover:
         held = loads > MIN_LOAD * self.rover.weight
         slip_speeds = np.where(held, slips / np.where(held, loads, 1.0), 0.0)
         return WheelContacts(loads, shears, slip_speeds)
-
-
-def _write_model(rover: Rover, terrain: Terrain, friction: float, timestep: float) -> str:
-    """Return the MJCF text of a rover on a terrain."""
-    half = 0.5 * terrain.resolution * (np.array(terrain.elevation.shape[::-1]) - 1)
-    rows, columns = _thin_out(terrain.elevation).shape
-    middle = np.array(terrain.origin) + half
-    span = float(np.ptp(terrain.elevation))
-    motors = "\n".join(
-        f'<motor name="{joint}" joint="{joint}" ctrllimited="false"/>' for joint in WHEEL_JOINTS
-    )
-    return _MODEL.format(
-        name=quoteattr(rover.name), timestep=timestep,
-        contact_time=2.5 * timestep, gravity=rover.gravity, friction=friction,
-        rows=rows, columns=columns, half_x=half[0], half_y=half[1],
-        height=span if span > 0.0 else 1.0, middle_x=middle[0], middle_y=middle[1],
-        lowest=float(terrain.elevation.min()), body=_write_inertia(rover.masses.body, 1.0),
-        sides="\n".join(_write_side(rover, side) for side in SIDES), motors=motors,
-    )  # fmt: skip
-
-
-def _thin_out(elevation: Floats) -> Floats:
-    """Drop redundant rows of ground that is uniform along y, which speeds up collision checks."""
-    for factor in (20, 10, 5, 4, 2):
-        if (len(elevation) - 1) % factor:
-            continue
-        kept = elevation[::factor]
-        shares = (np.arange(len(elevation)) % factor / factor)[:, None]
-        below = np.repeat(kept, factor, axis=0)[: len(elevation)]
-        above = np.repeat(np.vstack([kept[1:], kept[-1:]]), factor, axis=0)[: len(elevation)]
-        if np.allclose(below + shares * (above - below), elevation, rtol=0.0, atol=1e-9):
-            return kept
-    return elevation
-
-
-def _write_side(rover: Rover, side: str) -> str:
-    """Return the MJCF text of one side: rocker, bogie and wheels."""
-    suspension, mirror = rover.suspension, -1.0 if side == "right" else 1.0
-    wheels = {
-        name: _write_wheel(rover, f"{name}_{side}", place, mirror)
-        for name, place in suspension.wheels.items()
-    }
-    rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
-    hung = "\n".join(wheels[name] for name in suspension.bogie_wheels)
-    # Positions are given in the body frame on flat ground, so each MJCF body has no offset.
-    return f"""
-      <body name="rocker_{side}">
-        <joint name="rocker_{side}" type="hinge" axis="0 1 0" pos={_point(rocker, mirror)}
-          damping="0.01"/>
-        {_write_inertia(rover.masses.rocker, mirror)}
-        {wheels[suspension.rocker_wheel]}
-        <body name="bogie_{side}">
-          <joint name="bogie_{side}" type="hinge" axis="0 1 0" pos={_point(bogie, mirror)}
-            damping="0.01"/>
-          {_write_inertia(rover.masses.bogie, mirror)}
-          {hung}
-        </body>
-      </body>"""
-
-
-def _write_wheel(rover: Rover, name: str, place: tuple[float, ...], mirror: float) -> str:
-    wheel = rover.wheel
-    inertia = MOTOR_INERTIA * rover.total_mass / 6.0 * wheel.radius**2
-    return f"""
-          <body name="{name}" pos={_point(place, mirror)}>
-            <joint name="{name}_wheel" type="hinge" axis="0 1 0" armature="{inertia}"/>
-            <geom name="{name}" type="cylinder" size="{wheel.radius} {0.5 * wheel.width}"
-              euler="90 0 0" mass="{wheel.mass}"/>
-          </body>"""
-
-
-def _write_inertia(part: Part, mirror: float) -> str:
-    """Return the MJCF inertia of a part, taken as a sphere with a radius of 0.1 m."""
-    moment = 0.4 * max(part.mass, 1e-3) * 0.1**2
-    return (
-        f'<inertial pos={_point(part.com, mirror)} mass="{max(part.mass, 1e-3)}" '
-        f'diaginertia="{moment} {moment} {moment}"/>'
-    )
-
-
-def _point(place: tuple[float, ...], mirror: float) -> str:
-    return f'"{place[0]} {mirror * place[1]} {place[2]}"'

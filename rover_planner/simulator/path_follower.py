@@ -1,4 +1,7 @@
-"""Path following by pure pursuit: speed and yaw rate that keep the rover on a path."""
+"""Path following: pure pursuit along the path, and turns on the spot where the path has them."""
+
+import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -6,59 +9,126 @@ from rover_physics.numerics.arrays import Floats
 
 ARRIVED = 0.25
 """Distance from the end at which the path counts as finished, in look-ahead distances."""
+SAME_PLACE = 1e-4
+"""Distance between poses up to which the path turns on the spot [m]."""
+MIN_TURN = 1e-3
+"""Smallest turn on the spot [rad]."""
+ALIGNED = 0.01
+"""Error of the heading at which a turn on the spot is finished [rad]."""
+SLOW_ANGLE = 0.1
+"""Error of the heading below which a turn on the spot becomes slower [rad]."""
+MIN_TURN_SHARE = 0.2
+"""Smallest share of the speed at the end of such a turn."""
 
 
 class PathFollower:
-    """Pure pursuit of a path.
+    """Follows a path: stretches by pure pursuit, turns on the spot between them.
 
     Source: Coulter, "Implementation of the pure pursuit path tracking algorithm", 1992.
     """
 
-    def __init__(self, poses: Floats, look_ahead: float):
-        """Follow poses (n, 3) with a look-ahead distance [m] along them."""
-        self._places = np.asarray(poses, dtype=float)[:, :2]
-        steps = np.hypot(*np.diff(self._places, axis=0).T)
-        self._along = np.concatenate([[0.0], np.cumsum(steps)])
+    def __init__(self, poses: Floats, look_ahead: float, reach: float | None = None):
+        """Follow poses (n, 3).
+
+        Args:
+            poses: (n, 3) x, y [m], yaw [rad].
+            look_ahead: Look-ahead distance along the path [m].
+            reach: Distance of the outermost wheel from the body origin [m], which moves at the
+                commanded speed in a turn on the spot (default: the look-ahead distance).
+        """
+        self._legs = _find_legs(np.asarray(poses, dtype=float))
         self._look_ahead = look_ahead
-        self._done = 0.0
+        self._reach = look_ahead if reach is None else reach
+        self._at, self._finished = 0, 0.0
 
     @property
     def length(self) -> float:
         """Length of the path [m]."""
-        return float(self._along[-1])
+        return sum(leg.length for leg in self._legs)
 
     @property
     def driven(self) -> float:
         """Distance driven along the path [m]."""
-        return self._done
+        return self._finished + self._leg.done
+
+    @property
+    def _leg(self) -> "_Leg":
+        return self._legs[self._at]
+
+    @property
+    def _is_last(self) -> bool:
+        return self._at == len(self._legs) - 1
 
     def has_arrived(self, pose: Floats) -> bool:
         """Return whether a pose (3,) is at the end of the path."""
-        left = float(np.hypot(*(self._places[-1] - pose[:2])))
-        near = left < ARRIVED * self._look_ahead
-        return near or self._done >= self.length - 1e-6
+        return self._is_last and self._is_done(pose)
 
     def steer(self, pose: Floats, speed: float) -> tuple[float, float]:
         """Return speed [m/s] and yaw rate [rad/s] at a pose (3,); zeros at the end."""
-        self._project(pose)
+        self._leg.project(pose, self._look_ahead)
+        while not self._is_last and self._is_done(pose):
+            self._finished += self._leg.length
+            self._at += 1
+            self._leg.project(pose, self._look_ahead)
         if self.has_arrived(pose):
             return 0.0, 0.0
-        target = self._at(self._done + self._look_ahead)
+        if self._leg.is_turn:
+            return 0.0, self._turn(pose, speed)
+        target = self._leg.at(self._leg.done + self._look_ahead)
         way = target - pose[:2]
         across = -np.sin(pose[2]) * way[0] + np.cos(pose[2]) * way[1]
         curvature = 2.0 * across / max(float(way @ way), 1e-6)
         most = 1.0 / self._look_ahead
         return speed, speed * float(np.clip(curvature, -most, most))
 
-    def _project(self, pose: Floats) -> None:
-        """Advance to the point of the path nearest to the pose; never move backwards."""
-        ahead = np.linspace(self._done, min(self._done + self._look_ahead, self.length), 40)
-        places = np.array([self._at(along) for along in ahead])
-        away = np.hypot(*(places - pose[:2]).T)
-        self._done = float(ahead[int(np.argmin(away))])
+    def _is_done(self, pose: Floats) -> bool:
+        """Return whether a pose is at the end of the current leg."""
+        leg = self._leg
+        if leg.is_turn:
+            return abs(leg.left_to_turn(pose)) <= ALIGNED
+        near = leg.distance_to_end(pose) < ARRIVED * self._look_ahead
+        return (near and self._is_last) or leg.done >= leg.length - 1e-6
 
-    def _at(self, along: float) -> Floats:
-        """Return the point (2,) at a distance along the path [m], extended straight on."""
+    def _turn(self, pose: Floats, speed: float) -> float:
+        """Return the yaw rate [rad/s] of a turn on the spot."""
+        left = self._leg.left_to_turn(pose)
+        share = min(max(abs(left) / SLOW_ANGLE, MIN_TURN_SHARE), 1.0)
+        return math.copysign(share * speed / self._reach, left)
+
+
+class _Leg:
+    """A stretch of a path, or a turn on the spot, with the way that is done."""
+
+    def __init__(self, poses: Floats):
+        self.is_turn = len(poses) > 1 and bool((_steps(poses) <= SAME_PLACE).all())
+        self._places = poses[:, :2]
+        self._yaw = np.unwrap(poses[:, 2])
+        self._along = np.concatenate([[0.0], np.cumsum(_steps(poses))])
+        self.length = 0.0 if self.is_turn else float(self._along[-1])
+        self.done = 0.0
+        self._seen: float | None = None
+
+    def distance_to_end(self, pose: Floats) -> float:
+        return float(np.hypot(*(self._places[-1] - pose[:2])))
+
+    def left_to_turn(self, pose: Floats) -> float:
+        """Return the turn [rad] that is left, positive to the left; large turns keep their way."""
+        if self._seen is None:
+            self._seen = self._yaw[0] + _wrap(float(pose[2]) - self._yaw[0])
+        self._seen += _wrap(float(pose[2]) - self._seen)
+        return float(self._yaw[-1] - self._seen)
+
+    def project(self, pose: Floats, look_ahead: float) -> None:
+        """Advance to the point of the leg nearest to the pose; never move backwards."""
+        if self.is_turn:
+            return
+        ahead = np.linspace(self.done, min(self.done + look_ahead, self.length), 40)
+        places = np.array([self.at(along) for along in ahead])
+        away = np.hypot(*(places - pose[:2]).T)
+        self.done = float(ahead[int(np.argmin(away))])
+
+    def at(self, along: float) -> Floats:
+        """Return the point (2,) at a distance along the leg [m], extended straight on."""
         over = max(along - self.length, 0.0)
         x, y = (np.interp(along, self._along, self._places[:, k]) for k in (0, 1))
         if over > 0.0 and len(self._places) > 1:
@@ -66,3 +136,22 @@ class PathFollower:
             direction = last / max(float(np.hypot(*last)), 1e-9)
             return np.array([x, y]) + over * direction
         return np.array([x, y])
+
+
+def _find_legs(poses: Floats) -> list[_Leg]:
+    """Return the legs of a path (n, 3): stretches, and turns on the spot between them."""
+    turns = np.abs([_wrap(turn) for turn in np.diff(poses[:, 2])])
+    on_the_spot = (_steps(poses) <= SAME_PLACE) & (turns > MIN_TURN)
+    changes = np.flatnonzero(np.diff(on_the_spot.astype(int))) + 1
+    bounds = [0, *changes.tolist(), len(poses) - 1]
+    return [_Leg(poses[first : last + 1]) for first, last in pairwise(bounds)]
+
+
+def _steps(poses: Floats) -> Floats:
+    """Return the lengths (n - 1,) of the steps between poses [m]."""
+    return np.asarray(np.hypot(*np.diff(poses[:, :2], axis=0).T))
+
+
+def _wrap(angle: float) -> float:
+    """Return an angle [rad] in -pi to pi."""
+    return math.remainder(angle, 2.0 * math.pi)

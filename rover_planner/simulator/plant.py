@@ -19,9 +19,9 @@ class PlantState:
     body_rates: Floats
     """(3,) angular velocity [rad/s], body frame."""
     joint_positions: dict[str, float]
-    """Angles of suspension and wheels [rad] by joint name."""
+    """Angles of suspension, wheels and steered wheels' steering [rad] by joint name."""
     joint_velocities: dict[str, float]
-    """Rates of suspension and wheels [rad/s] by joint name."""
+    """Rates of the same joints [rad/s] by joint name."""
     wheel_torques: Floats
     """(6,) torques of the motors [N m], wheel order."""
     stopped: str
@@ -32,10 +32,17 @@ class Plant(Protocol):
     """A simulated rover that is driven by speeds or torques for given durations."""
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
-        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with wheel servos."""
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with wheel servos.
 
-    def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
-        """Apply torques (6,) [N m] for a duration [s]; `yaw_rate` [rad/s] sets the steering."""
+        Wheels that steer turn at their largest rate, and the rover drives slower or stands until
+        they point along the motion.
+        """
+
+    def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
+        """Apply torques (6,) [N m] for a duration [s].
+
+        `command`, speed [m/s] and yaw rate [rad/s], sets the steering.
+        """
 
     def state(self) -> PlantState:
         """Return the current measurements."""

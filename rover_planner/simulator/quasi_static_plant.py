@@ -3,8 +3,9 @@
 With a commanded speed, the rover moves if the model allows it; otherwise it stops with the model's
 reason. With commanded torques, the balance of forces decides: the traction beyond the force that
 holds the rover on its slope accelerates its mass, and wheel force beyond friction is lost as slip.
-The forward speed is the only state with inertia. Limits of attitude, suspension and clearance
-apply in both cases.
+The mean speed of the wheels is the only state with inertia. Limits of attitude, suspension and
+clearance apply in both cases. Wheels that steer turn at the rate of the rover file; `SteeredDrive`
+says how the drive waits for them.
 """
 
 from dataclasses import fields, replace
@@ -16,14 +17,21 @@ from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.steered_step import sweep_steered
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steered_drive import SteeredDrive, WheelAims
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceWriter
+from rover_physics.traction.wheel_course import WheelCourse
 from rover_physics.traversability.verdict import find_reasons
 from rover_planner.errors import PlanningError
-from rover_planner.simulator.driving_forces import DrivingForces, find_driving_forces
+from rover_planner.simulator.driving_forces import (
+    DrivingForces,
+    find_driving_forces,
+    measure_state,
+)
 from rover_planner.simulator.plant import PlantState
 
 DRAG = 0.5
@@ -70,8 +78,12 @@ class QuasiStaticPlant:
         self._mass = self._writer.weight / rover.gravity
         limits = replace(rover.limits, friction_utilisation=NO_LIMIT, torque_saturation=NO_LIMIT)
         self._without_force_limits = replace(rover, limits=limits)
+        self._drive, self._course = SteeredDrive(rover), WheelCourse(rover)
+        self._steered, self._steering_joints = steered_wheels(rover), steering_joints(rover)
+        self._angles = np.zeros(6)
+        self._motion = np.array([rover.nominal_speed, 0.0, 0.0])
         self._pose = np.array(pose, dtype=float)
-        first = self._predict(self._pose[None])
+        first = self._predict(self._pose[None], self._angles)
         reason = self._why_not(first)
         if reason:
             raise PlanningError(f"the rover cannot start at {tuple(pose)}: {reason}")
@@ -79,7 +91,7 @@ class QuasiStaticPlant:
         self._spin = np.zeros(6)
         self._wheel_rates = np.zeros(6)
         self._torques = np.zeros(6)
-        self._speed, self._yaw_rate, self._duration = 0.0, 0.0, 1.0
+        self._speed, self._moved, self._duration = 0.0, np.zeros(3), 1.0
         self._stopped = ""
         self._anchor, self._stalled = self._pose.copy(), 0.0
 
@@ -90,25 +102,55 @@ class QuasiStaticPlant:
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], if this is possible."""
         self._torques = self._here.torque[0].copy()
-        self._move(speed, yaw_rate, duration)
+        angles, aims = self._steer((speed, yaw_rate), duration)
+        if aims.refusal:
+            self._stop(aims.refusal, duration)
+            return
+        share = self._drive.share(angles, aims.angles)
+        self._speed = share * speed
+        self._move(share * np.array([speed, 0.0, yaw_rate]), angles, duration)
 
-    def pull(self, torques: Floats, yaw_rate: float, duration: float) -> None:
-        """Apply torques (6,) [N m] for a duration [s]; `yaw_rate` [rad/s] sets the steering."""
+    def _steer(self, command: tuple[float, float], duration: float) -> tuple[Floats, WheelAims]:
+        """Return the steering angles (6,) [rad] after a duration [s], and the aims of a command.
+
+        A rover that is to stand keeps its angles.
+        """
+        if not any(command):
+            return self._angles, WheelAims(self._angles, np.zeros(6), "")
+        aims = self._drive.aim(*command)
+        return self._drive.turn(self._angles, aims.angles, duration), aims
+
+    def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
+        """Apply torques (6,) [N m] for a duration [s]; speed and yaw rate set the steering."""
         wheel, limit = self._rover.wheel, self._rover.wheel.max_torque
         self._torques = np.clip(torques, -limit, limit)
+        angles, aims = self._steer(command, duration)
+        same = self._take_course()
         forces = find_driving_forces(
-            self._writer, wheel.radius, self._here, self._torques, float(np.sign(self._speed))
-        )
-        speed = self._speed + (forces.push / self._mass - DRAG * self._speed) * duration
+            self._writer, wheel.radius, self._here, self._torques,
+            self._course.sign * float(np.sign(self._speed)),
+        )  # fmt: skip
+        push = self._course.sign * forces.push / self._rolling.inertia
+        speed = self._speed + (push / self._mass - DRAG * self._speed) * duration
         top = wheel.max_speed * wheel.radius
         speed = float(np.clip(speed, -top, top))
         if self._speed * speed < 0.0:
             speed = 0.0  # the rover stops before it reverses
-        turning = yaw_rate if abs(speed) > CREEP else 0.0
-        self._move(speed, turning, duration, forces)
+        if not same or self._drive.share(angles, aims.angles) == 0.0:
+            speed = 0.0  # wheels that steer far away from the motion hold the rover
+        self._speed = speed
+        motion = speed * self._course.sign * self._rolling.motion
+        if self._rover.steering is None and abs(speed) > CREEP:
+            motion[2] = command[1]
+        self._move(motion, angles, duration, forces)
         racing = np.sign(torques) * wheel.max_speed
         self._wheel_rates = np.where(forces.sliding, racing, self._wheel_rates)
         self._watch_stall(forces, duration)
+
+    def _take_course(self) -> bool:
+        """Note how the wheels roll; return False if this is another motion than before."""
+        self._rolling = self._writer.find_rolling(measure_state(self._here, self._writer.on_bogie))
+        return self._course.take(self._rolling, self._angles)
 
     def _watch_stall(self, forces: DrivingForces, duration: float) -> None:
         """Set the reason for standing still when wheels slide or motors saturate for PATIENCE."""
@@ -126,34 +168,50 @@ class QuasiStaticPlant:
             self._stopped = "motors saturate and the rover stays"
 
     def _move(
-        self, speed: float, yaw_rate: float, duration: float, forces: DrivingForces | None = None
+        self, motion: Floats, angles: Floats, duration: float, forces: DrivingForces | None = None
     ) -> None:
         """Move if the model allows it.
 
         With `forces`, which already include friction and torque limits, these are not checked.
+
+        Args:
+            motion: (3,) speed ahead and to the left [m/s] and yaw rate [rad/s].
+            angles: (6,) steering angles [rad].
+            duration: Duration [s].
+            forces: The forces under given torques.
         """
         self._stopped = ""
-        middle = self._pose[2] + 0.5 * yaw_rate * duration
-        step = speed * duration
-        way = np.array([step * np.cos(middle), step * np.sin(middle), yaw_rate * duration])
-        there = self._pose + way
-        moved = self._predict(np.vstack([self._pose, there]), forces is not None)
-        reason = self._why_not(moved, forces is not None) if step or yaw_rate else ""
+        middle = self._pose[2] + 0.5 * motion[2] * duration
+        c, s = np.cos(middle), np.sin(middle)
+        way = duration * np.array(
+            [c * motion[0] - s * motion[1], s * motion[0] + c * motion[1], motion[2]]
+        )
+        there, moves = self._pose + way, bool(motion.any())
+        self._motion = motion if moves else self._motion
+        pulled = forces is not None
+        moved = self._predict(np.vstack([self._pose, there]), angles, pulled)
+        changes = moves or bool((angles != self._angles).any())
+        reason = self._why_not(moved, pulled) if changes else ""
         if reason:
-            self._stopped, self._speed, self._yaw_rate = reason, 0.0, 0.0
-            self._before, self._duration = self._here, duration
-            self._wheel_rates = np.zeros(6)
+            self._stop(reason, duration)
             return
         self._before, self._here = self._here, _last_row(moved)
-        self._pose, self._speed, self._yaw_rate = there, speed, yaw_rate
+        self._pose, self._moved, self._angles = there, motion, angles
         self._duration = duration
         ways = self._here.wheel_centres[0] - self._before.wheel_centres[0]
-        ahead = np.array([np.cos(middle), np.sin(middle), 0.0])
-        rolled = np.copysign(np.linalg.norm(ways, axis=1), ways @ ahead)
+        headings = middle + angles
+        ahead = ways[:, 0] * np.cos(headings) + ways[:, 1] * np.sin(headings)
+        rolled = np.copysign(np.hypot(ahead, ways[:, 2]), ahead)
         turned = rolled / self._rover.wheel.radius
         turned /= 1.0 - np.clip(self._slip(forces), 0.0, MAX_SLIP)
         self._spin += turned
         self._wheel_rates = turned / duration
+
+    def _stop(self, reason: str, duration: float) -> None:
+        """Stand still for a reason."""
+        self._stopped, self._speed, self._moved = reason, 0.0, np.zeros(3)
+        self._before, self._duration = self._here, duration
+        self._wheel_rates = np.zeros(6)
 
     def _slip(self, forces: DrivingForces | None) -> Floats:
         """Return the slip ratios (6,): of the model, or on firm ground of the forces."""
@@ -162,15 +220,12 @@ class QuasiStaticPlant:
             return here.slip_ratio[0]
         return np.array([coulomb_slip(used) for used in forces.utilisation.tolist()])
 
-    def _predict(self, poses: Floats, pulled: bool = False) -> PathPrediction:
+    def _predict(self, poses: Floats, angles: Floats, pulled: bool = False) -> PathPrediction:
         """Return the model's prediction at poses (n, 3); if `pulled`, with optimal torques."""
         policy = OPTIMAL if pulled else self._policy
-        return sweep_path(
-            self._rover,
-            self._terrain,
-            poses,
-            SweepOptions(friction=self._friction, policy=policy, soil=self._soil),
-        )
+        options = SweepOptions(friction=self._friction, policy=policy, soil=self._soil)
+        course = self._motion, angles
+        return sweep_steered(self._rover, self._terrain, poses, course, options)
 
     def _why_not(self, prediction: PathPrediction, pulled: bool = False) -> str:
         """Return the reason why the last pose cannot be reached; empty if it can.
@@ -194,19 +249,21 @@ class QuasiStaticPlant:
         here, before, duration = self._here, self._before, self._duration
         angles = _suspension(here)
         rates = (angles - _suspension(before)) / duration
-        yaw = self._pose[2]
+        yaw, (ahead, aside, yaw_rate) = self._pose[2], self._moved
         roll, pitch = float(here.roll[0]), float(here.pitch[0])
         roll_rate = (roll - float(before.roll[0])) / duration
         pitch_rate = (pitch - float(before.pitch[0])) / duration
         climb = float(here.position[0, 2] - before.position[0, 2]) / duration
-        names = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
-        positions = np.concatenate([angles, self._spin])
-        velocities = np.concatenate([rates, self._wheel_rates])
+        names = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *self._steering_joints)
+        steering = here.steering_angle[0, self._steered]
+        turning = (steering - before.steering_angle[0, self._steered]) / duration
+        positions = np.concatenate([angles, self._spin, steering])
+        velocities = np.concatenate([rates, self._wheel_rates, turning])
         return PlantState(
             position=here.position[0].copy(),
             orientation=xyzw_from_rpy(roll, pitch, yaw),
-            velocity=np.array([np.hypot(self._speed, climb) * np.sign(self._speed), 0.0, 0.0]),
-            body_rates=_body_rates(roll, pitch, roll_rate, pitch_rate, self._yaw_rate),
+            velocity=np.array([np.hypot(ahead, climb) * np.sign(ahead), aside, 0.0]),
+            body_rates=_body_rates(roll, pitch, roll_rate, pitch_rate, yaw_rate),
             joint_positions=dict(zip(names, positions.tolist(), strict=True)),
             joint_velocities=dict(zip(names, velocities.tolist(), strict=True)),
             wheel_torques=self._torques.copy(),

@@ -5,8 +5,8 @@ import math
 from rover_physics.numerics.arrays import Floats
 from rover_planner.simulator.path_follower import PathFollower
 
-PROGRESS = 0.01
-"""Way [m] that counts as progress."""
+PROGRESS, TURN_PROGRESS = 0.01, 0.02
+"""Way [m] and turn [rad] that count as progress."""
 STUCK_TIME = 12.0
 """Time without progress [s] after which the rover stands still. The traction controller stops
 pushing before that (`stall_time`), and pushes again after it was told to reverse."""
@@ -25,13 +25,20 @@ class SecondTry:
     A wheel that has wedged at a face, or slips there, often climbs it from another position.
     """
 
-    def __init__(self, follower: PathFollower, max_tries: int = MAX_TRIES):
-        """Follow the path of a follower, with so many attempts at one place.
+    def __init__(
+        self, follower: PathFollower, max_tries: int = MAX_TRIES, patience: float = STUCK_TIME
+    ):
+        """Follow the path of a follower.
 
-        With one attempt, a rover that stands still goes on trying.
+        Args:
+            follower: Follows the path.
+            max_tries: Attempts at one place. With one attempt, a rover that stands still goes on
+                trying.
+            patience: Time without progress after which the rover stands still [s]; longer for a
+                rover that stands while its wheels steer.
         """
-        self._follower, self._max_tries = follower, max_tries
-        self._place, self._since = NO_PLACE, 0.0
+        self._follower, self._max_tries, self._patience = follower, max_tries, patience
+        self._place, self._yaw, self._since = NO_PLACE, 0.0, 0.0
         self._tries, self._counted_from = 1, 0.0
         self._back_from, self._back_until = NO_PLACE, -math.inf
         self.retries = 0
@@ -55,7 +62,7 @@ class SecondTry:
         if self._backs_off(pose, now):
             return -speed, 0.0
         self._note_progress(pose, now)
-        if wanted[0] != 0.0 and now - self._since > STUCK_TIME:
+        if any(wanted) and now - self._since > self._patience:
             self._try_again(pose, now)
         return (0.0, 0.0) if self.given_up else wanted
 
@@ -74,13 +81,18 @@ class SecondTry:
         if math.dist(_place_of(pose), self._back_from) < BACK_DISTANCE:
             return True
         self._back_until = -math.inf
-        self._place, self._since = _place_of(pose), now
+        self._note(pose, now)
         return False
 
+    def _note(self, pose: Floats, now: float) -> None:
+        """Note a pose and its time [s] as progress."""
+        self._place, self._yaw, self._since = _place_of(pose), float(pose[2]), now
+
     def _note_progress(self, pose: Floats, now: float) -> None:
-        """Note where the rover is if it has moved."""
-        if math.dist(_place_of(pose), self._place) > PROGRESS:
-            self._place, self._since = _place_of(pose), now
+        """Note where the rover is if it has moved or turned."""
+        turned = abs(math.remainder(float(pose[2]) - self._yaw, 2.0 * math.pi))
+        if math.dist(_place_of(pose), self._place) > PROGRESS or turned > TURN_PROGRESS:
+            self._note(pose, now)
         if self._follower.driven > self._counted_from + NEW_PLACE:
             self._counted_from, self._tries = self._follower.driven, 1
 

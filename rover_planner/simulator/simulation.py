@@ -15,7 +15,7 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.plant import Plant, PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
-from rover_planner.simulator.second_try import MAX_TRIES, SecondTry
+from rover_planner.simulator.second_try import MAX_TRIES, STUCK_TIME, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
@@ -136,9 +136,14 @@ class Simulation:
 
         A rover that a controller's torques drive tries again where it stands still.
         """
-        wheels = self.settings.rover.suspension.wheels
-        follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]))
-        self._follower = SecondTry(follower, MAX_TRIES if self.settings.follow_commands else 1)
+        rover = self.settings.rover
+        wheels = rover.suspension.wheels
+        reach = max(float(np.hypot(x, y)) for x, y, _ in wheels.values())
+        follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]), reach)
+        tries, steering = MAX_TRIES if self.settings.follow_commands else 1, rover.steering
+        # From one limit to the other, while the rover stands.
+        longest = 0.0 if steering is None else 2.0 * steering.limit / steering.rate
+        self._follower = SecondTry(follower, tries, STUCK_TIME + longest)
 
     def take_speeds(self, speed: float, yaw_rate: float, now: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] from time `now` [s]; ends path following."""
@@ -161,12 +166,11 @@ class Simulation:
     def advance(self, now: float, duration: float) -> PlantState:
         """Advance by a duration [s] from time `now` [s]; return the measurements."""
         self.steering = self._steer(now)
-        speed, yaw_rate = self.steering
         if self.settings.follow_commands:
             fresh = now - self._torques_at <= self.settings.timeout
-            self.plant.pull(self._torques if fresh else np.zeros(6), yaw_rate, duration)
+            self.plant.pull(self._torques if fresh else np.zeros(6), self.steering, duration)
         else:
-            self.plant.drive(speed, yaw_rate, duration)
+            self.plant.drive(*self.steering, duration)
         return self.plant.state()
 
     def _steer(self, now: float) -> tuple[float, float]:

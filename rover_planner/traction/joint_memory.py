@@ -1,6 +1,6 @@
 """Merges joint states of several publishers: each joint keeps its last value and its time."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,11 +25,12 @@ NOT_READ = Reading(0.0, NEVER, 0)
 
 
 class JointMemory:
-    """Keeps positions of the suspension, and velocities of suspension and wheels, by name."""
+    """Keeps positions of suspension and steering, and velocities of suspension and wheels."""
 
-    def __init__(self) -> None:
-        """Start without values."""
-        self._positions = dict.fromkeys(SUSPENSION_JOINTS, NOT_READ)
+    def __init__(self, steering: Sequence[str] = ()) -> None:
+        """Start without values; `steering` are the names of the rover's steering joints."""
+        self._steering = tuple(steering)
+        self._positions = dict.fromkeys((*SUSPENSION_JOINTS, *steering), NOT_READ)
         self._velocities = dict.fromkeys((*SUSPENSION_JOINTS, *WHEEL_JOINTS), NOT_READ)
 
     def take(
@@ -59,8 +60,8 @@ class JointMemory:
     @property
     def time(self) -> float:
         """Time of the oldest value that is needed [s]; NEVER if one is missing."""
-        suspension = min(reading.time for reading in self._positions.values())
-        return min(suspension, self.wheel_time)
+        angles = min(reading.time for reading in self._positions.values())
+        return min(angles, self.wheel_time)
 
     @property
     def wheel_time(self) -> float:
@@ -76,7 +77,12 @@ class JointMemory:
     @property
     def suspension_angles(self) -> Floats:
         """Angles (4,) of SUSPENSION_JOINTS [rad]."""
-        return np.array([reading.value for reading in self._positions.values()])
+        return np.array([self._positions[name].value for name in SUSPENSION_JOINTS])
+
+    @property
+    def steering_angles(self) -> list[float]:
+        """Angles of the steering joints, in their order [rad]."""
+        return [self._positions[name].value for name in self._steering]
 
     @property
     def wheel_rates(self) -> Floats:

@@ -5,9 +5,12 @@ A measurement outside these limits comes from a broken sensor or driver, not fro
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import steering_joints
 
 MAX_WHEEL_RATE_RATIO = 20.0
 """Largest possible wheel rate, over the drive's largest; a rover that rolls down a slope is
@@ -15,7 +18,7 @@ faster than its drives."""
 MAX_TURNING_RATE = 20.0
 """Largest possible rate of the body, a rocker or a bogie [rad/s]."""
 ANGLE_MARGIN = 0.5
-"""Angle beyond the limit of a suspension joint that is possible [rad]."""
+"""Angle beyond the limit of a suspension or steering joint that is possible [rad]."""
 
 
 class MeasurementLimits:
@@ -29,13 +32,19 @@ class MeasurementLimits:
             name: suspension.rocker_limits if "rocker" in name else suspension.bogie_limits
             for name in SUSPENSION_JOINTS
         }
+        if rover.steering is not None:
+            limit = rover.steering.limit
+            self._angles |= dict.fromkeys(steering_joints(rover), (-limit, limit))
         self._max_speed = wheel.max_speed * wheel.radius
-        self._half_width = max(abs(place[1]) for place in suspension.wheels.values())
+        places = np.array([place[:2] for place in suspension.wheels.values()])
+        axles = () if rover.steering is None else rover.steering.wheels
+        self._sides = np.abs(places[:, 1])
+        self._arms = np.where([name in axles for name in suspension.wheels], places[:, 0], 0.0)
 
     def find_wrong_joint(
         self, positions: Mapping[str, float], velocities: Mapping[str, float]
     ) -> str:
-        """Describe an impossible angle [rad] or rate [rad/s] of a wheel or suspension joint."""
+        """Describe an impossible angle [rad] or rate [rad/s] of a joint of the rover."""
         for name, angle in positions.items():
             low, high = self._angles.get(name, (angle, angle))
             if not low - ANGLE_MARGIN <= angle <= high + ANGLE_MARGIN:
@@ -66,6 +75,7 @@ class MeasurementLimits:
 
         Both are scaled by the same factor, so that the curvature stays.
         """
-        fastest = abs(speed) + abs(yaw_rate) * self._half_width
+        ahead = abs(speed) + abs(yaw_rate) * self._sides
+        fastest = float(np.hypot(ahead, yaw_rate * self._arms).max())
         share = min(1.0, self._max_speed / fastest) if fastest > 0.0 else 1.0
         return share * speed, share * yaw_rate

@@ -1,6 +1,6 @@
 """Control loops around the torque allocation: speed, heading, slip, stall and torque rate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import median
 
 import numpy as np
@@ -9,6 +9,10 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 
+MAX_PUSH = 0.6
+"""Largest push of the speed loop, as a share of the rover's weight."""
+HEADING_INTEGRAL_GAIN = 0.5
+"""Integral gain of the heading loop over its gain [1/s]."""
 MAX_RATE_RATIO = 1.3
 """Largest median wheel rate, over the wanted rate, that counts as rolling without slip."""
 MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.2, 2.0
@@ -100,6 +104,21 @@ class PIController:
         return min(max(output, -self._limit), self._limit)
 
 
+class HeadingLoop(PIController):
+    """The heading loop: the moment that an error of the yaw rate asks for."""
+
+    def __init__(self, gain: float, half_track: float, max_push: float):
+        """Start with an integral of zero.
+
+        Args:
+            gain: Mass times angular acceleration per error of yaw rate [kg/s].
+            half_track: Half the distance between the middle wheels [m].
+            max_push: Largest force of the wheels together [N].
+        """
+        own = half_track**2 * gain
+        super().__init__(own, HEADING_INTEGRAL_GAIN * own, max_push * half_track)
+
+
 class PushLimit:
     """The largest push that the wheels can give without slip, found by trying.
 
@@ -161,7 +180,7 @@ class PushLoop(PIController):
 
 @dataclass(frozen=True, eq=False)
 class WheelMotion:
-    """How the wheels move and should move."""
+    """How the wheels move and should move, each in the direction in which it rolls."""
 
     rates: Floats
     """(6,) measured rates [rad/s]."""
@@ -173,6 +192,8 @@ class WheelMotion:
     """Wanted mean rate [rad/s]."""
     from_map: bool = False
     """Whether the ratios come from a map; from motion they may miss a face."""
+    level_ratios: Floats = field(default_factory=lambda: np.ones(WHEEL_COUNT))
+    """(6,) speeds of the wheels over their mean on level ground, 1 straight ahead."""
 
 
 class StallDetector:
@@ -274,7 +295,8 @@ class SlipControl:
         if share == 0.0:
             self._servos.follow(torques)
             return torques
-        servo = self._servos.update(motion.wanted - motion.rates, duration)
+        wanted = motion.wanted * motion.level_ratios
+        servo = self._servos.update(wanted - motion.rates, duration)
         return torques + share * (servo - torques)
 
 

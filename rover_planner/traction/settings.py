@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.traction.balance import BalanceWriter
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traction_controller import HOLD, TractionControllerParameters
@@ -62,10 +63,13 @@ def load_traction_settings(
             for it stays valid.
 
     Raises:
-        RoverError: The rover cannot be loaded, or cannot carry the payload.
+        RoverError: The rover cannot be loaded, its steering joints do not reach its steering
+            limit, or it cannot carry the payload.
         ParameterError: The payload is below 0 and not OWN_PAYLOAD.
     """
     rover = load_rover(parameters.rover)
+    if parameters.steering_limit:
+        check_joint_limit(rover, parameters.steering_limit)
     if last is not None and last.rover == rover:
         rover = last.rover
     settings = TractionSettings(

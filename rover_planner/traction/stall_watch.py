@@ -2,14 +2,15 @@
 
 from statistics import median
 
+import numpy as np
+
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.traction.loops import STALL_RATIO
 
-RIGHT_WHEELS = WHEEL_COUNT // 2
-"""Number of wheels on the right side, which are the first ones."""
 SLOW_SHARE = 0.1
-"""Wheels whose wanted rate is below this share of the other side's are not looked at."""
+"""Wheels whose wanted rate is below this share of the fastest one's are not looked at."""
+NOT_BLOCKED = np.zeros(WHEEL_COUNT)
 
 
 class StallWatch:
@@ -18,31 +19,29 @@ class StallWatch:
     def __init__(self) -> None:
         """Start with a rover that moves."""
         self._time = 0.0
-        self._blocked = (0.0, 0.0)
+        self._blocked = NOT_BLOCKED
 
     def reset(self) -> None:
         """Forget the stall."""
-        self._time, self._blocked = 0.0, (0.0, 0.0)
+        self._time, self._blocked = 0.0, NOT_BLOCKED
 
     def reset_time(self) -> None:
         """Start to count anew, for a rover that climbs."""
         self._time = 0.0
 
-    def update(
-        self, rates: Floats, wanted: tuple[float, float], duration: float, stall_time: float
-    ) -> bool:
+    def update(self, rates: Floats, wanted: Floats, duration: float, stall_time: float) -> bool:
         """Return whether the rover is stalled.
 
         Args:
             rates: (6,) wheel rates [rad/s].
-            wanted: Wanted rates of the wheels on the right and on the left side [rad/s].
+            wanted: (6,) wanted rates of the wheels [rad/s].
             duration: Time since the last call [s].
             stall_time: Time without progress after which the rover is stalled [s].
         """
-        if wanted[0] * self._blocked[0] + wanted[1] * self._blocked[1] > 0.0:
+        if float(wanted @ self._blocked) > 0.0:
             return True
-        self._blocked = (0.0, 0.0)
-        if not any(wanted):
+        self._blocked = NOT_BLOCKED
+        if not wanted.any():
             self._time = 0.0
             return False
         stands = _find_progress(rates, wanted) < STALL_RATIO
@@ -53,12 +52,8 @@ class StallWatch:
         return True
 
 
-def _find_progress(rates: Floats, wanted: tuple[float, float]) -> float:
+def _find_progress(rates: Floats, wanted: Floats) -> float:
     """Return the median of the wheels' rates over their wanted rates."""
-    slowest = SLOW_SHARE * max(map(abs, wanted))
-    shares = []
-    for wheel, rate in enumerate(rates.tolist()):
-        own = wanted[0] if wheel < RIGHT_WHEELS else wanted[1]
-        if abs(own) > slowest:
-            shares.append(rate / own)
-    return median(shares)
+    slowest = SLOW_SHARE * float(np.abs(wanted).max())
+    pairs = zip(rates.tolist(), wanted.tolist(), strict=True)
+    return median([rate / own for rate, own in pairs if abs(own) > slowest])

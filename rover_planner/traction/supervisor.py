@@ -116,13 +116,11 @@ class TractionSupervisor:
         return STANDSTILL if self._is_standing(duration) else DRIVING
 
     def _is_stalled(self, duration: float) -> bool:
-        settings, (speed, yaw_rate) = self.service.settings, self.service.wanted
-        wheel, middle = settings.rover.wheel, settings.rover.suspension.wheels["middle"]
-        turning = yaw_rate * abs(middle[1])
-        wanted = (speed + turning) / wheel.radius, (speed - turning) / wheel.radius
         if self.service.climbs:
             self._stall.reset_time()
-        return self._stall.update(self.service.wheel_rates, wanted, duration, settings.stall_time)
+        stall_time = self.service.settings.stall_time
+        rates, wanted = self.service.wheel_rates, self.service.wanted_rates
+        return self._stall.update(rates, wanted, duration, stall_time)
 
     def _is_standing(self, duration: float) -> bool:
         """Return whether the commanded speeds have been zero for STANDSTILL_DELAY."""

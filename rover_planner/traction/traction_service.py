@@ -9,6 +9,7 @@ import numpy as np
 from rover_physics.errors import ModelError
 from rover_physics.names import OPTIMAL, SUSPENSION_JOINTS, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceRows, BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import (
@@ -25,12 +26,14 @@ from rover_physics.traction.solver import (
     TractionWorkspace,
     solve_traction,
 )
+from rover_physics.traction.wheel_course import WheelCourse
 from rover_planner.traction.input_monitor import NEVER, InputMonitor
 from rover_planner.traction.joint_memory import JointMemory
 from rover_planner.traction.limits import MeasurementLimits
 from rover_planner.traction.loops import (
+    MAX_PUSH,
     STALLED_GROWTH,
-    PIController,
+    HeadingLoop,
     PushLoop,
     SlipControl,
     WheelMotion,
@@ -41,14 +44,8 @@ from rover_planner.traction.settings import TractionSettings
 from rover_planner.traction.traction_update import TractionUpdate
 
 JOINT_STATES, IMU, CMD_VEL, ODOMETRY = "joint_states", "imu", "cmd_vel", "odometry"
-MAX_PUSH = 0.6
-"""Largest push of the speed loop, as a share of the rover's weight."""
-HEADING_INTEGRAL_GAIN = 0.5
-"""Integral gain of the heading loop over its gain [1/s]."""
 MAX_STEP = 0.1
 """Upper bound of the time step of loops and filter [s]."""
-TURN_LEFT = np.repeat([1.0, -1.0], 3)
-"""Signs (6,) of wheel torques that turn the rover left: the right wheels drive forward."""
 
 
 class TractionService:
@@ -59,11 +56,10 @@ class TractionService:
         self._workspace = TractionWorkspace()
         self._monitor = InputMonitor({})
         self._odometry_monitor = InputMonitor({})
-        self._joints = JointMemory()
+        self._follow_steering(settings)
         self._suspension_angles = np.zeros(len(SUSPENSION_JOINTS))
         self._suspension_rates: Floats | None = None
         self._wheel_rates = np.zeros(WHEEL_COUNT)
-        self._mean_rate = 0.0
         self._attitude = (0.0, 0.0)
         self._body_rates: Floats | None = None
         self._wanted_speed, self._wanted_yaw_rate = 0.0, 0.0
@@ -92,14 +88,25 @@ class TractionService:
             self._speed.integral, self._heading.integral = integrals
             return
         self._estimator = MotionContactEstimator(settings.rover)
+        self._follow_steering(settings)
         self._last = None
         if self._terrain is not None:
             self.take_terrain(self._terrain)
+
+    def _follow_steering(self, settings: TractionSettings) -> None:
+        """Ask for the joints of a rover; all inputs must arrive anew."""
+        rover = settings.rover
+        self._joints = JointMemory(steering_joints(rover))
+        self._monitor.forget()
+        self._steered, self._course = steered_wheels(rover), WheelCourse(rover)
+        self.steering = np.zeros(WHEEL_COUNT)
+        """Last measured steering angles (6,) [rad], positive to the left."""
 
     def _apply(self, settings: TractionSettings) -> None:
         """Take what follows from settings and has no state."""
         self._settings = settings
         rover, timeouts = settings.rover, settings.timeouts
+        self._radius = rover.wheel.radius
         self._monitor.timeouts = {
             JOINT_STATES: timeouts.joint_states,
             IMU: timeouts.imu,
@@ -117,13 +124,9 @@ class TractionService:
         rover, gains = self._settings.rover, self._settings.gains
         weight = self._writer.weight
         mass, max_push = weight / rover.gravity, MAX_PUSH * weight
-        self._half_track = rover.suspension.wheels["middle"][1]
-        inertia = mass * self._half_track**2
-        heading = inertia * gains.heading
         self._speed = PushLoop(mass * gains.speed, mass * gains.travel, max_push)
-        self._heading = PIController(
-            heading, HEADING_INTEGRAL_GAIN * heading, max_push * self._half_track
-        )
+        half_track = rover.suspension.wheels["middle"][1]
+        self._heading = HeadingLoop(mass * gains.heading, half_track, max_push)
         self._slip = SlipControl(gains.slip, self._settings.max_torque)
 
     @property
@@ -157,6 +160,11 @@ class TractionService:
         return self._wanted_speed, self._wanted_yaw_rate
 
     @property
+    def wanted_rates(self) -> Floats:
+        """Rates (6,) of the wheels that these ask for at the last steering angles [rad/s]."""
+        return self._course.want(self.wanted, self.steering)[1] / self._radius
+
+    @property
     def expiry(self) -> float:
         """Time at which the first of the needed inputs becomes stale [s]."""
         return self._monitor.expiry
@@ -183,7 +191,7 @@ class TractionService:
             return
         self._suspension_angles = self._joints.suspension_angles
         self._wheel_rates = self._joints.wheel_rates
-        self._mean_rate = float(self._wheel_rates.sum()) / WHEEL_COUNT
+        self.steering[self._steered] = self._joints.steering_angles
         earliest = now - self._settings.timeouts.joint_states
         self._suspension_rates = self._joints.find_suspension_rates(earliest)
         if math.isfinite(self._joints.time):
@@ -259,13 +267,16 @@ class TractionService:
             return self.rest(fault, start)
         duration = 0.0 if self._last_time is None else min(now - self._last_time, MAX_STEP)
         self._last_time = now
+        if not self._course.take(self._writer.find_rolling(self._level_state()), self.steering):
+            self._speed.reset()
         estimate, warning = self._estimate_contacts(now, duration)
         state = self._measure_state(estimate)
         push = self._find_push(duration)
         try:
             rows = self._write_rows(state, push)
         except ModelError as error:
-            rows, warning = self._write_rows(self._measure_level_state(), push), str(error)
+            rows, warning = self._write_rows(self._level_state(), push), str(error)
+        warning = warning or self._course.describe_refusal(self.wanted)
         answer = self._share_torques(rows)
         self._from_map = estimate.source == MAP_SOURCE
         torques = self._command_torques(answer, rows, duration)
@@ -279,8 +290,8 @@ class TractionService:
         """Return zero torques at once, and reset the loops."""
         self._reset()
         start = time.perf_counter() if start is None else start
-        zero = np.zeros(WHEEL_COUNT)
-        return TractionUpdate(zero, fault, "", None, None, time.perf_counter() - start)
+        duration = time.perf_counter() - start
+        return TractionUpdate(np.zeros(WHEEL_COUNT), fault, "", None, None, duration)
 
     def _reset(self) -> None:
         """Discard the last answer and set all integrals to zero."""
@@ -298,9 +309,10 @@ class TractionService:
         if self._finder is None or not self._odometry_monitor.is_fresh(ODOMETRY, now):
             return from_motion, warning
         try:
-            forward = self._wanted_speed >= 0.0
+            backward = self._mean_wanted() < 0.0
+            directions = -self._course.directions if backward else self._course.directions
             state = self._measure_state(from_motion)
-            return self._finder.find(state, self._pose, self._deviation, forward), ""
+            return self._finder.find(state, self._pose, self._deviation, directions), ""
         except ModelError as error:
             return from_motion, warning or str(error)
 
@@ -312,29 +324,33 @@ class TractionService:
                 lacking = "imu has no angular velocity"
             return level_estimate(), f"contact angles are taken as zero: {lacking}"
         rocker = 0.5 * (self._suspension_rates[0] - self._suspension_rates[1])
-        state = self._measure_level_state()
+        state = self._level_state()
         motion = Motion(
-            state.roll, state.pitch, state.rocker_angle, state.bogie_angles,
-            rocker, self._suspension_rates[2:], self._wheel_rates, self._body_rates,
+            state.roll, state.pitch, state.rocker_angle, state.bogie_angles, rocker,
+            self._suspension_rates[2:], self._wheel_rates, self._body_rates, state.steering,
         )  # fmt: skip
         return self._estimator.update(motion, duration), ""
 
-    def _measure_level_state(self) -> MeasuredState:
+    def _level_state(self) -> MeasuredState:
         """Return the measured state with zero contact angles."""
         roll, pitch = self._attitude
         right, left, *bogies = self._suspension_angles
-        angles = np.zeros(WHEEL_COUNT)
-        return MeasuredState(roll, pitch, 0.5 * (right - left), np.array(bogies), angles)
+        rocker, zero, none = 0.5 * (right - left), np.zeros(WHEEL_COUNT), np.zeros(WHEEL_COUNT)
+        return MeasuredState(roll, pitch, rocker, np.array(bogies), zero, none, self.steering)
 
     def _measure_state(self, estimate: ContactEstimate) -> MeasuredState:
         """Return the measured state with estimated contact angles."""
-        state = self._measure_level_state()
+        state = self._level_state()
         state.contact_angles[:] = estimate.angles
         return state
 
+    def _mean_wanted(self) -> float:
+        """Return the wanted mean speed of the wheels [m/s]."""
+        return self._course.want(self.wanted, self.steering)[0]
+
     def _find_push(self, duration: float) -> float:
         """Return the wanted push [N], from the mean travel of the wheels."""
-        error = self._wanted_speed - self._mean_rate * self._settings.rover.wheel.radius
+        error = self._mean_wanted() - self._course.mean_of(self._wheel_rates) * self._radius
         growth = STALLED_GROWTH * duration if self._slip.detector.stalled else duration
         if not self._optimal:
             return self._speed.update(error, growth, self._limited)
@@ -342,6 +358,7 @@ class TractionService:
 
     def _write_rows(self, state: MeasuredState, push: float) -> BalanceRows:
         """Return the balance with a push; the program takes it as resistance at the wheels."""
+        push *= self._course.sign
         push, resistance = (0.0, push) if self._optimal else (push, 0.0)
         return self._writer.write(state, push, resistance)
 
@@ -361,18 +378,21 @@ class TractionService:
         self, answer: TractionAnswer, rows: BalanceRows, duration: float
     ) -> Floats:
         """Return the torques (6,) [N m] with the other loops, limited in magnitude and rate."""
-        settings, torques = self._settings, answer.torques.copy()
+        settings, torques, course = self._settings, answer.torques.copy(), self._course
         if self._body_rates is not None:
-            error = self._wanted_yaw_rate - float(self._body_rates[2])
+            mean_speed = course.mean_of(self._wheel_rates) * self._radius
+            wanted = course.yaw_rate(self._wanted_yaw_rate, mean_speed)
+            error = wanted - float(self._body_rates[2])
             moment = self._heading.update(error, duration, self._limited)
-            torques += (
-                settings.rover.wheel.radius * moment / (WHEEL_COUNT * self._half_track) * TURN_LEFT
-            )
+            torques += self._radius * moment * course.turning_shares
         if self._optimal:
-            speed = self._wanted_speed / settings.rover.wheel.radius
-            angles, rates = self._suspension_angles, self._wheel_rates
-            motion = WheelMotion(rates, rows.wheel_speeds, angles, speed, self._from_map)
-            torques = self._slip.correct(torques, motion, duration)
+            ahead = course.directions
+            motion = WheelMotion(
+                ahead * self._wheel_rates, course.sign * ahead * rows.wheel_speeds,
+                self._suspension_angles, self._mean_wanted() / self._radius, self._from_map,
+                course.ratios,
+            )  # fmt: skip
+            torques = ahead * self._slip.correct(ahead * torques, motion, duration)
         torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)
         max_change = settings.gains.torque_rate * duration
         self._torques = limit_rate(torques, self._torques, max_change)

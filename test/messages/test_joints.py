@@ -6,7 +6,9 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from msg_adapters.errors import MessageError
-from msg_adapters.joints import joint_positions
+from msg_adapters.joints import convert_steering, joint_positions
+from rover_physics.names import STEERING_JOINTS
+from rover_physics.rover.steering_joints import LEFT, RIGHT
 
 WANTED = ("rocker_left", "bogie_left")
 
@@ -52,3 +54,12 @@ def test_other_joints_are_not_looked_at():
 def test_lengths_and_names_that_disagree_are_refused(names, positions, text):
     with pytest.raises(MessageError, match=text):
         joint_positions(JointState(name=names, position=positions), WANTED)
+
+
+def test_steering_is_converted_to_positive_left_and_back_and_nothing_else_is():
+    state = JointState(name=["front_left_steering", "rocker_left"], position=[0.3, 0.1])
+    read = joint_positions(state, ("rocker_left", *STEERING_JOINTS))
+    assert convert_steering(read, LEFT) == {"front_left_steering": 0.3, "rocker_left": 0.1}
+    turned = convert_steering(read, RIGHT)
+    assert turned == {"front_left_steering": -0.3, "rocker_left": 0.1}
+    assert convert_steering(turned, RIGHT) == read

@@ -24,6 +24,7 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 
 STAMP = Time(sec=12, nanosec=34)
@@ -88,9 +89,10 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
     prediction,
     rover,
 ):
-    message = joint_trajectory(prediction, rover.wheel.radius, "map", STAMP)
+    message = joint_trajectory(prediction, rover, "map", STAMP)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
-    assert tuple(message.joint_names) == JOINTS == SUSPENSION_JOINTS + WHEEL_JOINTS
+    assert JOINTS == SUSPENSION_JOINTS + WHEEL_JOINTS
+    assert tuple(message.joint_names) == JOINTS + steering_joints(rover)
     assert len(message.points) == 50
     for i in (0, 20, 49):
         point = message.points[i]
@@ -98,7 +100,9 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
             point.positions[:4], [*prediction.rocker_angle[i], *prediction.bogie_angle[i]]
         )
         np.testing.assert_array_equal(point.effort[:4], 0.0)
-        np.testing.assert_array_equal(point.effort[4:], prediction.torque[i])
+        np.testing.assert_array_equal(point.effort[4:10], prediction.torque[i])
+        np.testing.assert_array_equal(point.velocities[4:10], prediction.wheel_speed[i])
+        assert len(point.positions) == len(point.velocities) == len(point.effort) == 14
         seconds = point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
         assert seconds == pytest.approx(prediction.time[i], abs=1e-8)
 
@@ -108,15 +112,43 @@ def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(pre
     for unsettled in (49, 10, 50):
         cut = np.arange(len(prediction.settled)) < unsettled
         part = replace(prediction, settled=prediction.settled & cut)
-        radius = rover.wheel.radius
-        trajectory = joint_trajectory(part, radius, "map", STAMP, stock)
+        trajectory = joint_trajectory(part, rover, "map", STAMP, stock)
         assert len(trajectory.points) == unsettled
-        assert trajectory == joint_trajectory(part, radius, "map", STAMP)
+        assert trajectory == joint_trajectory(part, rover, "map", STAMP)
+
+
+def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_rover(rover):
+    turned = np.linspace(0.0, 0.5, 30)
+    path = np.column_stack([np.sin(turned), 1.0 - np.cos(turned), turned])
+    flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
+    prediction = sweep_path(rover, flat, path)
+    for positive, sign in (("left", 1.0), ("right", -1.0)):
+        message = joint_trajectory(prediction, rover, "map", STAMP, positive_steering=positive)
+        for i, point in enumerate(message.points):
+            angles = dict(zip(message.joint_names, point.positions, strict=True))
+            own = {name: angles[name] for name in steering_joints(rover)}
+            assert list(own.values()) == pytest.approx(
+                sign * prediction.steering_angle[i, steered_wheels(rover)]
+            )
+        assert sign * own["front_left_steering"] > 0.3
+    fixed = replace(rover, steering=None)
+    message = joint_trajectory(sweep_path(fixed, flat, path), fixed, "map", STAMP)
+    assert tuple(message.joint_names) == JOINTS and len(message.points[0].positions) == 10
+
+
+def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other_back(rover):
+    turned = np.linspace(0.0, 1.0, 30)
+    flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
+    path = np.column_stack([0.0 * turned, 0.0 * turned, turned])
+    last = joint_trajectory(sweep_path(rover, flat, path), rover, "map", STAMP).points[-1]
+    reach = np.hypot([0.4, 0.0, 0.4], 0.31) / rover.wheel.radius
+    assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)
+    assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()
 
 
 def test_wheels_roll_forwards_by_the_way_they_go(prediction, rover):
-    message = joint_trajectory(prediction, rover.wheel.radius, "map", STAMP)
-    rolled = np.array([point.positions[4:] for point in message.points])
+    message = joint_trajectory(prediction, rover, "map", STAMP)
+    rolled = np.array([point.positions[4:10] for point in message.points])
     assert (np.diff(rolled, axis=0) > 0.0).all()
     flat = 0.05 * 49 / rover.wheel.radius
     assert np.all((rolled[-1] > 0.97 * flat) & (rolled[-1] < 1.05 * flat))

@@ -15,6 +15,7 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator, main
@@ -78,7 +79,8 @@ def test_it_publishes_what_a_rover_would(ros, terrain_file):
     wait_until(lambda: len(ear.heard) >= 3, "joint states, attitude and map")
     state = ear.heard["joint_states"][-1]
     arm = simulator.simulation.settings.rover.manipulator.joints
-    assert list(state.name) == [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *arm]
+    steering = steering_joints(simulator.simulation.settings.rover)
+    assert list(state.name) == [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *steering, *arm]
     assert len(state.position) == len(state.velocity) == len(state.effort) == len(state.name)
     attitude = imu_to_attitude(ear.heard["imu"][-1])
     settled = simulator.simulation.plant.state()
@@ -86,6 +88,26 @@ def test_it_publishes_what_a_rover_would(ros, terrain_file):
     assert np.isfinite([attitude.roll, attitude.pitch]).all()
     seen = terrain_from_point_cloud(ear.heard["elevation_cloud"][-1])
     assert np.isfinite(seen.elevation_at(*settled.position[:2]))
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+def test_joint_states_have_the_steering_angles_with_the_sign_of_the_rover(
+    ros, terrain_file, side, sign
+):
+    ear = Ear(ros)
+    simulator = start_simulator(ros, terrain_file, steering_sign=side)
+    twist = TwistStamped()
+    twist.twist.linear.x, twist.twist.angular.z = 0.05, 0.05
+
+    def has_turned():
+        ear.commands.publish(twist)
+        return simulator.simulation.plant.pose()[2] > 0.03
+
+    wait_until(has_turned, "the rover to turn left")
+    state = ear.heard["joint_states"][-1]
+    angles = dict(zip(state.name, state.position, strict=True))
+    assert sign * angles["front_left_steering"] > 0.2
+    assert angles["rear_left_steering"] == pytest.approx(-angles["front_left_steering"], abs=0.01)
 
 
 def test_it_drives_as_commanded_and_stops_when_commands_stop(ros, terrain_file):

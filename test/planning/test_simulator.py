@@ -20,6 +20,8 @@ from support.rough_grounds import plane
 
 LSR1 = load_rover("lsr1")
 STEP = 0.02
+AHEAD = (0.06, 0.0)
+"""Command that keeps the wheels straight: speed [m/s] and yaw rate [rad/s]."""
 
 
 def wavy():
@@ -97,14 +99,14 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
     plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
     needed = np.full(6, LSR1.weight * np.sin(np.radians(10.0)) * LSR1.wheel.radius / 6.0)
     for _ in range(50):
-        plant.pull(needed, 0.0, STEP)
+        plant.pull(needed, AHEAD, STEP)
     assert plant.pose()[0] == pytest.approx(-1.0, abs=1e-3)
     for _ in range(50):
-        plant.pull(1.3 * needed, 0.0, STEP)
+        plant.pull(1.3 * needed, AHEAD, STEP)
     assert plant.pose()[0] > -0.99
     before = plant.pose()[0]
     for _ in range(300):
-        plant.pull(0.5 * needed, 0.0, STEP)
+        plant.pull(0.5 * needed, AHEAD, STEP)
     assert plant.pose()[0] < before
 
 
@@ -114,7 +116,7 @@ def test_a_wheel_pulls_no_more_than_its_friction():
     strong = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0), friction=0.8)
     for _ in range(10):
         for plant in (weak, strong):
-            plant.pull(np.full(6, 1.0), 0.0, STEP)
+            plant.pull(np.full(6, 1.0), AHEAD, STEP)
     limit = 0.05 * LSR1.gravity * 10 * STEP
     assert 0.0 < weak.state().velocity[0] <= limit
     assert strong.state().velocity[0] == pytest.approx(0.1)
@@ -241,7 +243,7 @@ def test_torques_shared_well_carry_the_rover_where_equal_ones_would_slip():
             LSR1, ground, plant.pose()[None], SweepOptions(friction=0.4, policy="optimal")
         )
         push = 6.0 * (0.08 - plant.state().velocity[0]) * LSR1.total_mass
-        plant.pull(here.torque[0] + push * LSR1.wheel.radius / 6.0, 0.0, STEP)
+        plant.pull(here.torque[0] + push * LSR1.wheel.radius / 6.0, AHEAD, STEP)
     assert plant.pose()[0] > 0.1
 
 
@@ -249,7 +251,7 @@ def test_a_rover_whose_wheels_spin_says_so():
     ground = make_terrain(lambda x, y: 0.3 * np.maximum(x, 0.0) + 0.0 * y, half=3.0)
     plant = QuasiStaticPlant(LSR1, ground, (-0.6, 0.0, 0.0), friction=0.1)
     for _ in range(1000):
-        plant.pull(np.full(6, 1.0), 0.0, STEP)
+        plant.pull(np.full(6, 1.0), AHEAD, STEP)
         if plant.state().stopped:
             break
     assert "wheels slip and the rover stays: rear_right" in plant.state().stopped

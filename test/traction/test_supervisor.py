@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.stall_watch import StallWatch
@@ -16,6 +16,7 @@ from rover_planner.traction.supervisor import (
 
 PERIOD = 0.02
 INPUTS = ("joint_states", "imu", "cmd_vel")
+ANGLES = dict.fromkeys((*SUSPENSION_JOINTS, *STEERING_JOINTS), 0.0)
 
 
 class Rig:
@@ -31,7 +32,7 @@ class Rig:
         service = self.supervisor.service
         rates = dict.fromkeys(SUSPENSION_JOINTS, 0.0) | dict.fromkeys(WHEEL_JOINTS, self.rate)
         if "joint_states" in names:
-            service.take_joints(dict.fromkeys(SUSPENSION_JOINTS, 0.0), rates, self.now)
+            service.take_joints(ANGLES, rates, self.now)
         if "imu" in names:
             service.take_attitude(0.0, self.pitch, np.zeros(3), self.now)
         if "cmd_vel" in names:
@@ -188,7 +189,7 @@ def test_progress_now_and_then_is_no_stall():
     watch = StallWatch()
     for k in range(1000):
         rates = np.full(6, 0.3 if k % 2 else 0.0)
-        assert not watch.update(rates, (0.3, 0.3), 0.02, 2.0)
+        assert not watch.update(rates, np.full(6, 0.3), 0.02, 2.0)
 
 
 @pytest.mark.parametrize("wanted", [(0.3, -0.3), (-0.3, 0.3), (0.3, 0.0)])
@@ -196,10 +197,10 @@ def test_a_rover_that_does_not_turn_is_stalled_one_that_turns_is_not(wanted):
     turns = np.repeat(wanted, 3)
     for rates, stalled in ((turns, False), (np.zeros(6), True), (-turns, True)):
         watch = StallWatch()
-        found = [watch.update(rates, wanted, 0.02, 2.0) for _ in range(110)]
+        found = [watch.update(rates, turns, 0.02, 2.0) for _ in range(110)]
         assert found[-1] == stalled
-    assert watch.update(turns, wanted, 0.02, 2.0)
-    assert not watch.update(turns, (-wanted[0], -wanted[1]), 0.02, 2.0)
+    assert watch.update(turns, turns, 0.02, 2.0)
+    assert not watch.update(turns, -turns, 0.02, 2.0)
 
 
 def test_new_settings_change_the_policy_at_rest():

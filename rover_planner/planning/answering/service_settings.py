@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
@@ -43,13 +44,15 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
     """Load the rover named in the parameters, and check soil and payload.
 
     Raises:
-        RoverError: The rover cannot be loaded, the soil is not among the presets, or the rover
-            cannot carry the payload.
+        RoverError: The rover cannot be loaded, its steering joints do not reach its steering
+            limit, the soil is not among the presets, or the rover cannot carry the payload.
         ParameterError: The payload is below 0 and not OWN_PAYLOAD.
     """
     rover, payload = load_rover(parameters.rover), payload_or_none(parameters.payload)
     if payload is not None:
         body_mass_and_com(rover, payload=payload)
+    if parameters.steering_limit:
+        check_joint_limit(rover, parameters.steering_limit)
     if parameters.soil:
         soil_named(parameters.soil)
     return ServiceSettings(

@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState, PointCloud2
 
 from benchmarks.driven_rover import JOINTS
 from msg_adapters.elevation import terrain_to_point_cloud
+from rover_physics.errors import ModelError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.ros_fixtures import wait_until
@@ -90,18 +91,44 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
     assert rover.count_lines(text) == 1
 
 
-def test_a_wheel_that_is_never_measured_is_named(ros, rover, start_controller):
-    kept = [i for i, name in enumerate(JOINTS) if name != "rear_left_wheel"]
+def leave_out(rover, joint):
+    kept = [i for i, name in enumerate(JOINTS) if name != joint]
     whole = rover.joints
     rover.joints = JointState(
         name=[JOINTS[i] for i in kept],
         position=[whole.position[i] for i in kept],
         velocity=[whole.velocity[i] for i in kept],
     )
+
+
+def test_a_wheel_that_is_never_measured_is_named(ros, rover, start_controller):
+    leave_out(rover, "rear_left_wheel")
     start_controller()
     text = "waiting for joint_states (no velocity of rear_left_wheel)"
     wait_until(lambda: rover.status and text in rover.status.message, "the wheel's name")
     assert rover.torque == 0.0 and rover.brakes[-1]
+
+
+def test_a_steering_joint_that_is_never_measured_is_named_and_the_rover_rests(
+    ros, rover, start_controller
+):
+    leave_out(rover, "front_left_steering")
+    start_controller()
+    text = "waiting for joint_states (no position of front_left_steering)"
+    wait_until(lambda: rover.status and text in rover.status.message, "the joint's name")
+    assert set(rover.states) == {"fault"}
+
+
+@pytest.mark.parametrize(("side", "angle"), [("left", 0.2), ("right", -0.2)])
+def test_steering_is_read_with_the_sign_of_the_rover(rover, start_controller, side, angle):
+    rover.joints.position[JOINTS.index("front_left_steering")] = 0.2
+    controller = start_controller(steering_sign=side)
+    wait_until(lambda: controller.service.steering[5] == angle, "the angle")
+
+
+def test_joints_that_do_not_reach_the_steering_limit_end_the_start(ros, start_controller):
+    with pytest.raises(ModelError, match=r"reach 0\.5 rad.*must be at most 0\.5"):
+        start_controller(steering_limit=0.5)
 
 
 def test_messages_of_an_arm_between_those_of_the_wheels_change_nothing(ros, rover, controller):

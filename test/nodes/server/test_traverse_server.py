@@ -15,6 +15,8 @@ from sensor_msgs.msg import PointCloud2, PointField
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.predictions import JOINTS, MEASURES, array_values
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
@@ -62,7 +64,8 @@ def test_all_results_of_a_path_share_stamp_frame_and_waypoints(mapped, client):
     assert [dim.label for dim in dims] == ["waypoint", "measure"]
     assert array_values(results["tip_over_margin"]).shape == (waypoints, len(MEASURES))
     joints = results["predicted_joints"]
-    assert tuple(joints.joint_names) == JOINTS and len(joints.points) == waypoints
+    assert tuple(joints.joint_names) == JOINTS + steering_joints(load_rover("lsr1"))
+    assert len(joints.points) == waypoints
     last = joints.points[-1].time_from_start
     assert last.sec + last.nanosec * 1e-9 == pytest.approx(float(verdict["time"]), abs=1e-6)
 

@@ -118,7 +118,7 @@ def test_the_map_tells_the_angles_whatever_height_odometry_says(drift):
     finder, errors = MapContactFinder(LSR1, ground), []
     for i in range(0, 1201, 20):
         x, y, z = prediction.position[i]
-        found = finder.find(state_of(prediction, i), np.array([x, y, z + drift, 0.0]), 0.0)
+        found = finder.find(state_of(LSR1, prediction, i), np.array([x, y, z + drift, 0.0]), 0.0)
         assert found.source == "map"
         errors.append(found.angles - prediction.contact_angle[i])
     assert np.median(np.abs(errors)) < 0.03
@@ -132,7 +132,7 @@ def test_at_the_foot_of_a_face_it_is_the_face_that_counts():
     angles = MapContactFinder(LSR1, ground).find(level, pose, 0.0).angles
     assert angles[[2, 5]] == pytest.approx(np.full(2, face), abs=0.02)
     assert angles[[0, 1, 3, 4]] == pytest.approx(np.zeros(4), abs=0.02)
-    back = MapContactFinder(LSR1, ground).find(level, pose, 0.0, forward=False).angles
+    back = MapContactFinder(LSR1, ground).find(level, pose, 0.0, directions=-1.0).angles
     assert back == pytest.approx(np.zeros(6), abs=0.02)
 
 
@@ -143,7 +143,7 @@ def test_an_estimate_stays_as_it_is_when_the_next_one_is_made():
 
     def estimate(i):
         pose = np.array([*prediction.position[i], 0.0])
-        found = finder.find(state_of(prediction, i), pose, 0.0)
+        found = finder.find(state_of(LSR1, prediction, i), pose, 0.0)
         return found, estimator.update(motions[i], duration)
 
     first = estimate(400)
@@ -159,7 +159,7 @@ def test_uncertain_odometry_makes_uncertain_angles():
     prediction, _, _ = drive_states(LSR1, plane(0.1, 0.0, half=2.5))
     finder = MapContactFinder(LSR1, ground)
     pose = np.array([*prediction.position[600], 0.0])
-    well, badly = (finder.find(state_of(prediction, 600), pose, d) for d in (0.01, 0.05))
+    well, badly = (finder.find(state_of(LSR1, prediction, 600), pose, d) for d in (0.01, 0.05))
     assert badly.covariance[0, 0] > 2.0 * well.covariance[0, 0]
 
 
@@ -169,4 +169,4 @@ def test_ground_that_the_map_does_not_have_is_refused_by_wheel():
     finder = MapContactFinder(LSR1, Terrain(elevation, 0.04, (-2.0, -2.0)))
     prediction, _, _ = drive_states(LSR1, plane(0.0, 0.0, half=2.5))
     with pytest.raises(ModelError, match="front_right"):
-        finder.find(state_of(prediction, 600), np.array([0.0, 0.0, 0.3, 0.0]), 0.0)
+        finder.find(state_of(LSR1, prediction, 600), np.array([0.0, 0.0, 0.3, 0.0]), 0.0)

@@ -14,8 +14,6 @@ from rover_physics.traction.layout import (
     CONE_ROWS,
     EQUATIONS,
     FORCES,
-    LATERAL_SHARE,
-    LATERAL_SLOPE,
     LOADS,
     PEAK,
     PEAK_LIMIT_ROW,
@@ -52,12 +50,12 @@ def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **
 def test_equal_torques_are_those_of_the_sweep():
     writer = BalanceWriter(LSR1)
     for prediction, i in rough_states(LSR1, 60):
-        rows = writer.write(state_of(prediction, i), 0.0)
+        rows = writer.write(state_of(LSR1, prediction, i), 0.0)
         x = rows.force_unit * rows.complete(np.zeros(6))
         for values, name in (
             (x[LOADS], "wheel_loads"),
             (x[TRACTIONS], "tangential"),
-            (x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along, "lateral"),
+            (rows.lateral_forces(x), "lateral"),
         ):
             assert values == pytest.approx(getattr(prediction, name)[i], abs=1e-9 * LSR1.weight)
 
@@ -66,7 +64,7 @@ def test_equal_torques_are_those_of_the_sweep():
 def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_optimum():
     workspace, writer, short = TractionWorkspace(), BalanceWriter(LSR1), []
     for prediction, i in rough_states(LSR1, 1000):
-        rows = writer.write(state_of(prediction, i), 0.0)
+        rows = writer.write(state_of(LSR1, prediction, i), 0.0)
         answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
         assert not answer.fallback and answer.load_slack == answer.torque_slack == 0.0
         A, b, along = balance_matrix(LSR1, prediction, i)
@@ -82,7 +80,7 @@ def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_opti
 def test_rows_of_the_program_hold_to_a_ten_thousandth_of_the_weight():
     workspace, writer = TractionWorkspace(), BalanceWriter(LSR1)
     for prediction, i in rough_states(LSR1, 100):
-        rows = writer.write(state_of(prediction, i), 0.0)
+        rows = writer.write(state_of(LSR1, prediction, i), 0.0)
         x = rows.complete(np.zeros(6))
         qp = build_traction_qp(rows, INPUTS, Reference(x, measure_peak(rows, INPUTS, x)))
         y, _, status, solved = workspace.solve(qp)
@@ -97,7 +95,7 @@ def test_rows_of_the_program_hold_to_a_ten_thousandth_of_the_weight():
 def test_a_program_that_is_written_over_is_like_a_new_one():
     writer, qp = BalanceWriter(LSR1), new_traction_qp()
     for prediction, i in rough_states(LSR1, 20):
-        rows = writer.write(state_of(prediction, i), 5.0)
+        rows = writer.write(state_of(LSR1, prediction, i), 5.0)
         reference = Reference(rows.complete(np.zeros(6)), 0.1 * (1 + i % 9))
         fresh = build_traction_qp(rows, INPUTS, reference)
         assert build_traction_qp(rows, INPUTS, reference, qp) is qp
@@ -106,13 +104,13 @@ def test_a_program_that_is_written_over_is_like_a_new_one():
 
 def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
     prediction, i = next(rough_states(LSR1, 1))
-    rows = BalanceWriter(LSR1).write(state_of(prediction, i), 5.0)
+    rows = BalanceWriter(LSR1).write(state_of(LSR1, prediction, i), 5.0)
     x = rows.complete(np.array([0.1, -0.05, 0.0, 0.05, 0.1, 0.2]))
     reference = Reference(x, 0.4)
     qp = build_traction_qp(rows, INPUTS, reference)
 
     def rounded(x, peak):
-        across = np.hypot(x[TRACTIONS], x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along)
+        across = np.hypot(x[TRACTIONS], rows.lateral_forces(x))
         return across - peak * FRICTION * x[LOADS]
 
     def polygon(x, peak):
@@ -154,7 +152,7 @@ def test_the_rows_of_the_program_have_the_slopes_of_figure_4(torques, changes):
 
 def test_straight_up_a_plane_all_wheels_use_the_same_share():
     prediction = sweep_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])
-    answer = solve(LSR1, state_of(prediction, 0))
+    answer = solve(LSR1, state_of(LSR1, prediction, 0))
     assert answer.utilisation == pytest.approx(np.full(6, 0.4 / 0.8), rel=2e-3)
 
 
@@ -184,7 +182,7 @@ def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
     # Body frame on level ground: what the wheels give has no moment about the centre of mass.
     rows = BalanceWriter(rover).write(level(), push * rover.weight)
     x = rows.force_unit * rows.complete(np.linspace(-0.1, 0.1, 6))
-    lateral = x[LATERAL_SHARE] + x[LATERAL_SLOPE] * rows.along
+    lateral = rows.lateral_forces(x)
     forces = np.column_stack([x[TRACTIONS], lateral, x[LOADS]])
     places, com = wheel_contacts_and_com(rover)
     assert np.sum(forces, axis=0) == pytest.approx(rover.weight * np.array([push, 0.0, 1.0]))
@@ -207,14 +205,14 @@ def wheel_contacts_and_com(rover):
 
 def test_any_rover_is_balanced():
     prediction = sweep_path(M2020, plane(0.2, 0.1, half=5.0), [[0.0, 0.0, 0.3]])
-    answer = solve(M2020, state_of(prediction, 0))
+    answer = solve(M2020, state_of(M2020, prediction, 0))
     assert not answer.fallback and 0.2 < answer.utilisation.max() < 0.4
     assert answer.torques == pytest.approx(answer.tractions * M2020.wheel.radius)
 
 
 def test_too_little_friction_is_told_by_how_much():
     prediction = sweep_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])
-    answer = solve(LSR1, state_of(prediction, 0), friction=np.full(6, 0.2))
+    answer = solve(LSR1, state_of(LSR1, prediction, 0), friction=np.full(6, 0.2))
     assert not answer.fallback
     assert answer.friction_slack == pytest.approx(1.0, rel=0.02)
 
@@ -222,7 +220,7 @@ def test_too_little_friction_is_told_by_how_much():
 def test_too_weak_motors_are_told_by_how_much_and_their_torques_are_cut_off():
     prediction = sweep_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])
     needed = LSR1.weight * np.sin(np.arctan(0.4)) / 6.0 * LSR1.wheel.radius
-    answer = solve(LSR1, state_of(prediction, 0), torque=0.6 * needed)
+    answer = solve(LSR1, state_of(LSR1, prediction, 0), torque=0.6 * needed)
     assert not answer.fallback
     assert answer.torque_slack == pytest.approx(0.4 * needed, rel=0.02)
     assert np.abs(answer.torques).max() == pytest.approx(0.6 * needed)
@@ -239,7 +237,7 @@ def test_a_wheel_that_has_to_lift_is_told_with_its_missing_load():
 def test_the_peak_never_rises_from_one_program_to_the_next():
     writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
     for prediction, i in rough_states(LSR1, 50):
-        rows = writer.write(state_of(prediction, i), 0.0)
+        rows = writer.write(state_of(LSR1, prediction, i), 0.0)
         last, peak = None, measure_peak(rows, INPUTS, rows.complete(np.zeros(6)))
         for _ in range(6):
             answer = solve_traction(workspace, rows, INPUTS, last=last, max_programs=1)
@@ -252,7 +250,7 @@ def test_the_best_place_on_the_line_is_no_worse_than_any_other_and_keeps_the_bal
     rng = np.random.default_rng(5)
     inputs = replace(INPUTS, weights=TractionWeights(effort=0.0))
     for prediction, i in rough_states(LSR1, 30):
-        rows = BalanceWriter(LSR1).write(state_of(prediction, i), 0.0)
+        rows = BalanceWriter(LSR1).write(state_of(LSR1, prediction, i), 0.0)
         start, aim = (rows.complete(0.1 * rng.standard_normal(6)) for _ in range(2))
         found, _ = find_best_between(rows, inputs, Reference(start, np.nan), aim)
         assert rows.A @ found.x == pytest.approx(rows.b, abs=1e-12)
@@ -269,30 +267,32 @@ def test_the_best_place_on_the_line_is_no_worse_than_any_other_and_keeps_the_bal
 
 def test_limits_of_torque_turn_to_wheels_with_torque_left():
     prediction, i = next(rough_states(LSR1, 1))
-    free = solve(LSR1, state_of(prediction, i), net=10.0)
+    free = solve(LSR1, state_of(LSR1, prediction, i), net=10.0)
     limit = 0.9 * np.abs(free.torques).max()
-    held = solve(LSR1, state_of(prediction, i), net=10.0, torque=limit)
+    held = solve(LSR1, state_of(LSR1, prediction, i), net=10.0, torque=limit)
     assert np.abs(held.torques).max() <= limit and held.torque_slack < 1e-3 * limit
 
 
 def test_an_unsolved_program_falls_back_to_equal_torques_and_says_so():
     prediction, i = next(rough_states(LSR1, 1))
-    answer = solve(LSR1, state_of(prediction, i), workspace=TractionWorkspace(max_iterations=1))
+    answer = solve(
+        LSR1, state_of(LSR1, prediction, i), workspace=TractionWorkspace(max_iterations=1)
+    )
     assert answer.fallback and answer.programs == 0 and answer.status != "solved"
     assert answer.torques == pytest.approx(prediction.torque[i], abs=1e-9)
 
 
 def test_equal_torques_on_demand_are_no_fallback():
     prediction, i = next(rough_states(LSR1, 1))
-    answer = solve(LSR1, state_of(prediction, i), programs=0)
+    answer = solve(LSR1, state_of(LSR1, prediction, i), programs=0)
     assert not answer.fallback and np.ptp(answer.torques) < 1e-12
 
 
 def test_a_start_from_the_last_answer_takes_less():
     workspace = TractionWorkspace()
     prediction, i = next(rough_states(LSR1, 1))
-    cold = solve(LSR1, state_of(prediction, i), workspace=workspace)
-    warm = solve(LSR1, state_of(prediction, i), workspace=workspace, last=cold.tractions)
+    cold = solve(LSR1, state_of(LSR1, prediction, i), workspace=workspace)
+    warm = solve(LSR1, state_of(LSR1, prediction, i), workspace=workspace, last=cold.tractions)
     assert warm.programs == 1 and warm.iterations < 0.5 * cold.iterations
     assert warm.utilisation.max() == pytest.approx(cold.utilisation.max(), rel=5e-3)
 

@@ -1,0 +1,112 @@
+"""How the wheels of a rover roll with their measured steering angles.
+
+`shares` has the planar motion of the body in which the wheels roll. Here it is scaled so that the
+mean speed of the wheels along their headings is 1. It goes forward, or to the left if it is mostly
+a turn. Wheels straight ahead have the motion (1, 0, 0).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rover_physics.forces.shares import has_turned_wheels, write_shares
+from rover_physics.names import WHEEL_COUNT
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.records import record_type
+
+ROLLING = record_type(
+    ("motion", float, (3,)),  # vx, vy and yaw rate per mean wheel speed [1, 1, 1/m]
+    ("directions", float, (WHEEL_COUNT,)),  # 1 where a wheel rolls forward, -1 where backward
+    ("speeds", float, (WHEEL_COUNT,)),  # along the wheels' headings, on level ground
+    ("thrust", float, (3,)),  # force at the centre of mass and moment of a unit push [1, 1, m]
+    ("inertia", float),  # effective mass of the motion over the rover's mass
+    ("arms", float, (WHEEL_COUNT,)),  # lever arms of the tractions about body z [m]
+)
+"""The rolling motion of `Rolling`, for kernels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rolling:
+    """The motion in which the wheels roll with their steering angles."""
+
+    packed: np.ndarray
+    """Array (1,) of ROLLING."""
+
+    @property
+    def motion(self) -> np.ndarray:
+        """(3,) speed ahead and to the left, and yaw rate [1/m], per mean speed of the wheels."""
+        return self.packed["motion"][0]
+
+    @property
+    def directions(self) -> np.ndarray:
+        """(6,) 1 where a wheel rolls forward in this motion, -1 where backward."""
+        return self.packed["directions"][0]
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """(6,) speeds of the wheels along their headings on level ground, over the mean speed."""
+        return self.packed["speeds"][0]
+
+    @property
+    def inertia(self) -> float:
+        """Effective mass: push over acceleration of the mean wheel speed, over the mass."""
+        return float(self.packed["inertia"][0])
+
+    @property
+    def arms(self) -> np.ndarray:
+        """(6,) moment about body z per traction of each wheel [m], positive to the left."""
+        return self.packed["arms"][0]
+
+
+@kernel
+def write_rolling(linkage, placement, com, shares, rolling):
+    """Write how placed wheels roll.
+
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT.
+        com: (3,) centre of mass of the rover [m], body frame, where a push acts.
+        shares: SHARES, written.
+        rolling: ROLLING, written.
+    """
+    write_shares(linkage, placement, shares)
+    motion, speeds, length = rolling.motion, rolling.speeds, linkage.length
+    turned = has_turned_wheels(placement)
+    motion[0], motion[1], motion[2] = 1.0, 0.0, 0.0
+    if turned:
+        motion[0], motion[1] = shares.rolling[0], shares.rolling[1]
+        motion[2] = shares.rolling[2] / length
+    mean = 0.0
+    for wheel in range(WHEEL_COUNT):
+        x, y = _place_of(placement, wheel)
+        ahead, left = 1.0, 0.0
+        if turned:
+            # The heading is a quarter turn to the right of the axle.
+            ahead, left = shares.axles[wheel, 1], -shares.axles[wheel, 0]
+        rolling.arms[wheel] = x * left - y * ahead
+        rolling.directions[wheel] = shares.common[wheel, 2]
+        speeds[wheel] = ahead * (motion[0] - motion[2] * y) + left * (motion[1] + motion[2] * x)
+        mean += rolling.directions[wheel] * speeds[wheel] / WHEEL_COUNT
+    if turned:
+        for k in range(3):
+            motion[k] /= mean
+        for wheel in range(WHEEL_COUNT):
+            speeds[wheel] /= mean
+    # Yaw inertia of a mass at the distance of the middle wheels.
+    squared_radius = linkage.wheels[1, 1] * linkage.wheels[1, 1]
+    ahead, left = motion[0] - motion[2] * com[1], motion[1] + motion[2] * com[0]
+    inertia = ahead * ahead + left * left + squared_radius * motion[2] * motion[2]
+    rolling.inertia = inertia
+    rolling.thrust[0], rolling.thrust[1] = ahead / inertia, left / inertia
+    rolling.thrust[2] = squared_radius * motion[2] / inertia
+
+
+@kernel
+def _place_of(placement, wheel):
+    """Return the position of a wheel along body x and y [m]."""
+    R, origin, centres = placement.R, placement.origin, placement.centres
+    x = y = 0.0
+    for i in range(3):
+        x += R[i, 0] * (centres[wheel, i] - origin[i])
+        y += R[i, 1] * (centres[wheel, i] - origin[i])
+    return x, y
