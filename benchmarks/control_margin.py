@@ -22,6 +22,7 @@ from rover_physics.names import EQUAL, OPTIMAL
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_path
 from rover_planner.parameters.shared import CONTROL_MARGIN
@@ -183,7 +184,7 @@ def drive(case: Case, source: str = MAP) -> Drive:
     if source == MAP:
         service.take_terrain(ground)
     path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
-    follower = SecondTry(PathFollower(path, LOOK_AHEAD))
+    follower, steered = SecondTry(PathFollower(path, LOOK_AHEAD)), SteeredDrive(plant.rover)
     while plant.time < MAX_DURATION and plant.pose[0] < END:
         now, pose = plant.time, plant.pose
         steering = follower.steer(pose[[0, 1, 3]], SPEED, now)
@@ -193,6 +194,7 @@ def drive(case: Case, source: str = MAP) -> Drive:
         service.take_attitude(*plant.attitude, plant.body_rates, now)
         service.take_command(*steering, now)
         service.take_odometry(pose, 0.0, now)
+        plant.steer(steered.aim(*steering).angles)
         plant.step(service.update(now).torques, PERIOD)
     end = float(plant.pose[0])
     return Drive(end >= END, end, plant.time, follower.retries)
