@@ -9,7 +9,7 @@ from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from support.reference_cases import reference_grounds, reference_predictions
+from support.reference_cases import angle_errors, reference_grounds, reference_predictions
 from support.rough_grounds import fractal, mirrored, plane, quarter_turn, random_poses, smooth
 from support.rover_geometry import attitude_of, place_rover, wheel_gaps
 
@@ -58,12 +58,7 @@ def test_wheel_centres_are_where_mujoco_has_them():
 
 
 def test_attitude_and_suspension_angles_are_those_of_mujoco():
-    errors = []
-    for case, prediction in reference_predictions():
-        attitude = np.column_stack([prediction.roll, prediction.pitch])
-        joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle])
-        errors.append(np.abs(np.hstack([attitude - case.attitude, joints - case.joints])))
-    errors = np.concatenate(errors)
+    errors = angle_errors(reference_predictions())
     assert np.median(errors) <= 0.5e-3
     assert np.percentile(errors, 95) <= 5e-3
 

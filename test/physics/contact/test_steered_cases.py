@@ -7,7 +7,7 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from support.reference_cases import steered_predictions
+from support.reference_cases import angle_errors, steered_predictions
 from support.rover_geometry import wheel_gaps
 
 LSR1 = load_rover("lsr1")
@@ -36,12 +36,7 @@ def test_centres_of_turned_wheels_are_where_mujoco_has_them():
 
 
 def test_attitudes_and_suspension_angles_with_turned_wheels_are_those_of_mujoco():
-    errors = []
-    for case, prediction in steered_predictions():
-        attitude = np.column_stack([prediction.roll, prediction.pitch])
-        joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle])
-        errors.append(np.abs(np.hstack([attitude - case.attitude, joints - case.joints])))
-    errors = np.concatenate(errors)
+    errors = angle_errors(steered_predictions())
     assert np.median(errors) <= 0.5e-3
     assert np.percentile(errors, 95) <= 5e-3
 
