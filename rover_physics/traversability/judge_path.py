@@ -86,10 +86,15 @@ def judge_paths(
     *,
     sigmas: float | None = SIGMAS,
     stop_at_failure: bool = False,
+    ask_ways_out: bool = True,
 ) -> list[tuple[PathPrediction, Verdict]]:
-    """Judge several paths at once, faster than one by one; see `judge_path`."""
+    """Judge several paths at once, faster than one by one; see `judge_path`.
+
+    Without `ask_ways_out`, entrapment is not looked for: pieces of a longer path are judged, and
+    the whole of it later.
+    """
     check_sigmas(sigmas)
-    judge_with = partial(_judge_under_policy, rover, terrain, sigmas)
+    judge_with = partial(_judge_under_policy, rover, terrain, (sigmas, ask_ways_out))
     judged = judge_with(paths, options, stop_at_failure)
     refused = [k for k, (_, verdict) in enumerate(judged) if not verdict.traversable]
     if options.kept_margin == 0.0 or not refused:
@@ -170,12 +175,16 @@ def _judge_and_weigh(path: ArrayLike, options: SweepOptions, judge_with: Judge) 
 def _judge_under_policy(
     rover: Rover,
     terrain: Terrain,
-    sigmas: float | None,
+    extent: tuple[float | None, bool],
     paths: Sequence[ArrayLike],
     options: SweepOptions,
     stop_at_failure: bool,
 ) -> list[Judged]:
-    """Judge several paths under the policy of the options."""
+    """Judge several paths under the policy of the options.
+
+    `extent` is `sigmas` and `ask_ways_out` of `judge_paths`.
+    """
+    sigmas, ask_ways_out = extent
     if stop_at_failure:
         swept_paths = sweep_until_failure(rover, terrain, paths, options)
     else:
@@ -184,7 +193,7 @@ def _judge_under_policy(
     judged = []
     for swept, verdict in swept_paths:
         check_interruption()
-        if verdict.code != "wheel_drop":
+        if ask_ways_out and verdict.code != "wheel_drop":
             course = course_of(rover, terrain, swept, options)
             verdict = ask_for_ways_out(rover, terrain, course, verdict, options)
         prediction = swept.prediction

@@ -1,0 +1,148 @@
+"""Connections of the start and the goal, which lie anywhere, to nodes of the lattice."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.rover.model import Rover
+from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_planner.planning.angles import wrap
+from rover_planner.planning.candidates import path_length
+from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.lattice.costs import PRICES
+from rover_planner.planning.lattice.headings import HEADINGS, YAWS, nearest_heading
+from rover_planner.planning.lattice.nodes import Nodes
+from rover_planner.planning.lattice.primitives import Gear
+from rover_planner.planning.point_turn import turn_and_drive
+
+REACH = 3.0
+"""Largest distance of a node that a curve leads to [cells]."""
+MOST_CURVES = 16
+"""Largest number of curves in each gear."""
+TURNED_PLACES = 4
+"""Number of nearest places to which the rover turns on the spot and drives straight."""
+LARGEST_TURN = 3
+"""Largest turn of a curve [headings]."""
+DETOUR = 1.3
+"""Largest length of a curve over the distance of its ends."""
+
+Pose = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """A piece of path between the start or the goal and a node."""
+
+    node: int
+    """The node."""
+    gear: Gear
+    """How it is driven."""
+    poses: NDArray[np.float64]
+    """(n, 3) waypoints in the order of the drive, x, y [m], yaw [rad], map frame."""
+    least_cost: float
+    """Cost on level ground [m]."""
+
+
+def connect_start(
+    rover: Rover, nodes: Nodes, start: Pose, waypoint_spacing: float
+) -> list[Connection]:
+    """Return connections from a start pose (3,) to nodes, at most `waypoint_spacing` [m] apart."""
+    radius = tightest_radius(rover)
+
+    def drive(node: Pose) -> np.ndarray:
+        return _shortest_curve(start, node, radius, waypoint_spacing)
+
+    def drive_back(node: Pose) -> np.ndarray:
+        turned = _shortest_curve(_about(start), _about(node), radius, waypoint_spacing)
+        return turned - (0.0, 0.0, np.pi)
+
+    found = _curves(nodes, start, 1.0, drive, Gear.FORWARD)
+    found += _curves(nodes, start, -1.0, drive_back, Gear.BACKWARD)
+    if can_turn_on_the_spot(rover):
+        for node, pose in _turned_nodes(nodes, start, 1.0):
+            path, length = turn_and_drive(start, pose, swing_radius(rover), waypoint_spacing)
+            found.append(_turned(node, path, length))
+    return found
+
+
+def connect_goal(
+    rover: Rover, nodes: Nodes, goal: Pose, waypoint_spacing: float
+) -> list[Connection]:
+    """Return connections from nodes to a goal pose (3,), at most `waypoint_spacing` [m] apart."""
+    radius = tightest_radius(rover)
+
+    def drive(node: Pose) -> np.ndarray:
+        return _shortest_curve(node, goal, radius, waypoint_spacing)
+
+    def drive_back(node: Pose) -> np.ndarray:
+        turned = _shortest_curve(_about(node), _about(goal), radius, waypoint_spacing)
+        return turned - (0.0, 0.0, np.pi)
+
+    found = _curves(nodes, goal, -1.0, drive, Gear.FORWARD)
+    found += _curves(nodes, goal, 1.0, drive_back, Gear.BACKWARD)
+    if can_turn_on_the_spot(rover):
+        for node, pose in _turned_nodes(nodes, goal, -1.0):
+            path, length = turn_and_drive(pose, goal, swing_radius(rover), waypoint_spacing)
+            found.append(_turned(node, path, length))
+    return found
+
+
+def _curves(
+    nodes: Nodes, pose: Pose, side: float, drive: Callable[[Pose], np.ndarray], gear: Gear
+) -> list[Connection]:
+    """Return the shortest curves between a pose and the nodes ahead (side 1) or behind (-1)."""
+    found = []
+    for node, there in _nodes_beside(nodes, pose, side):
+        poses = drive(there)
+        length = path_length(poses)
+        if length <= DETOUR * np.hypot(*(there - pose)[:2]) + 1e-9:
+            found.append(Connection(node, gear, poses, PRICES[gear] * length))
+    return sorted(found, key=lambda one: (one.least_cost, one.node))[:MOST_CURVES]
+
+
+def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
+    """Yield the nodes within REACH, ahead of a pose (side 1) or behind it (-1), hardly turned."""
+    ahead = side * np.array([np.cos(pose[2]), np.sin(pose[2])])
+    nearest = nearest_heading(pose[2])
+    for place in nodes.places_near(pose, REACH * nodes.cell):
+        away = nodes.cell * (place + nodes.first) - pose[:2]
+        distance = float(np.hypot(*away))
+        if distance < 1e-6 or away @ ahead < 0.5 * distance:
+            continue
+        for turn in range(-LARGEST_TURN, LARGEST_TURN + 1):
+            heading = (nearest + turn) % HEADINGS
+            yield _node(nodes, place, heading)
+
+
+def _turned_nodes(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
+    """Yield the nearest nodes that head away from a pose (side 1) or towards it (-1)."""
+    places = nodes.places_near(pose, REACH * nodes.cell)
+    aways = nodes.cell * (places + nodes.first) - pose[:2]
+    for row in np.argsort(np.hypot(*aways.T), kind="stable")[:TURNED_PLACES]:
+        x, y = side * aways[row]
+        heading = nearest_heading(np.arctan2(y, x) if np.hypot(x, y) > 1e-6 else pose[2])
+        yield _node(nodes, places[row], heading)
+
+
+def _node(nodes: Nodes, place: np.ndarray, heading: int) -> tuple[int, Pose]:
+    node = int(nodes.index(place[None, :], np.array([heading]))[0])
+    position = nodes.cell * (place + nodes.first)
+    return node, np.array([*position, YAWS[heading]])
+
+
+def _turned(node: int, poses: np.ndarray, length: float) -> Connection:
+    return Connection(node, Gear.ON_THE_SPOT, poses, PRICES[Gear.ON_THE_SPOT] * length)
+
+
+def _shortest_curve(here: Pose, there: Pose, radius: float, spacing: float) -> np.ndarray:
+    """Return the waypoints (n, 3) of the shortest Dubins path between two poses."""
+    poses = np.column_stack(dubins_paths(here, there, radius, spacing)[0])
+    poses[0], poses[-1, :2] = here, there[:2]
+    return poses
+
+
+def _about(pose: Pose) -> Pose:
+    """Return the pose (3,) that heads the other way."""
+    return np.array([pose[0], pose[1], wrap(pose[2] + np.pi)])

@@ -1,0 +1,115 @@
+"""The edges of the lattice: each is a primitive that begins at a node.
+
+What the model found of an edge is kept until the ground under it changes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_planner.planning.lattice.costs import least_cost
+from rover_planner.planning.lattice.headings import HEADINGS
+from rover_planner.planning.lattice.nodes import Nodes
+from rover_planner.planning.lattice.primitives import Primitive
+
+UNJUDGED, PASSES, FAILS = 0, 1, 2
+"""States of an edge; states from FAILS on tell the limit that fails, see `JudgedEdges.codes`."""
+
+
+class PrimitiveTable(NamedTuple):
+    """The primitives of all headings as arrays, as kernels read them; P is the largest number."""
+
+    step: NDArray[np.int64]
+    """(HEADINGS, P, 2) step in x and y [cells]."""
+    end_heading: NDArray[np.int64]
+    """(HEADINGS, P) heading at the end; -1 where a heading has fewer primitives."""
+    least_cost: NDArray[np.float64]
+    """(HEADINGS, P) cost on level ground [m]."""
+    back: NDArray[np.int64]
+    """(HEADINGS, Q, 2) first heading and number of the primitives that end with a heading; -1
+    where there are fewer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The edges of the nodes of a window; edge `node * P + k` is primitive k of the node."""
+
+    nodes: Nodes
+    """The nodes."""
+    primitives: tuple[tuple[Primitive, ...], ...]
+    """The primitives of each heading."""
+
+    @cached_property
+    def table(self) -> PrimitiveTable:
+        """The primitives as arrays."""
+        width = max(len(own) for own in self.primitives)
+        step = np.zeros((HEADINGS, width, 2), np.int64)
+        end, cost = np.full((HEADINGS, width), -1), np.full((HEADINGS, width), np.inf)
+        leading: list[list[tuple[int, int]]] = [[] for _ in range(HEADINGS)]
+        for heading, own in enumerate(self.primitives):
+            for k, primitive in enumerate(own):
+                step[heading, k], end[heading, k] = primitive.step, primitive.end_heading
+                cost[heading, k] = least_cost(primitive)
+                leading[primitive.end_heading].append((heading, k))
+        back = np.full((HEADINGS, max(map(len, leading)), 2), -1)
+        for heading, pairs in enumerate(leading):
+            back[heading, : len(pairs)] = pairs
+        return PrimitiveTable(step, end, cost, back)
+
+    @property
+    def width(self) -> int:
+        """Largest number of primitives of a heading, P."""
+        return self.table.end_heading.shape[1]
+
+    @property
+    def count(self) -> int:
+        """Number of edges, those counted that leave the window."""
+        return self.nodes.count * self.width
+
+    def primitive(self, edge: int) -> Primitive:
+        """Return the primitive of an edge."""
+        node, k = divmod(int(edge), self.width)
+        return self.primitives[node % HEADINGS][k]
+
+    def poses(self, edge: int) -> NDArray[np.float64]:
+        """Return the waypoints (n, 3) of an edge, map frame."""
+        node = int(edge) // self.width
+        start = self.nodes.poses(np.array([node]))[0]
+        return self.primitive(edge).poses + (start[0], start[1], 0.0)
+
+    def ends(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the nodes (n,) where edges (n,) end; they must be in the window."""
+        node, k = np.divmod(edges, self.width)
+        place, heading = np.divmod(node, HEADINGS)
+        step = self.table.step[heading, k]
+        place = place + step[:, 1] * self.nodes.shape[1] + step[:, 0]
+        return place * HEADINGS + self.table.end_heading[heading, k]
+
+
+class JudgedEdges:
+    """What is known of the edges of a window."""
+
+    def __init__(self, edges: Edges):
+        self.edges = edges
+        shape = (edges.nodes.count, edges.width)
+        self.state = np.zeros(shape, np.int8)
+        """(nodes, P) UNJUDGED, PASSES, or FAILS + i for the failure `codes[i]`."""
+        self.cost = np.zeros(shape, np.float32)
+        """(nodes, P) cost [m] where the edge passes."""
+        self.codes: list[str] = []
+        """Codes of the limits that failed so far."""
+
+    def write(self, edge: int, code: str, cost: float) -> None:
+        """Keep what was found of an edge: the code of its failure, "" for none, and its cost."""
+        if code and code not in self.codes:
+            self.codes.append(code)
+        self.state.flat[edge] = FAILS + self.codes.index(code) if code else PASSES
+        self.cost.flat[edge] = cost
+
+    @property
+    def judged(self) -> int:
+        """Number of edges that the model has judged."""
+        return int(np.count_nonzero(self.state))

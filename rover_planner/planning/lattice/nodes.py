@@ -1,0 +1,66 @@
+"""The nodes of the lattice: places on a square grid, each with sixteen headings.
+
+Nodes lie at whole multiples of the cell in the map frame, wherever the map begins, so that what
+is known of them stays valid when the map rolls with the rover.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_planner.planning.lattice.headings import HEADINGS, YAWS
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """The nodes within a window of the map."""
+
+    cell: float
+    """Distance of neighbouring nodes [m]."""
+    first: tuple[int, int]
+    """Column and row of the first place, in cells from the origin of the map frame."""
+    shape: tuple[int, int]
+    """Number of rows (along y) and columns (along x) of places."""
+
+    @property
+    def count(self) -> int:
+        """Number of nodes; a node's index is (row * columns + column) * HEADINGS + heading."""
+        return self.shape[0] * self.shape[1] * HEADINGS
+
+    def poses(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the poses (n, 3) of nodes (n,): x, y [m] and yaw [rad], map frame."""
+        place, heading = np.divmod(np.asarray(nodes), HEADINGS)
+        row, column = np.divmod(place, self.shape[1])
+        return np.column_stack(
+            [
+                self.cell * (column + self.first[0]),
+                self.cell * (row + self.first[1]),
+                YAWS[heading],
+            ]
+        )
+
+    def places_near(self, position: NDArray[np.float64], radius: float) -> NDArray[np.int64]:
+        """Return the places (n, 2), column and row in the window, within a radius [m]."""
+        centre = np.asarray(position[:2]) / self.cell - self.first
+        reach = radius / self.cell
+        low = np.maximum(np.ceil(centre - reach), 0).astype(int)
+        high = np.minimum(np.floor(centre + reach), np.array(self.shape[::-1]) - 1).astype(int)
+        columns, rows = (np.arange(a, b + 1) for a, b in zip(low, high, strict=True))
+        found = np.stack(np.meshgrid(columns, rows, indexing="ij"), axis=-1).reshape(-1, 2)
+        apart = np.hypot(*(found - centre).T)
+        return found[apart <= reach]
+
+    def index(self, places: NDArray[np.int64], headings: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the indices of nodes at places (n, 2) of the window with headings (n,)."""
+        return (places[:, 1] * self.shape[1] + places[:, 0]) * HEADINGS + headings
+
+
+def nodes_within(
+    cell: float, low: tuple[float, float], high: tuple[float, float]
+) -> Nodes:
+    """Return the nodes in a rectangle from `low` to `high`, x and y [m]."""
+    first = tuple(int(np.ceil(value / cell - 1e-9)) for value in low)
+    last = tuple(int(np.floor(value / cell + 1e-9)) for value in high)
+    shape = (max(0, last[1] - first[1] + 1), max(0, last[0] - first[0] + 1))
+    return Nodes(cell, (first[0], first[1]), shape)

@@ -1,0 +1,91 @@
+"""The shortest path from start to goal over what is known of a lattice so far."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_planner.planning.lattice.edges import JudgedEdges
+from rover_planner.planning.lattice.graph import (
+    Graph,
+    Seeds,
+    Tree,
+    find_shortest,
+    measure_to_goal,
+)
+
+SLACK = 1.2
+"""Costs to the goal are known up to this multiple of the start's."""
+WORN_OUT = 0.3
+"""Share of the measured nodes above which a search expands too many: the costs to the goal are
+measured again."""
+FEW = 500
+"""Number of expanded nodes that never counts as too many."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """A path over the lattice, from one of the start's connections to one of the goal's."""
+
+    start: int
+    """Index of the connection at the start."""
+    edges: NDArray[np.int64]
+    """(k,) edges from there."""
+    goal: int
+    """Index of the connection at the goal."""
+    cost: float
+    """Its cost [m] by what is known."""
+
+
+class ShortestPaths:
+    """Searches one lattice between fixed ends again and again, while edges are judged."""
+
+    def __init__(self, known: JudgedEdges, doubt: NDArray[np.float32]):
+        self._known, self._doubt = known, doubt
+        count = known.edges.nodes.count
+        self._to_goal, self._beyond, self._measured = np.empty(count), np.inf, 0
+        self._tree = Tree(np.empty(count), np.empty(count, np.int64))
+        self._caution = -1.0
+        self.expanded = 0
+        """Number of nodes expanded by all searches."""
+
+    def find(self, starts: Seeds, goals: Seeds, caution: float) -> Route | None:
+        """Return the shortest path, None if there is none.
+
+        Args:
+            starts: Nodes of the start's connections and their costs [m].
+            goals: Nodes of the goal's connections and their costs [m].
+            caution: Weight of the doubts.
+        """
+        graph = self.graph(caution)
+        if caution != self._caution:
+            self._measure(graph, starts, goals)
+            self._caution = caution
+        to_goal = self._to_goal, self._beyond
+        goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree)
+        self.expanded += expanded
+        if expanded > max(FEW, WORN_OUT * self._measured):
+            self._measure(graph, starts, goals)
+        if goal < 0:
+            return None
+        start, edges = self._follow_back(int(goals.nodes[goal]))
+        return Route(start, edges, int(goal), float(cost))
+
+    def graph(self, caution: float) -> Graph:
+        """Return the lattice as kernels read it."""
+        known, nodes = self._known, self._known.edges.nodes
+        return Graph(
+            known.edges.table, known.state, known.cost, self._doubt, caution, *nodes.shape
+        )
+
+    def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
+        """Measure the costs to the goal again."""
+        self._beyond, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
+
+    def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
+        """Return the start's connection and the edges (k,) that lead to a node."""
+        edges, width = [], self._known.edges.width
+        while (edge := int(self._tree.parent[node])) >= 0:
+            edges.append(edge)
+            node = edge // width
+        return -1 - edge, np.array(edges[::-1], np.int64)
