@@ -111,6 +111,11 @@ def sweep_poses(
     """
     model, places = pack_model(rover, terrain, options), check_poses(poses)
     results = evaluator(model)(places, motions=motions_of(model, places, curvature))
+    return predict_poses(model, places, results)
+
+
+def predict_poses(model: PackedModel, places: np.ndarray, results: Any) -> PathPrediction:
+    """Return the prediction of single poses (n, 3) that form no path from their RESULTs (n,)."""
     prediction = _collect(
         places,
         results,

@@ -2,15 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
+from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_motion import check_curvature
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import check_poses, sweep_poses
+from rover_physics.prediction.sweep import check_poses, predict_poses, sweep_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -100,6 +103,13 @@ def judge_many_poses(
         take(prediction)
     assert worst is not None
     return with_refusals(worst, codes, reasons)
+
+
+def judge_results(
+    rover: Rover, model: PackedModel, poses: np.ndarray, results: Any
+) -> tuple[str, ...]:
+    """Return the codes (n,) of single poses (n, 3) from their RESULTs, "" where none fails."""
+    return judge(rover, predict_poses(model, poses, results)).codes if len(poses) else ()
 
 
 def _judge(

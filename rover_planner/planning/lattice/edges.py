@@ -16,7 +16,8 @@ from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.lattice.primitives import Primitive
 
 UNJUDGED, PASSES, FAILS = 0, 1, 2
-"""States of an edge; states from FAILS on tell the limit that fails, see `JudgedEdges.codes`."""
+"""States of an edge or node; states from FAILS on tell the limit that fails, see
+`JudgedEdges.codes`."""
 
 
 class PrimitiveTable(NamedTuple):
@@ -99,15 +100,20 @@ class JudgedEdges:
         """(nodes, P) UNJUDGED, PASSES, or FAILS + i for the failure `codes[i]`."""
         self.cost = np.zeros(shape, np.float32)
         """(nodes, P) cost [m] where the edge passes."""
+        self.standing = np.zeros(edges.nodes.count, np.int8)
+        """(nodes,) as `state`: whether the rover can stand at a node with its wheels ahead."""
         self.codes: list[str] = []
         """Codes of the limits that failed so far."""
 
     def write(self, edge: int, code: str, cost: float) -> None:
         """Keep what was found of an edge: the code of its failure, "" for none, and its cost."""
+        self.state.flat[edge], self.cost.flat[edge] = self.state_of(code), cost
+
+    def state_of(self, code: str) -> int:
+        """Return the state of what fails by a code, or passes if it is empty."""
         if code and code not in self.codes:
             self.codes.append(code)
-        self.state.flat[edge] = FAILS + self.codes.index(code) if code else PASSES
-        self.cost.flat[edge] = cost
+        return FAILS + self.codes.index(code) if code else PASSES
 
     @property
     def judged(self) -> int:

@@ -23,8 +23,10 @@ class Graph(NamedTuple):
     """(nodes, P) states of the edges, see `JudgedEdges`."""
     cost: np.ndarray
     """(nodes, P) costs [m] of the edges that pass."""
+    standing: np.ndarray
+    """(nodes,) states of the nodes, see `JudgedEdges`."""
     doubt: np.ndarray
-    """(nodes,) doubt that the rover can be at a node, 0 for none."""
+    """(nodes,) doubt that edges to a node pass, 0 for none."""
     caution: float
     """Weight of the doubt; with 0 no edge is estimated above its true cost."""
     rows: int
@@ -53,9 +55,12 @@ class Tree(NamedTuple):
 
 @exact_kernel
 def edge_cost(graph, node, k, end):
-    """Return the cost [m] of edge k of a node, which ends at node `end`; infinite if it fails."""
+    """Return the cost [m] of edge k of a node, which ends at node `end`; infinite if it fails.
+
+    Nodes where the rover cannot stand are never entered.
+    """
     state = graph.state[node, k]
-    if state >= FAILS:
+    if state >= FAILS or graph.standing[end] >= FAILS:
         return np.inf
     if state == PASSES:
         return float(graph.cost[node, k])
@@ -89,7 +94,8 @@ def measure_to_goal(graph, goals, starts, slack, distance):
     heap = [(0.0, np.int64(-1))]
     heap.clear()
     for i in range(goals.nodes.size):
-        if goals.costs[i] < distance[goals.nodes[i]]:
+        standing = graph.standing[goals.nodes[i]] < FAILS
+        if standing and goals.costs[i] < distance[goals.nodes[i]]:
             distance[goals.nodes[i]] = goals.costs[i]
             heapq.heappush(heap, (goals.costs[i], goals.nodes[i]))
     entry = np.full(distance.size, np.inf)
@@ -156,7 +162,8 @@ def find_shortest(graph, starts, goals, to_goal, tree):
     for i in range(starts.nodes.size):
         node, cost = starts.nodes[i], starts.costs[i]
         bound = min(distance[node], beyond)
-        if cost < tree.cost[node] and bound < np.inf:
+        standing = graph.standing[node] < FAILS
+        if standing and cost < tree.cost[node] and bound < np.inf:
             tree.cost[node], tree.parent[node] = cost, -1 - i
             heapq.heappush(heap, (cost + bound, -cost, node))
     best, found, expanded = np.inf, np.int64(-1), 0

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_paths
+from rover_physics.traversability.judge_poses import judge_poses
+from rover_physics.traversability.sure_failures import find_sure_failures
 from rover_planner.planning.lattice.costs import true_cost
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.path_query import Candidate, PathQueryOptions, check_path
@@ -43,32 +44,42 @@ class Judge:
     def judge(
         self, pieces: Sequence[NDArray[np.float64]], gears: Sequence[Gear]
     ) -> list[Judged]:
-        """Judge pieces of path, each of poses (n, 3), up to their first failures.
+        """Judge pieces of path, each of poses (n, 3).
 
         Ways out of pits are not asked for; that is done for the whole path.
         """
+        asked = self.options.sweep_options(self.joint_angles)
+        codes = find_sure_failures(self.rover, self.terrain, pieces, asked)
+        judged = [Judged(code, np.inf) for code in codes]
+        rest = [k for k, code in enumerate(codes) if not code]
         found = judge_paths(
             self.rover,
             self.terrain,
-            pieces,
-            self.options.sweep_options(self.joint_angles),
+            [pieces[k] for k in rest],
+            asked,
             sigmas=self.options.map_sigmas,
             stop_at_failure=True,
             ask_ways_out=False,
         )
-        self.poses += sum(len(prediction.poses) for prediction, _ in found)
-        return [
-            Judged("", true_cost(self.rover, gear, prediction, verdict))
-            if verdict.traversable
-            else Judged(verdict.code, np.inf)
-            for gear, (prediction, verdict) in zip(gears, found, strict=True)
-        ]
+        self.poses += sum(map(len, pieces))
+        for k, (prediction, verdict) in zip(rest, found, strict=True):
+            passes = verdict.traversable
+            cost = true_cost(self.rover, gears[k], prediction, verdict) if passes else np.inf
+            judged[k] = Judged(verdict.code, cost)
+        return judged
 
-    def can_stand(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return where the rover keeps its limits at single poses (n, 3), wheels ahead."""
+    def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
+        """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
         self.poses += len(poses)
-        asked = self.options.sweep_options(self.joint_angles)
-        return score_poses(self.rover, self.terrain, poses, asked).within_limits(self.rover)
+        _, verdict = judge_poses(
+            self.rover,
+            self.terrain,
+            poses,
+            np.zeros(len(poses)),
+            self.options.sweep_options(self.joint_angles),
+            sigmas=self.options.map_sigmas,
+        )
+        return verdict.codes
 
     def check(self, poses: NDArray[np.float64]) -> Candidate:
         """Judge a whole path (n, 3) with all that belongs to it, up to its first failure."""

@@ -51,6 +51,17 @@ class Nodes:
         apart = np.hypot(*(found - centre).T)
         return found[apart <= reach]
 
+    def around(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the nodes of the window at and beside nodes (n,), with similar headings."""
+        place, heading = np.divmod(np.asarray(nodes), HEADINGS)
+        row, column = np.divmod(place, self.shape[1])
+        beside = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        rows, columns = row[:, None] + beside[:, 0], column[:, None] + beside[:, 1]
+        headings = (heading[:, None] + beside[:, 2]) % HEADINGS
+        inside = (rows >= 0) & (rows < self.shape[0]) & (columns >= 0) & (columns < self.shape[1])
+        places = np.stack([columns[inside], rows[inside]], axis=-1)
+        return np.unique(self.index(places, headings[inside]))
+
     def index(self, places: NDArray[np.int64], headings: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the indices of nodes at places (n, 2) of the window with headings (n,)."""
         return (places[:, 1] * self.shape[1] + places[:, 0]) * HEADINGS + headings

@@ -2,31 +2,36 @@
 
 The search is lazy (LazySP; Dellin and Srinivasa 2016, A unifying formalism for shortest path
 problems with expensive edge evaluations): find the shortest path by what is known, ask the model
-about its edges, and again. First it is cautious: places where the rover cannot stand make the edges
-that lead there dear before they are judged, so that a first path is found soon. Then it is exact:
-edges that are not judged cost what they would on level ground, so that the cost of the shortest
-path is a bound from below on that of any path on the lattice.
+about its nodes, then about its edges, and again. A node where the rover cannot stand belongs to no
+path. First the search is cautious: edges near refused ones are dearer, so that a first path is
+found soon. Then it is exact: edges that are not judged cost what they would on level ground, so
+that the cost of the shortest path is a bound from below on that of any path on the lattice.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.planning.lattice.connections import Connection
-from rover_planner.planning.lattice.edges import FAILS, PASSES, UNJUDGED, JudgedEdges
+from rover_planner.planning.lattice.edges import PASSES, UNJUDGED, JudgedEdges
 from rover_planner.planning.lattice.graph import Seeds
 from rover_planner.planning.lattice.judge import Judge
+from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.lattice.shortest import Route, ShortestPaths
 from rover_planner.planning.path_query import Candidate
 
 CAUTIONS = (1.0, 0.0)
 """Weights of the doubts, one after the other; with 0 the search is exact."""
-DOUBT = 5.0
-"""Doubt at a node where the rover cannot stand: edges that lead there cost 1 + DOUBT as much."""
+DOUBT = 0.3
+"""Doubt that a refused edge adds to the nodes around its end: the cost of edges that lead there
+rises by this share."""
+FIRST_PIECES = 2
+"""Number of pieces that are judged first at either end of a path."""
 NEAR_OPTIMAL = 0.02
 """A path is good enough if no path of the lattice costs less by more than this share."""
 
@@ -62,6 +67,17 @@ class _Ends:
         return Seeds(self.nodes, self.costs)
 
 
+class _Piece(NamedTuple):
+    """A piece of a route that is not judged."""
+
+    poses: NDArray[np.float64]
+    """(n, 3) waypoints."""
+    gear: Gear
+    """How it is driven."""
+    place: tuple[_Ends | None, int]
+    """The end of the search that it connects and its index there, or None and the edge."""
+
+
 @dataclass
 class LatticeSearch:
     """A search between two poses over the edges of a lattice."""
@@ -80,7 +96,6 @@ class LatticeSearch:
     def __post_init__(self) -> None:
         count = self.known.edges.nodes.count
         self._doubt = np.zeros(count, np.float32)
-        self._probed = np.zeros(count, bool)
         self._ends = _Ends(self.starts), _Ends(self.goals)
         self.shortest = ShortestPaths(self.known, self._doubt)
         self._refused: list[tuple[int, int, float]] = []
@@ -109,46 +124,83 @@ class LatticeSearch:
             progress.bound = max(progress.bound, min(route.cost, progress.cost))
         if route.cost * (1.0 + NEAR_OPTIMAL) >= progress.cost:
             return True
-        if caution > 0.0 and self._probe(route):
-            return False
-        if not self._judge_route(route):
+        if not (self._stand_along(route) and self._judge_route(route)):
             return False
         return self._take(route) and caution > 0.0
 
-    def _probe(self, route: Route) -> bool:
-        """Ask about the nodes of a route; return whether the rover cannot stand at a new one."""
-        edges = self.known.edges
-        open_edges = route.edges[self.known.state.flat[route.edges] == UNJUDGED]
-        new = np.unique(edges.ends(open_edges))
-        new = new[~self._probed[new]]
+    def _stand_along(self, route: Route) -> bool:
+        """Ask about the nodes of a route; return whether the rover can stand at all new ones.
+
+        Where it cannot, nodes around are asked about too: obstacles are larger than a node.
+        """
+        known, edges = self.known, self.known.edges
+        ends = self.starts[route.start].node, self.goals[route.goal].node
+        passed = np.unique(np.concatenate([edges.ends(route.edges), ends]))
+        new = passed[known.standing[passed] == UNJUDGED]
         if not len(new):
-            return False
-        self._probed[new] = True
-        stands = self.judge.can_stand(edges.nodes.poses(new))
-        self._doubt[new[~stands]] = DOUBT
-        return not bool(stands.all())
+            return True
+        refused = new[~self._stand(new)]
+        around = edges.nodes.around(refused)
+        self._stand(around[known.standing[around] == UNJUDGED])
+        return not len(refused)
+
+    def _stand(self, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Ask whether the rover can stand at nodes (n,)."""
+        if not len(nodes):
+            return np.ones(0, bool)
+        codes = self.judge.stand(self.known.edges.nodes.poses(nodes))
+        self.known.standing[nodes] = [self.known.state_of(code) for code in codes]
+        return self.known.standing[nodes] == PASSES
 
     def _judge_route(self, route: Route) -> bool:
-        """Judge what is open of a route; return whether all of it passes."""
-        known, (start_ends, goal_ends) = self.known, self._ends
-        edges = route.edges[known.state.flat[route.edges] == UNJUDGED]
-        pieces = [known.edges.poses(edge) for edge in edges]
-        gears = [known.edges.primitive(edge).gear for edge in edges]
-        ends = [
-            (ends, index)
-            for ends, index in ((start_ends, route.start), (goal_ends, route.goal))
-            if not ends.judged[index]
-        ]
-        pieces += [ends.connections[index].poses for ends, index in ends]
-        gears += [ends.connections[index].gear for ends, index in ends]
-        if not pieces:
-            return True
-        found = self.judge.judge(pieces, gears)
-        for edge, judged in zip(edges, found, strict=False):
-            known.write(edge, judged.code, judged.cost)
-        for (side, index), judged in zip(ends, found[len(edges) :], strict=True):
-            side.judged[index], side.costs[index] = True, judged.cost
-        return not any(judged.code for judged in found)
+        """Judge what is open of a route; return whether all of it passes.
+
+        It is judged from both ends inwards, more and more at a time: a refusal near an end may
+        close it.
+        """
+        pieces = self._open_pieces(route)
+        size = FIRST_PIECES
+        while pieces:
+            count = len(pieces)
+            chosen = range(count) if count <= 2 * size else [*range(size), *range(-size, 0)]
+            found = self._judge([pieces[k] for k in chosen])
+            if not all(found):
+                return False
+            pieces = [] if count <= 2 * size else pieces[size:-size]
+            size *= 2
+        return True
+
+    def _open_pieces(self, route: Route) -> list["_Piece"]:
+        """Return the pieces of a route that are not judged, in the order of the drive."""
+        (starts, goals), edges = self._ends, self.known.edges
+        first, last = starts.connections[route.start], goals.connections[route.goal]
+        found = []
+        if not starts.judged[route.start]:
+            found.append(_Piece(first.poses, first.gear, (starts, route.start)))
+        for edge in route.edges[self.known.state.flat[route.edges] == UNJUDGED]:
+            found.append(_Piece(edges.poses(edge), edges.primitive(edge).gear, (None, int(edge))))
+        if not goals.judged[route.goal]:
+            found.append(_Piece(last.poses, last.gear, (goals, route.goal)))
+        return found
+
+    def _judge(self, pieces: Sequence["_Piece"]) -> list[bool]:
+        """Judge pieces, keep what is found, and return whether they pass."""
+        found = self.judge.judge([one.poses for one in pieces], [one.gear for one in pieces])
+        for piece, judged in zip(pieces, found, strict=True):
+            side, index = piece.place
+            if side is None:
+                self.known.write(index, judged.code, judged.cost)
+                if judged.code:
+                    self._doubt_around(index)
+            else:
+                side.judged[index], side.costs[index] = True, judged.cost
+        return [not judged.code for judged in found]
+
+    def _doubt_around(self, edge: int) -> None:
+        """Doubt the edges that lead where a refused edge does."""
+        edges = self.known.edges
+        end = edges.ends(np.array([edge]))
+        self._doubt[edges.nodes.around(end)] += DOUBT
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""

@@ -75,7 +75,13 @@ class ShortestPaths:
         """Return the lattice as kernels read it."""
         known, nodes = self._known, self._known.edges.nodes
         return Graph(
-            known.edges.table, known.state, known.cost, self._doubt, caution, *nodes.shape
+            known.edges.table,
+            known.state,
+            known.cost,
+            known.standing,
+            self._doubt,
+            caution,
+            *nodes.shape,
         )
 
     def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
