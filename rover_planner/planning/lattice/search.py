@@ -30,6 +30,9 @@ CAUTIONS = (1.0, 0.0)
 DOUBT = 0.3
 """Doubt that a refused edge adds to the nodes around its end: the cost of edges that lead there
 rises by this share."""
+FEW_NODES, NODES_ASKED = 200, 0.05
+"""Number of nodes around refused ones that are asked about at least, and in addition for each node
+that the last search expanded: then both take about as long."""
 FIRST_PIECES = 2
 """Number of pieces that are judged first at either end of a path."""
 NEAR_OPTIMAL = 0.02
@@ -90,14 +93,14 @@ class LatticeSearch:
     """Connections from the start to nodes."""
     goals: list[Connection]
     """Connections from nodes to the goal."""
+    doubt: NDArray[np.float32]
+    """(nodes,) doubt that the rover can be at a node, 0 for none; grows with the search."""
     progress: Progress = field(default_factory=Progress)
     """What it has found."""
 
     def __post_init__(self) -> None:
-        count = self.known.edges.nodes.count
-        self._doubt = np.zeros(count, np.float32)
         self._ends = _Ends(self.starts), _Ends(self.goals)
-        self.shortest = ShortestPaths(self.known, self._doubt)
+        self.shortest = ShortestPaths(self.known, self.doubt)
         self._refused: list[tuple[int, int, float]] = []
 
     def run(self, go_on: Callable[[], bool]) -> Progress:
@@ -140,9 +143,21 @@ class LatticeSearch:
         if not len(new):
             return True
         refused = new[~self._stand(new)]
-        around = edges.nodes.around(refused)
-        self._stand(around[known.standing[around] == UNJUDGED])
+        self._explore(refused)
         return not len(refused)
+
+    def _explore(self, refused: NDArray[np.int64]) -> None:
+        """Ask about the nodes around refused ones, and around those refused in turn.
+
+        Obstacles are larger than a node. The work is in proportion to that of the last search.
+        """
+        known, nodes = self.known, self.known.edges.nodes
+        allowed = FEW_NODES + round(NODES_ASKED * self.shortest.last_expanded)
+        while len(refused) and allowed > 0:
+            around = nodes.around(refused)
+            around = around[known.standing[around] == UNJUDGED][:allowed]
+            allowed -= len(around)
+            refused = around[~self._stand(around)]
 
     def _stand(self, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Ask whether the rover can stand at nodes (n,)."""
@@ -200,7 +215,7 @@ class LatticeSearch:
         """Doubt the edges that lead where a refused edge does."""
         edges = self.known.edges
         end = edges.ends(np.array([edge]))
-        self._doubt[edges.nodes.around(end)] += DOUBT
+        self.doubt[edges.nodes.around(end)] += DOUBT
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""

@@ -16,11 +16,8 @@ from rover_planner.planning.lattice.graph import (
 
 SLACK = 1.2
 """Costs to the goal are known up to this multiple of the start's."""
-WORN_OUT = 0.3
-"""Share of the measured nodes above which a search expands too many: the costs to the goal are
-measured again."""
 FEW = 500
-"""Number of expanded nodes that never counts as too many."""
+"""Number of nodes that a search may expand beside those of its path before it counts as misled."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +42,11 @@ class ShortestPaths:
         count = known.edges.nodes.count
         self._to_goal, self._beyond, self._measured = np.empty(count), np.inf, 0
         self._tree = Tree(np.empty(count), np.empty(count, np.int64))
-        self._caution = -1.0
+        self._caution, self._misled = -1.0, 0
         self.expanded = 0
         """Number of nodes expanded by all searches."""
+        self.last_expanded = 0
+        """Number of nodes expanded by the last search."""
 
     def find(self, starts: Seeds, goals: Seeds, caution: float) -> Route | None:
         """Return the shortest path, None if there is none.
@@ -64,7 +63,9 @@ class ShortestPaths:
         to_goal = self._to_goal, self._beyond
         goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree)
         self.expanded += expanded
-        if expanded > max(FEW, WORN_OUT * self._measured):
+        self.last_expanded = expanded
+        self._misled += max(0, expanded - FEW)
+        if self._misled > self._measured:  # the costs to the goal are worn out
             self._measure(graph, starts, goals)
         if goal < 0:
             return None
@@ -86,6 +87,7 @@ class ShortestPaths:
 
     def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
         """Measure the costs to the goal again."""
+        self._misled = 0
         self._beyond, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
 
     def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
