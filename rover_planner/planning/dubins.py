@@ -12,7 +12,11 @@ _TURN = {"L": 1.0, "S": 0.0, "R": -1.0}
 
 
 def dubins_paths(
-    start: np.ndarray, goal: np.ndarray, radius: float, waypoint_spacing: float
+    start: np.ndarray,
+    goal: np.ndarray,
+    radius: float,
+    waypoint_spacing: float,
+    most: int | None = None,
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Return the Dubins paths between two poses, the shortest first.
 
@@ -21,17 +25,29 @@ def dubins_paths(
         goal: (3,) x, y [m] and yaw [rad].
         radius: Radius of the arcs [m].
         waypoint_spacing: Largest distance between waypoints along the path [m].
+        most: Largest number of paths; None returns all.
 
     Returns:
         One to six paths, each x (n,), y (n,) [m] and yaw (n,) [rad], with equidistant
         waypoints.
     """
-    dx, dy = (goal[:2] - start[:2]) / radius
-    bearing = np.arctan2(dy, dx)
-    distance = float(np.hypot(dx, dy))
-    words = _solve_words(_turn(start[2] - bearing), _turn(goal[2] - bearing), distance)
+    words = _words_between(start, goal, radius)
     words.sort(key=lambda word: sum(word[1]))
-    return [_drive(start, word, pieces, radius, waypoint_spacing) for word, pieces in words]
+    return [_drive(start, word, pieces, radius, waypoint_spacing) for word, pieces in words[:most]]
+
+
+def dubins_length(start: np.ndarray, goal: np.ndarray, radius: float) -> float:
+    """Return the length [m] of the shortest Dubins path; arguments as for `dubins_paths`."""
+    return radius * min(sum(pieces) for _, pieces in _words_between(start, goal, radius))
+
+
+def _words_between(
+    start: np.ndarray, goal: np.ndarray, radius: float
+) -> list[tuple[str, tuple[float, float, float]]]:
+    """Return the words between two poses; pieces as `_solve_words` returns them."""
+    dx, dy = (goal[:2] - start[:2]) / radius
+    bearing, distance = np.arctan2(dy, dx), float(np.hypot(dx, dy))
+    return _solve_words(_turn(start[2] - bearing), _turn(goal[2] - bearing), distance)
 
 
 def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, float, float]]]:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
-from rover_planner.planning.candidates import path_length
-from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.dubins import dubins_length, dubins_paths
 from rover_planner.planning.lattice.costs import PRICES
 from rover_planner.planning.lattice.headings import HEADINGS, YAWS, nearest_heading
 from rover_planner.planning.lattice.nodes import Nodes
@@ -29,6 +28,8 @@ DETOUR = 1.3
 """Largest length of a curve over the distance of its ends."""
 
 Pose = NDArray[np.float64]
+Ends = Callable[[Pose], tuple[Pose, Pose]]
+"""Function of a node's pose that returns the first and the last pose of a piece of path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,57 +50,63 @@ def connect_start(
     rover: Rover, nodes: Nodes, start: Pose, waypoint_spacing: float
 ) -> list[Connection]:
     """Return connections from a start pose (3,) to nodes, at most `waypoint_spacing` [m] apart."""
-    radius = tightest_radius(rover)
-
-    def drive(node: Pose) -> np.ndarray:
-        return _shortest_curve(start, node, radius, waypoint_spacing)
-
-    def drive_back(node: Pose) -> np.ndarray:
-        turned = _shortest_curve(_about(start), _about(node), radius, waypoint_spacing)
-        return turned - (0.0, 0.0, np.pi)
-
-    found = _curves(nodes, start, 1.0, drive, Gear.FORWARD)
-    found += _curves(nodes, start, -1.0, drive_back, Gear.BACKWARD)
-    if can_turn_on_the_spot(rover):
-        for node, pose in _turned_nodes(nodes, start, 1.0):
-            path, length = turn_and_drive(start, pose, swing_radius(rover), waypoint_spacing)
-            found.append(_turned(node, path, length))
-    return found
+    maker = _Maker(rover, nodes, waypoint_spacing)
+    found = maker.curves(start, 1.0, Gear.FORWARD, lambda node: (start, node))
+    found += maker.curves(start, -1.0, Gear.BACKWARD, lambda node: (_about(start), _about(node)))
+    return found + maker.turns(start, 1.0, lambda node: (start, node))
 
 
 def connect_goal(
     rover: Rover, nodes: Nodes, goal: Pose, waypoint_spacing: float
 ) -> list[Connection]:
     """Return connections from nodes to a goal pose (3,), at most `waypoint_spacing` [m] apart."""
-    radius = tightest_radius(rover)
-
-    def drive(node: Pose) -> np.ndarray:
-        return _shortest_curve(node, goal, radius, waypoint_spacing)
-
-    def drive_back(node: Pose) -> np.ndarray:
-        turned = _shortest_curve(_about(node), _about(goal), radius, waypoint_spacing)
-        return turned - (0.0, 0.0, np.pi)
-
-    found = _curves(nodes, goal, -1.0, drive, Gear.FORWARD)
-    found += _curves(nodes, goal, 1.0, drive_back, Gear.BACKWARD)
-    if can_turn_on_the_spot(rover):
-        for node, pose in _turned_nodes(nodes, goal, -1.0):
-            path, length = turn_and_drive(pose, goal, swing_radius(rover), waypoint_spacing)
-            found.append(_turned(node, path, length))
-    return found
+    maker = _Maker(rover, nodes, waypoint_spacing)
+    found = maker.curves(goal, -1.0, Gear.FORWARD, lambda node: (node, goal))
+    found += maker.curves(goal, 1.0, Gear.BACKWARD, lambda node: (_about(node), _about(goal)))
+    return found + maker.turns(goal, -1.0, lambda node: (node, goal))
 
 
-def _curves(
-    nodes: Nodes, pose: Pose, side: float, drive: Callable[[Pose], np.ndarray], gear: Gear
-) -> list[Connection]:
-    """Return the shortest curves between a pose and the nodes ahead (side 1) or behind (-1)."""
-    found = []
-    for node, there in _nodes_beside(nodes, pose, side):
-        poses = drive(there)
-        length = path_length(poses)
-        if length <= DETOUR * np.hypot(*(there - pose)[:2]) + 1e-9:
-            found.append(Connection(node, gear, poses, PRICES[gear] * length))
-    return sorted(found, key=lambda one: (one.least_cost, one.node))[:MOST_CURVES]
+@dataclass(frozen=True)
+class _Maker:
+    """Makes the connections of one rover and lattice."""
+
+    rover: Rover
+    nodes: Nodes
+    waypoint_spacing: float
+
+    def curves(self, pose: Pose, side: float, gear: Gear, ends: Ends) -> list[Connection]:
+        """Return the shortest curves between a pose and the nodes ahead (side 1) or behind (-1).
+
+        `ends` gives first and last pose of the curve to or from a node, as if driven forwards.
+        """
+        radius, found = tightest_radius(self.rover), []
+        for node, there in _nodes_beside(self.nodes, pose, side):
+            length = dubins_length(*ends(there), radius)
+            if length <= DETOUR * np.hypot(*(there - pose)[:2]) + 1e-9:
+                found.append((PRICES[gear] * length, node, there))
+        found.sort(key=lambda one: one[:2])
+        return [
+            Connection(node, gear, self._drive(*ends(there), gear), cost)
+            for cost, node, there in found[:MOST_CURVES]
+        ]
+
+    def _drive(self, here: Pose, there: Pose, gear: Gear) -> np.ndarray:
+        """Return the waypoints (n, 3) of the shortest Dubins path between two poses."""
+        radius = tightest_radius(self.rover)
+        poses = np.column_stack(dubins_paths(here, there, radius, self.waypoint_spacing, 1)[0])
+        poses[0], poses[-1, :2] = here, there[:2]
+        return poses - (0.0, 0.0, np.pi if gear == Gear.BACKWARD else 0.0)
+
+    def turns(self, pose: Pose, side: float, ends: Ends) -> list[Connection]:
+        """Return ways that turn, drive straight and turn, if the rover turns on the spot."""
+        if not can_turn_on_the_spot(self.rover):
+            return []
+        swing, found = swing_radius(self.rover), []
+        for node, there in _turned_nodes(self.nodes, pose, side):
+            poses, length = turn_and_drive(*ends(there), swing, self.waypoint_spacing)
+            cost = PRICES[Gear.ON_THE_SPOT] * length
+            found.append(Connection(node, Gear.ON_THE_SPOT, poses, cost))
+        return found
 
 
 def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
@@ -130,17 +137,6 @@ def _node(nodes: Nodes, place: np.ndarray, heading: int) -> tuple[int, Pose]:
     node = int(nodes.index(place[None, :], np.array([heading]))[0])
     position = nodes.cell * (place + nodes.first)
     return node, np.array([*position, YAWS[heading]])
-
-
-def _turned(node: int, poses: np.ndarray, length: float) -> Connection:
-    return Connection(node, Gear.ON_THE_SPOT, poses, PRICES[Gear.ON_THE_SPOT] * length)
-
-
-def _shortest_curve(here: Pose, there: Pose, radius: float, spacing: float) -> np.ndarray:
-    """Return the waypoints (n, 3) of the shortest Dubins path between two poses."""
-    poses = np.column_stack(dubins_paths(here, there, radius, spacing)[0])
-    poses[0], poses[-1, :2] = here, there[:2]
-    return poses
 
 
 def _about(pose: Pose) -> Pose:

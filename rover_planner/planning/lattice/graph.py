@@ -44,6 +44,19 @@ class Seeds(NamedTuple):
     """(k,) costs [m] at which they are entered."""
 
 
+class ToGoal(NamedTuple):
+    """What is known of the costs from the nodes to the goal."""
+
+    cost: np.ndarray
+    """(nodes,) cost to the goal [m], too high or infinite where it is not known."""
+    focus: np.ndarray
+    """(2,) row and column of the place that was measured towards, the start."""
+    reach: float
+    """Distance of the start's connections from there [m]."""
+    cell: float
+    """Distance of neighbouring nodes [m]."""
+
+
 class Tree(NamedTuple):
     """What a search has reached."""
 
@@ -75,49 +88,72 @@ def node_at(graph, row, column, heading):
     return -1
 
 
+@exact_kernel
+def _from_start(to_goal, columns, node):
+    """Return a bound from below on the cost from the start to a node [m]."""
+    place = node // HEADINGS
+    rows = place // columns - to_goal.focus[0]
+    along = place % columns - to_goal.focus[1]
+    return max(to_goal.cell * np.hypot(rows, along) - to_goal.reach, 0.0)
+
+
+@exact_kernel
+def _bound_to_goal(to_goal, limit, columns, node):
+    """Return a bound from below on the cost from a node to the goal [m].
+
+    All costs are known for which the sum with the bound from the start is at most `limit`.
+    """
+    from_start = _from_start(to_goal, columns, node)
+    if to_goal.cost[node] + from_start <= limit:
+        return to_goal.cost[node]
+    return max(limit - from_start, 0.0)
+
+
 @allocating_kernel
-def measure_to_goal(graph, goals, starts, slack, distance):
-    """Write the cost from each node to the goal, up to a little beyond the starts (Dijkstra).
+def measure_to_goal(graph, goals, starts, slack, to_goal):
+    """Measure the costs from the nodes to the goal (A* from the goal towards the start).
 
     Args:
         graph: Graph.
         goals: Seeds with the costs from the nodes to the goal.
         starts: Seeds with the costs from the start to the nodes.
-        slack: How much farther than the start is measured, as a factor.
-        distance: (nodes,) written; infinite beyond what is returned.
+        slack: Up to which multiple of the cost from the start to the goal it goes on.
+        to_goal: ToGoal; `cost` is written.
 
     Returns:
-        The cost up to which all nodes are known; infinite if all that lead to the goal are. And
-        the number of known nodes.
+        The `limit` of `_bound_to_goal`, infinite if all nodes are known that lead to the goal; and
+        the number of nodes expanded.
     """
+    distance = to_goal.cost
     distance[:] = np.inf
-    heap = [(0.0, np.int64(-1))]
+    heap = [(0.0, 0.0, np.int64(-1))]
     heap.clear()
     for i in range(goals.nodes.size):
-        standing = graph.standing[goals.nodes[i]] < FAILS
-        if standing and goals.costs[i] < distance[goals.nodes[i]]:
-            distance[goals.nodes[i]] = goals.costs[i]
-            heapq.heappush(heap, (goals.costs[i], goals.nodes[i]))
+        node, cost = goals.nodes[i], goals.costs[i]
+        if graph.standing[node] < FAILS and cost < distance[node]:
+            distance[node] = cost
+            heapq.heappush(heap, (cost + _from_start(to_goal, graph.columns, node), cost, node))
     entry = np.full(distance.size, np.inf)
     for i in range(starts.nodes.size):
         entry[starts.nodes[i]] = min(entry[starts.nodes[i]], starts.costs[i])
-    limit, known = np.inf, 0
+    limit, expanded = np.inf, 0
     while len(heap) > 0:
-        here, node = heapq.heappop(heap)
+        estimate, here, node = heapq.heappop(heap)
         if here > distance[node]:
             continue
-        if here > limit:
-            return here, known
-        known += 1
+        if estimate > limit:
+            return limit, expanded
+        expanded += 1
         if entry[node] < np.inf:
             limit = min(limit, slack * (here + entry[node]))
-        _enter_before(graph, node, here, distance, heap)
-    return np.inf, known
+        _enter_before(graph, node, to_goal, heap)
+    return np.inf, expanded
 
 
 @allocating_kernel
-def _enter_before(graph, node, here, distance, heap):
-    """Enter the nodes from which an edge leads to a node at cost `here`."""
+def _enter_before(graph, node, to_goal, heap):
+    """Enter the nodes from which an edge leads to a node."""
+    distance = to_goal.cost
     heading, place = node % HEADINGS, node // HEADINGS
     row, column = place // graph.columns, place % graph.columns
     for i in range(graph.table.back.shape[1]):
@@ -128,10 +164,11 @@ def _enter_before(graph, node, here, distance, heap):
         before = node_at(graph, row - step[1], column - step[0], first)
         if before < 0:
             continue
-        cost = here + edge_cost(graph, before, k, node)
+        cost = distance[node] + edge_cost(graph, before, k, node)
         if cost < distance[before]:
             distance[before] = cost
-            heapq.heappush(heap, (cost, before))
+            bound = _from_start(to_goal, graph.columns, before)
+            heapq.heappush(heap, (cost + bound, cost, before))
 
 
 @allocating_kernel
@@ -142,15 +179,14 @@ def find_shortest(graph, starts, goals, to_goal, tree):
         graph: Graph.
         starts: Seeds with the costs from the start to the nodes.
         goals: Seeds with the costs from the nodes to the goal.
-        to_goal: (nodes,) bound from below of the cost to the goal [m], and the bound where that
-            is infinite.
+        to_goal: ToGoal, and the limit up to which it is measured.
         tree: Tree, written.
 
     Returns:
         Index of the goal's seed that the path ends with, -1 if there is no path; its cost [m]; and
         the number of nodes expanded.
     """
-    distance, beyond = to_goal
+    measured, limit = to_goal
     tree.cost[:] = np.inf
     leave = np.full(tree.cost.size, np.int64(-1))
     for i in range(goals.nodes.size):
@@ -161,7 +197,7 @@ def find_shortest(graph, starts, goals, to_goal, tree):
     heap.clear()
     for i in range(starts.nodes.size):
         node, cost = starts.nodes[i], starts.costs[i]
-        bound = min(distance[node], beyond)
+        bound = _bound_to_goal(measured, limit, graph.columns, node)
         standing = graph.standing[node] < FAILS
         if standing and cost < tree.cost[node] and bound < np.inf:
             tree.cost[node], tree.parent[node] = cost, -1 - i
@@ -183,7 +219,7 @@ def find_shortest(graph, starts, goals, to_goal, tree):
 @allocating_kernel
 def _enter_after(graph, node, to_goal, tree, heap):
     """Enter the nodes to which the edges of a node lead."""
-    distance, beyond = to_goal
+    measured, limit = to_goal
     heading, place = node % HEADINGS, node // HEADINGS
     row, column = place // graph.columns, place % graph.columns
     width = graph.table.end_heading.shape[1]
@@ -195,7 +231,7 @@ def _enter_after(graph, node, to_goal, tree, heap):
         end = node_at(graph, row + step[1], column + step[0], end_heading)
         if end < 0:
             continue
-        bound = min(distance[end], beyond)
+        bound = _bound_to_goal(measured, limit, graph.columns, end)
         cost = tree.cost[node] + edge_cost(graph, node, k, end)
         if cost < tree.cost[end] and bound < np.inf:
             tree.cost[end], tree.parent[end] = cost, node * width + k

@@ -51,6 +51,14 @@ class Nodes:
         apart = np.hypot(*(found - centre).T)
         return found[apart <= reach]
 
+    def surround(self, nodes: NDArray[np.int64]) -> tuple[NDArray[np.float64], float]:
+        """Return row and column (2,) amid nodes (n,), and their largest distance from it [m]."""
+        places = np.stack(np.divmod(np.asarray(nodes) // HEADINGS, self.shape[1]), axis=-1)
+        if not len(places):
+            return np.zeros(2), 0.0
+        middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+        return middle, self.cell * float(np.hypot(*(places - middle).T).max())
+
     def around(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the nodes of the window at and beside nodes (n,), with similar headings."""
         place, heading = np.divmod(np.asarray(nodes), HEADINGS)

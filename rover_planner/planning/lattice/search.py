@@ -100,7 +100,7 @@ class LatticeSearch:
 
     def __post_init__(self) -> None:
         self._ends = _Ends(self.starts), _Ends(self.goals)
-        self.shortest = ShortestPaths(self.known, self.doubt)
+        self.shortest = ShortestPaths(self.known, self.doubt, self._ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
 
     def run(self, go_on: Callable[[], bool]) -> Progress:

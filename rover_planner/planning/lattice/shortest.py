@@ -9,13 +9,14 @@ from rover_planner.planning.lattice.edges import JudgedEdges
 from rover_planner.planning.lattice.graph import (
     Graph,
     Seeds,
+    ToGoal,
     Tree,
     find_shortest,
     measure_to_goal,
 )
 
-SLACK = 1.2
-"""Costs to the goal are known up to this multiple of the start's."""
+SLACK = 1.1
+"""Costs to the goal are measured up to this multiple of the cost from start to goal."""
 FEW = 500
 """Number of nodes that a search may expand beside those of its path before it counts as misled."""
 
@@ -37,10 +38,13 @@ class Route:
 class ShortestPaths:
     """Searches one lattice between fixed ends again and again, while edges are judged."""
 
-    def __init__(self, known: JudgedEdges, doubt: NDArray[np.float32]):
+    def __init__(self, known: JudgedEdges, doubt: NDArray[np.float32], starts: Seeds):
+        """Search from about the nodes of the first seeds; later ones must be among them."""
         self._known, self._doubt = known, doubt
-        count = known.edges.nodes.count
-        self._to_goal, self._beyond, self._measured = np.empty(count), np.inf, 0
+        nodes = known.edges.nodes
+        count = nodes.count
+        self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell)
+        self._limit, self._measured = np.inf, 0
         self._tree = Tree(np.empty(count), np.empty(count, np.int64))
         self._caution, self._misled = -1.0, 0
         self.expanded = 0
@@ -60,7 +64,7 @@ class ShortestPaths:
         if caution != self._caution:
             self._measure(graph, starts, goals)
             self._caution = caution
-        to_goal = self._to_goal, self._beyond
+        to_goal = self._to_goal, self._limit
         goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree)
         self.expanded += expanded
         self.last_expanded = expanded
@@ -88,7 +92,9 @@ class ShortestPaths:
     def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
         """Measure the costs to the goal again."""
         self._misled = 0
-        self._beyond, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
+        self._limit, self._measured = measure_to_goal(
+            graph, goals, starts, SLACK, self._to_goal
+        )
 
     def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
         """Return the start's connection and the edges (k,) that lead to a node."""
