@@ -124,6 +124,11 @@ def select_results(results: Any, rows: Any) -> Any:
     return _numbers(results)[rows].view(RESULT)[:, 0]
 
 
+def place_results(results: Any, to: Any, rows: np.ndarray) -> None:
+    """Copy RESULTs (k,) into rows (k,) of others."""
+    _numbers(to)[rows] = _numbers(results)
+
+
 def copy_results(results: Any, to: Any) -> None:
     """Copy RESULTs (n,) into others."""
     _numbers(to)[:] = _numbers(results)
@@ -206,7 +211,7 @@ def find_crossings(
     """
     jumps = np.empty((len(poses), 2), np.int64)
     joined = np.broadcast_to(joined, len(poses) - 1)
-    at_rest = _turn_wheels(poses, results, joined, evaluate)
+    at_rest = turn_wheels(poses, results, joined, evaluate)
     jumps = jumps[: find_jumps(results, poses, joined, limits_of(wheels), jumps)]
     if not len(jumps):
         return at_rest
@@ -232,7 +237,7 @@ _NOTHING = Crossings(
 )
 
 
-def _turn_wheels(
+def turn_wheels(
     poses: np.ndarray, results: Any, joined: np.ndarray, evaluate: Evaluate
 ) -> Crossings:
     """Return the waypoints where the wheels turn, with the motion that leads on from there."""

@@ -131,7 +131,7 @@ class _StartedPath:
         """Number of waypoints up to which the crossings are known."""
         self.judged: tuple[SweptPath, Verdict] | None = None
         """The result once it is known."""
-        self._limits = limits_of(rover, model)
+        self._limits = suspect_limits_of(rover, model)
         self._suspicious = False
         self._crossings: list[Crossings] = []
 
@@ -178,7 +178,7 @@ class _StartedPath:
             self.judged = swept, judge(self._rover, swept.prediction)
 
 
-def limits_of(rover: Rover, model: PackedModel) -> SuspectLimits:
+def suspect_limits_of(rover: Rover, model: PackedModel) -> SuspectLimits:
     """Return the limits of a rover under the options of a model."""
     limits, suspension = rover.limits, rover.suspension
     kept = 1.0 - float(model.settings.control_margin)

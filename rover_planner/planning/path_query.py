@@ -14,6 +14,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.extremes import extremes_of, used_share
 from rover_physics.traversability.judge_path import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.parameters.shared import CONTROL_MARGIN
@@ -244,22 +245,5 @@ def path_cost(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> tup
 
 
 def path_risk(rover: Rover, verdict: Verdict) -> float:
-    """Return the used share of the tightest safety limit; 1 is at the limit.
-
-    The share is value over limit for friction utilisation, torque saturation and tilt, which have
-    maxima. It is limit over value for tip-over ratio and belly clearance, which have minima. On an
-    uncertain map the values are the bounds.
-    """
-    limits = rover.limits
-    friction = np.fmax(verdict.max_friction_utilisation, verdict.friction_utilisation_bound)
-    torque = np.fmax(verdict.max_torque_saturation, verdict.torque_saturation_bound)
-    tilt = np.fmax(verdict.max_tilt, verdict.tilt_bound)
-    tip_over = np.fmin(verdict.min_tip_over_ratio, verdict.tip_over_ratio_bound)
-    belly = np.fmin(verdict.min_belly_clearance, verdict.belly_clearance_bound)
-    return max(
-        friction / limits.friction_utilisation,
-        torque / limits.torque_saturation,
-        tilt / limits.tilt,
-        limits.tip_over_ratio / max(tip_over, 1e-9),
-        limits.belly_clearance / max(belly, 1e-9),
-    )
+    """Return the used share of the tightest safety limit of a judged path; 1 is at the limit."""
+    return used_share(rover, extremes_of(verdict))

@@ -8,11 +8,12 @@ Energy over weight is the height [m] to which the energy would lift the rover. R
 share of the tightest safety limit on the piece, 1 at the limit.
 """
 
-from rover_physics.prediction.path_prediction import PathPrediction
+import math
+
 from rover_physics.rover.model import Rover
-from rover_physics.traversability.verdict import Verdict
+from rover_physics.traversability.extremes import used_share
+from rover_physics.traversability.pieces import PieceVerdict
 from rover_planner.planning.lattice.primitives import Gear, Primitive
-from rover_planner.planning.path_query import path_risk
 
 PRICES = {Gear.FORWARD: 1.0, Gear.BACKWARD: 1.5, Gear.ON_THE_SPOT: 1.5}
 """Price of time in each gear: sensors look ahead, and turning on the spot wears the wheels."""
@@ -29,9 +30,11 @@ def least_cost(primitive: Primitive) -> float:
     return PRICES[primitive.gear] * primitive.length
 
 
-def true_cost(rover: Rover, gear: Gear, prediction: PathPrediction, verdict: Verdict) -> float:
-    """Return the cost [m] of a piece of path that was judged traversable."""
-    driven = float(prediction.time[-1]) * rover.nominal_speed
-    excess = max(0.0, path_risk(rover, verdict) - SAFE) / (1.0 - SAFE)
-    cost = PRICES[gear] * driven + CLIMB * max(0.0, float(prediction.energy[-1])) / rover.weight
+def true_cost(rover: Rover, gear: Gear, piece: PieceVerdict) -> float:
+    """Return the cost [m] of a piece of path, infinite if it fails."""
+    if piece.code:
+        return math.inf
+    driven = piece.time * rover.nominal_speed
+    excess = max(0.0, used_share(rover, piece.extremes) - SAFE) / (1.0 - SAFE)
+    cost = PRICES[gear] * driven + CLIMB * max(0.0, piece.energy) / rover.weight
     return cost + RISK * driven * min(excess, 1.0) ** 2

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_paths
 from rover_physics.traversability.judge_poses import judge_poses
-from rover_physics.traversability.sure_failures import find_sure_failures
+from rover_physics.traversability.pieces import judge_pieces
 from rover_planner.planning.lattice.costs import true_cost
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.path_query import Candidate, PathQueryOptions, check_path
@@ -48,25 +47,18 @@ class Judge:
 
         Ways out of pits are not asked for; that is done for the whole path.
         """
-        asked = self.options.sweep_options(self.joint_angles)
-        codes = find_sure_failures(self.rover, self.terrain, pieces, asked)
-        judged = [Judged(code, np.inf) for code in codes]
-        rest = [k for k, code in enumerate(codes) if not code]
-        found = judge_paths(
+        self.poses += sum(map(len, pieces))
+        found = judge_pieces(
             self.rover,
             self.terrain,
-            [pieces[k] for k in rest],
-            asked,
+            pieces,
+            self.options.sweep_options(self.joint_angles),
             sigmas=self.options.map_sigmas,
-            stop_at_failure=True,
-            ask_ways_out=False,
         )
-        self.poses += sum(map(len, pieces))
-        for k, (prediction, verdict) in zip(rest, found, strict=True):
-            passes = verdict.traversable
-            cost = true_cost(self.rover, gears[k], prediction, verdict) if passes else np.inf
-            judged[k] = Judged(verdict.code, cost)
-        return judged
+        return [
+            Judged(piece.code, true_cost(self.rover, gear, piece))
+            for gear, piece in zip(gears, found, strict=True)
+        ]
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
         """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""

@@ -1,0 +1,301 @@
+"""Judges many short pieces of path at once, faster than `judge_paths`, which decides when in doubt.
+
+A search asks about thousands of pieces and needs of each only whether it passes, and what it costs.
+A piece fails if one of its waypoints does in any case. It passes if no waypoint comes near a limit,
+no contact jumps between them and no wheel may fall. All others are left to `judge_paths`. The
+verdicts are the same as its own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.bounds.path import SIGMAS
+from rover_physics.numerics.kernels import exact_kernel
+from rover_physics.numerics.quiet import quiet
+from rover_physics.numerics.read_only import view_read_only
+from rover_physics.prediction.crossing import (
+    place_results,
+    select_results,
+    turn_wheels,
+)
+from rover_physics.prediction.crossing import limits_of as jump_limits_of
+from rover_physics.prediction.drops import FACE, MIN_ANGLE
+from rover_physics.prediction.evaluation import unwritten_results
+from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.path_kernels import add_up, find_jumps, way_between
+from rover_physics.prediction.path_motion import path_motions
+from rover_physics.prediction.sweep import check_poses, evaluator, joined_paths, wheels_of
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.rover.model import Rover
+from rover_physics.rover.turning import wheelbase
+from rover_physics.status import TorquePolicy
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.extremes import Extremes, extremes_of
+from rover_physics.traversability.first_failure import (
+    SuspectLimits,
+    find_suspects,
+    suspect_limits_of,
+)
+from rover_physics.traversability.judge_path import judge_paths
+from rover_physics.traversability.judge_poses import judge_results
+from rover_physics.traversability.servo_checks import MAX_SLIDE, MAX_TURN_OFF
+
+NUMBERS = 7
+"""Numbers of a piece that passes: time, energy and the extremes."""
+STRIDE = 8
+"""Every so many waypoints of a piece are evaluated first, then the others."""
+
+
+@dataclass(frozen=True)
+class PieceVerdict:
+    """What is found of a piece of path."""
+
+    code: str
+    """Code of a limit that fails, empty if the rover may drive the piece."""
+    time: float
+    """Time that it takes [s], NaN if it fails."""
+    energy: float
+    """Energy that it takes [J], NaN if it fails."""
+    extremes: Extremes
+    """How near it comes to the limits, NaN if it fails."""
+
+
+_NOTHING = Extremes(*[float("nan")] * 5)
+
+
+@quiet
+def judge_pieces(
+    rover: Rover,
+    terrain: Terrain,
+    pieces: Sequence[ArrayLike],
+    options: SweepOptions = DEFAULT_OPTIONS,
+    *,
+    sigmas: float | None = SIGMAS,
+) -> list[PieceVerdict]:
+    """Judge pieces of path as `judge_paths` does without asking for ways out.
+
+    The code of a piece that fails is that of one of its failures, not always of the first.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        pieces: Poses of each piece, (n, 3) x, y [m] and yaw [rad], map frame.
+        options: As for `judge_paths`.
+        sigmas: As for `judge_paths`.
+
+    Raises:
+        PoseError, ModelError, SoilError: As `judge_paths`.
+    """
+    if not len(pieces):
+        return []
+    sweep = _Sweep(rover, terrain, pieces, options)
+    verdicts: list[PieceVerdict | None] = [None] * len(pieces)
+    for k, code in sweep.find_failures().items():
+        verdicts[k] = PieceVerdict(code, np.nan, np.nan, _NOTHING)
+    if terrain.elevation_std is None or not sigmas:
+        for k, passed in sweep.find_passes().items():
+            verdicts[k] = passed
+    rest = [k for k, verdict in enumerate(verdicts) if verdict is None]
+    judged = judge_paths(
+        rover,
+        terrain,
+        [pieces[k] for k in rest],
+        options,
+        sigmas=sigmas,
+        stop_at_failure=True,
+        ask_ways_out=False,
+    )
+    for k, (prediction, verdict) in zip(rest, judged, strict=True):
+        if verdict.traversable:
+            time, energy = float(prediction.time[-1]), float(prediction.energy[-1])
+            verdicts[k] = PieceVerdict("", time, energy, extremes_of(verdict))
+        else:
+            verdicts[k] = PieceVerdict(verdict.code, np.nan, np.nan, _NOTHING)
+    return [verdict for verdict in verdicts if verdict is not None]
+
+
+class _Ease(NamedTuple):
+    """What a piece must keep to pass without a closer look."""
+
+    limits: SuspectLimits
+    """Limits of the waypoints."""
+    steepest: float
+    """Least contact angle behind a wheel [rad]; no wheel falls from there."""
+    most_turn: float
+    """Largest turn off the path [rad]."""
+    most_slide: float
+    """Largest way off the path [m]."""
+
+
+class _Sweep:
+    """The waypoints of some pieces, evaluated as far as needed."""
+
+    def __init__(
+        self,
+        rover: Rover,
+        terrain: Terrain,
+        pieces: Sequence[ArrayLike],
+        options: SweepOptions,
+    ):
+        self._rover, self._model = rover, pack_model(rover, terrain, options)
+        # Equal torques may pass what only the control margin of other torques refuses.
+        physical = pack_model(rover, terrain, replace(options, control_margin=0.0))
+        self._sure = suspect_limits_of(rover, physical)
+        poses = [check_poses(piece) for piece in pieces]
+        self._counts = np.array([len(one) for one in poses])
+        self._poses = np.concatenate(poses)
+        self._motions = np.concatenate([path_motions(self._model, one) for one in poses])
+        self._results = unwritten_results(len(self._poses))
+        self._is_open = np.ones(len(poses), bool)
+
+    def find_failures(self) -> dict[int, str]:
+        """Return the codes of pieces with a waypoint that fails in any case, by index."""
+        piece = np.repeat(np.arange(len(self._counts)), self._counts)
+        ends = np.cumsum(self._counts)
+        place = np.arange(len(piece)) - (ends - self._counts)[piece]
+        coarse = (place % STRIDE == 0) | (place == self._counts[piece] - 1)
+        codes: dict[int, str] = {}
+        for chosen in (coarse, ~coarse):
+            rows = np.flatnonzero(chosen & self._is_open[piece])
+            if not len(rows):
+                continue
+            results = evaluator(self._model)(self._poses[rows], motions=self._motions[rows])
+            place_results(results, self._results, rows)
+            fails = np.zeros(len(rows), bool)
+            mark_failures(view_read_only(results), self._sure, fails)
+            failed, first = np.unique(piece[rows[fails]], return_index=True)
+            at = np.flatnonzero(fails)[first]
+            found = judge_results(
+                self._rover, self._model, self._poses[rows[at]], select_results(results, at)
+            )
+            codes |= {k: code for k, code in zip(failed.tolist(), found, strict=True) if code}
+            self._is_open[list(codes)] = False
+        return codes
+
+    def find_passes(self) -> dict[int, PieceVerdict]:
+        """Return the verdicts of pieces that pass without a closer look, by index.
+
+        `find_failures` must have evaluated the waypoints.
+        """
+        indices = np.flatnonzero(self._is_open)
+        if not len(indices):
+            return {}
+        rows = np.flatnonzero(np.repeat(self._is_open, self._counts))
+        ends = np.cumsum(self._counts[indices])
+        poses, results = self._poses[rows], select_results(self._results, rows)
+        joined = joined_paths(ends)
+        turned = turn_wheels(poses, results, joined, evaluator(self._model))
+        jumps, wheels = np.empty((len(poses), 2), np.int64), wheels_of(self._model)
+        jumps = jumps[: find_jumps(results, poses, joined, jump_limits_of(wheels), jumps)]
+        numbers, ease = np.full((len(indices), NUMBERS), np.nan), self._ease()
+        sums = np.empty((3, len(poses)))
+        path = view_read_only(poses), view_read_only(results), ends, sums
+        turns = view_read_only(turned.results), np.searchsorted(turned.waypoint, ends)
+        linkage = self._model.record.linkage
+        size = wheels.reach, linkage.steering_rate
+        sum_up_pieces(path, turns, ease, size, numbers)
+        numbers[np.searchsorted(ends, jumps[:, 0], side="right"), 0] = np.nan
+        return {
+            k: PieceVerdict("", row[0], row[1], Extremes(*row[2:]))
+            for k, row in zip(indices.tolist(), numbers.tolist(), strict=True)
+            if row[0] == row[0]
+        }
+
+    def _ease(self) -> _Ease:
+        """Return what a piece must keep to pass without a closer look."""
+        on_servos = bool(self._model.settings.policy == TorquePolicy.SERVO)
+        return _Ease(
+            suspect_limits_of(self._rover, self._model),
+            -MIN_ANGLE if on_servos else -FACE,
+            MAX_TURN_OFF if on_servos else np.inf,
+            MAX_SLIDE * wheelbase(self._rover) if on_servos else np.inf,
+        )
+
+
+@exact_kernel
+def mark_failures(results, limits, fails):
+    """Write True into fails (n,) for RESULTs (n,) that break a limit in any case."""
+    for row in range(results.size):
+        fails[row] = find_suspects(results[row : row + 1], limits)[1] >= 0
+
+
+@exact_kernel
+def sum_up_pieces(path, turns, ease, size, numbers):
+    """Write the numbers of the pieces that pass without a closer look.
+
+    Args:
+        path: (n, 3) poses of all pieces, (n,) their RESULTs, (k,) the rows where pieces end, and
+            (3, n) work space.
+        turns: (m,) RESULTs where wheels turn at a waypoint, and (k,) the rows where those of the
+            pieces end.
+        ease: _Ease.
+        size: Distance of the outermost wheel from the body origin [m], and the largest speed of
+            the steering [rad/s].
+        numbers: (k, NUMBERS) time [s], energy [J] and Extremes, written for pieces that pass.
+    """
+    (poses, results, ends, sums), (turned, turned_ends) = path, turns
+    reach, rate = size
+    first, first_turn = 0, 0
+    for k in range(ends.size):
+        piece, its_turns = slice(first, ends[k]), slice(first_turn, turned_ends[k])
+        first, first_turn = ends[k], turned_ends[k]
+        if not (_is_easy(results[piece], ease) and _is_easy(turned[its_turns], ease)):
+            continue
+        if not _keeps_to_path(poses[piece], results[piece], ease, reach):
+            continue
+        numbers[k, 2:] = 0.0
+        numbers[k, 5], numbers[k, 6] = np.inf, np.nan
+        _find_extremes(results[piece], numbers[k, 2:])
+        _find_extremes(turned[its_turns], numbers[k, 2:])
+        last = add_up(poses[piece], results[piece], rate, (0.0, 0.0, 0.0), sums[:, piece])
+        numbers[k, 0], numbers[k, 1] = last[1], last[2]
+
+
+@exact_kernel
+def _is_easy(results, ease):
+    """Return whether no RESULT may break a limit and no wheel may fall or lift."""
+    if find_suspects(results, ease.limits)[0] >= 0:
+        return False
+    for row in range(results.size):
+        result = results[row]
+        for wheel in range(6):
+            angle = result.contact_angle[wheel]
+            if result.wheel_speed[wheel] < 0.0:
+                angle = -angle
+            if angle < ease.steepest or result.lift_rate[wheel] > 0.0:
+                return False
+    return True
+
+
+@exact_kernel
+def _keeps_to_path(poses, results, ease, reach):
+    """Return whether the deviations from the path stay small, whatever their directions."""
+    turn, slide = 0.0, 0.0
+    for row in range(1, results.size):
+        way = way_between(poses[row - 1], poses[row], reach)
+        for i in range(row - 1, row + 1):
+            x, y, rate = results[i].deviation[0], results[i].deviation[1], results[i].deviation[2]
+            if x != 0.0 or y != 0.0 or rate != 0.0:
+                share = 0.5 * way / results[i].speed_share
+                turn += share * abs(rate)
+                slide += share * np.hypot(x, y)
+    return turn <= ease.most_turn and slide <= ease.most_slide
+
+
+@exact_kernel
+def _find_extremes(results, extremes):
+    """Widen Extremes (5,) by those of RESULTs."""
+    for row in range(results.size):
+        result = results[row]
+        for wheel in range(6):
+            extremes[0] = max(extremes[0], result.friction_utilisation[wheel])
+            extremes[1] = max(extremes[1], result.torque_saturation[wheel])
+        upright = np.cos(result.q[1]) * np.cos(result.q[2])
+        extremes[2] = max(extremes[2], np.arccos(min(max(upright, -1.0), 1.0)))
+        extremes[3] = min(extremes[3], result.tip_over_ratio)
+        if result.belly_clearance < extremes[4] or extremes[4] != extremes[4]:
+            extremes[4] = result.belly_clearance
