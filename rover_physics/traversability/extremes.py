@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rover_physics.names import SERVO
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
 
@@ -12,9 +13,9 @@ class Extremes(NamedTuple):
     """Values nearest to the limits, or furthest beyond them."""
 
     friction_utilisation: float
-    """Largest of any wheel."""
+    """Largest of any wheel; 0 with speed servos."""
     torque_saturation: float
-    """Largest of any wheel."""
+    """Largest of any wheel; 0 with speed servos."""
     tilt: float
     """Largest [rad]."""
     tip_over_ratio: float
@@ -24,10 +25,15 @@ class Extremes(NamedTuple):
 
 
 def extremes_of(verdict: Verdict) -> Extremes:
-    """Return the extremes of a judged path; on an uncertain map they are the bounds."""
+    """Return the extremes of a judged path; on an uncertain map they are the bounds.
+
+    Speed servos use all friction and torque of a wheel wherever the ground is uneven. That is no
+    risk, so both are 0 for them.
+    """
+    use = 0.0 if verdict.policy == SERVO else 1.0
     return Extremes(
-        float(np.fmax(verdict.max_friction_utilisation, verdict.friction_utilisation_bound)),
-        float(np.fmax(verdict.max_torque_saturation, verdict.torque_saturation_bound)),
+        use * float(np.fmax(verdict.max_friction_utilisation, verdict.friction_utilisation_bound)),
+        use * float(np.fmax(verdict.max_torque_saturation, verdict.torque_saturation_bound)),
         float(np.fmax(verdict.max_tilt, verdict.tilt_bound)),
         float(np.fmin(verdict.min_tip_over_ratio, verdict.tip_over_ratio_bound)),
         float(np.fmin(verdict.min_belly_clearance, verdict.belly_clearance_bound)),

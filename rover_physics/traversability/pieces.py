@@ -199,6 +199,8 @@ class _Sweep:
         size = wheels.reach, linkage.steering_rate
         sum_up_pieces(path, turns, ease, size, numbers)
         numbers[np.searchsorted(ends, jumps[:, 0], side="right"), 0] = np.nan
+        if self._model.settings.policy == TorquePolicy.SERVO:
+            numbers[:, 2:4] = 0.0  # as `extremes_of`
         return {
             k: PieceVerdict("", row[0], row[1], Extremes(*row[2:]))
             for k, row in zip(indices.tolist(), numbers.tolist(), strict=True)

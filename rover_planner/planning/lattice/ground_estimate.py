@@ -19,7 +19,7 @@ from rover_planner.planning.lattice.nodes import Nodes
 FULL_DOUBT = 4.0
 """Doubt of ground that is as steep as the rover can climb: edges that lead there cost 1 + that as
 much while the search is cautious."""
-STEEP = 0.6
+STEEP = 0.4
 """Share of that steepness from where on ground is doubted."""
 UNEVEN = 0.5
 """Weight of the slopes at the wheels beside that of the ground as a whole."""

@@ -25,7 +25,7 @@ from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.lattice.shortest import Route, ShortestPaths
 from rover_planner.planning.path_query import Candidate
 
-CAUTIONS = (1.0, 0.0)
+CAUTIONS = (1.0, 0.5, 0.0)
 """Weights of the doubts, one after the other; with 0 the search is exact."""
 DOUBT = 0.3
 """Doubt that a refused edge adds to the nodes around its end: the cost of edges that lead there
