@@ -1,9 +1,9 @@
-"""Judges many short pieces of path at once, faster than `judge_paths`, which decides when in doubt.
+"""Judges many short pieces of path at once, as `judge_paths` does but faster.
 
-A search asks about thousands of pieces and needs of each only whether it passes, and what it costs.
-A piece fails if one of its waypoints does in any case. It passes if no waypoint comes near a limit,
-no contact jumps between them and no wheel may fall. All others are left to `judge_paths`. The
-verdicts are the same as its own.
+A search asks about thousands of pieces and needs to know only whether each passes, and what it
+costs. A piece fails if one of its waypoints does in any case. It passes if no waypoint may break a
+limit, no contact jumps between them and no wheel may fall. `judge_paths` decides about the others.
+The verdicts are the same as its own.
 """
 
 from collections.abc import Sequence
@@ -17,15 +17,15 @@ from rover_physics.bounds.path import SIGMAS
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
+from rover_physics.prediction.crossing import limits_of as jump_limits_of
 from rover_physics.prediction.crossing import (
     place_results,
     select_results,
     turn_wheels,
 )
-from rover_physics.prediction.crossing import limits_of as jump_limits_of
 from rover_physics.prediction.drops import FACE, MIN_ANGLE
 from rover_physics.prediction.evaluation import unwritten_results
-from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_kernels import add_up, find_jumps, way_between
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, evaluator, joined_paths, wheels_of

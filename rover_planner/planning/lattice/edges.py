@@ -78,8 +78,8 @@ class Edges:
     def poses(self, edge: int) -> NDArray[np.float64]:
         """Return the waypoints (n, 3) of an edge, map frame."""
         node = int(edge) // self.width
-        start = self.nodes.poses(np.array([node]))[0]
-        return self.primitive(edge).poses + (start[0], start[1], 0.0)
+        x, y, _ = self.nodes.poses(np.array([node]))[0]
+        return self.primitive(edge).poses + np.array([x, y, 0.0])
 
     def ends(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the nodes (n,) where edges (n,) end; they must be in the window."""
@@ -114,6 +114,11 @@ class JudgedEdges:
         if code and code not in self.codes:
             self.codes.append(code)
         return FAILS + self.codes.index(code) if code else PASSES
+
+    def forget(self, places: NDArray[np.int64]) -> None:
+        """Forget what is known of the nodes at places (k,) and of the edges that begin there."""
+        for values in (self.state, self.standing):
+            values.reshape(-1, HEADINGS, *values.shape[1:])[places] = UNJUDGED
 
     @property
     def judged(self) -> int:

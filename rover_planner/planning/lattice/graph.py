@@ -236,3 +236,73 @@ def _enter_after(graph, node, to_goal, tree, heap):
         if cost < tree.cost[end] and bound < np.inf:
             tree.cost[end], tree.parent[end] = cost, node * width + k
             heapq.heappush(heap, (cost + bound, -cost, end))
+
+
+@allocating_kernel
+def spread(graph, seeds, backwards, inside, crossing):
+    """Mark the nodes that edges connect with seeds, and count what closes them in.
+
+    Args:
+        graph: Graph; edges that are not judged count as open.
+        seeds: (k,) nodes.
+        backwards: Whether edges are followed from their ends to their beginnings.
+        inside: (nodes,), written where True.
+        crossing: (codes + 1,) numbers of edges that would cross the border, for each code of a
+            failure, and last of those that leave the window; added to.
+    """
+    stack = [np.int64(-1)]
+    stack.clear()
+    for i in range(seeds.size):
+        if graph.standing[seeds[i]] < FAILS and not inside[seeds[i]]:
+            inside[seeds[i]] = True
+            stack.append(seeds[i])
+    most = graph.table.back.shape[1] if backwards else graph.table.end_heading.shape[1]
+    visited = [np.int64(-1)]
+    visited.clear()
+    while len(stack) > 0:
+        node = stack.pop()
+        visited.append(node)
+        for i in range(most):
+            other, state = _neighbour(graph, node, i, backwards)
+            if other >= 0 and state < FAILS and not inside[other]:
+                inside[other] = True
+                stack.append(other)
+    for node in visited:
+        for i in range(most):
+            other, state = _neighbour(graph, node, i, backwards)
+            if state >= FAILS and (other < 0 or not inside[other]):
+                crossing[min(state - FAILS, crossing.size - 1)] += 1
+
+
+@exact_kernel
+def _neighbour(graph, node, i, backwards):
+    """Return the node at the other end of an edge, and the edge's state; -1, -1 if there is none.
+
+    The state is that of the edge or, if that does not fail, of the other node. If the edge leaves
+    the window, the node is -1 and the state is larger than all.
+
+    Args:
+        graph: Graph.
+        node: A node.
+        i: Number of the edge among those that begin, or end, at the node.
+        backwards: Whether those that end there are meant.
+    """
+    heading, place = node % HEADINGS, node // HEADINGS
+    row, column = place // graph.columns, place % graph.columns
+    if backwards:
+        first, k = graph.table.back[heading, i, 0], graph.table.back[heading, i, 1]
+        if first < 0:
+            return np.int64(-1), np.int64(-1)
+        step = graph.table.step[first, k]
+        other = node_at(graph, row - step[1], column - step[0], first)
+        edge_node = other
+    else:
+        k, end_heading = np.int64(i), graph.table.end_heading[heading, i]
+        if end_heading < 0:
+            return np.int64(-1), np.int64(-1)
+        step = graph.table.step[heading, k]
+        other = node_at(graph, row + step[1], column + step[0], end_heading)
+        edge_node = node
+    if other < 0:
+        return np.int64(-1), np.int64(2**30)
+    return np.int64(other), np.int64(max(graph.state[edge_node, k], graph.standing[other]))

@@ -57,7 +57,9 @@ class _Wheels(NamedTuple):
     """(2, 6) weights of the heights below the wheels in the slopes of the plane through them."""
 
 
-def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes, friction: float) -> GroundEstimate:
+def estimate_ground(
+    rover: Rover, terrain: Terrain, nodes: Nodes, friction: float
+) -> GroundEstimate:
     """Estimate all nodes.
 
     Args:
@@ -156,6 +158,6 @@ def _is_known(elevation, u, v):
     for row in range(2):
         for column in range(2):
             weight = (a if column else 1.0 - a) * (b if row else 1.0 - b)
-            if weight > 1e-4 and not elevation[j + row, i + column] == elevation[j + row, i + column]:
+            if weight > 1e-4 and np.isnan(elevation[j + row, i + column]):
                 known = False
     return known

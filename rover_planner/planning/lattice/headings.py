@@ -11,13 +11,11 @@ from rover_planner.planning.angles import wrap
 HEADINGS = 16
 """Number of headings; the first points along x, the others follow to the left."""
 _QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
-STEPS = tuple(
-    step
-    for turn in range(4)
-    for step in (
-        tuple(int(v) for v in np.linalg.matrix_power([[0, -1], [1, 0]], turn) @ quarter)
-        for quarter in _QUARTER
-    )
+STEPS: tuple[tuple[int, int], ...] = (
+    *_QUARTER,
+    *((-y, x) for x, y in _QUARTER),
+    *((-x, -y) for x, y in _QUARTER),
+    *((y, -x) for x, y in _QUARTER),
 )
 """Step (x, y) [cells] from a node to the next one straight ahead, for each heading."""
 YAWS = np.arctan2(*np.array(STEPS, float).T[::-1])

@@ -10,6 +10,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_poses import judge_poses
 from rover_physics.traversability.pieces import judge_pieces
+from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.lattice.costs import true_cost
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.path_query import Candidate, PathQueryOptions, check_path
@@ -40,9 +41,7 @@ class Judge:
     poses: int = field(default=0, init=False)
     """Number of poses asked for so far, a measure of the work done."""
 
-    def judge(
-        self, pieces: Sequence[NDArray[np.float64]], gears: Sequence[Gear]
-    ) -> list[Judged]:
+    def judge(self, pieces: Sequence[NDArray[np.float64]], gears: Sequence[Gear]) -> list[Judged]:
         """Judge pieces of path, each of poses (n, 3).
 
         Ways out of pits are not asked for; that is done for the whole path.
@@ -62,16 +61,23 @@ class Judge:
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
         """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
+        return self._stand(poses).codes
+
+    def _stand(self, poses: NDArray[np.float64]) -> Verdict:
+        """Judge single poses (n, 3), wheels ahead."""
         self.poses += len(poses)
-        _, verdict = judge_poses(
+        return judge_poses(
             self.rover,
             self.terrain,
             poses,
             np.zeros(len(poses)),
             self.options.sweep_options(self.joint_angles),
             sigmas=self.options.map_sigmas,
-        )
-        return verdict.codes
+        )[1]
+
+    def refuse(self, pose: NDArray[np.float64]) -> str:
+        """Return why the rover cannot stand at a pose (3,), empty if it can."""
+        return self._stand(pose[None, :]).reasons[0]
 
     def check(self, poses: NDArray[np.float64]) -> Candidate:
         """Judge a whole path (n, 3) with all that belongs to it, up to its first failure."""

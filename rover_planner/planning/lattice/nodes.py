@@ -75,9 +75,7 @@ class Nodes:
         return (places[:, 1] * self.shape[1] + places[:, 0]) * HEADINGS + headings
 
 
-def nodes_within(
-    cell: float, low: tuple[float, float], high: tuple[float, float]
-) -> Nodes:
+def nodes_within(cell: float, low: tuple[float, float], high: tuple[float, float]) -> Nodes:
     """Return the nodes in a rectangle from `low` to `high`, x and y [m]."""
     first = tuple(int(np.ceil(value / cell - 1e-9)) for value in low)
     last = tuple(int(np.floor(value / cell + 1e-9)) for value in high)

@@ -10,7 +10,7 @@ that the cost of the shortest path is a bound from below on that of any path on 
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +39,18 @@ NEAR_OPTIMAL = 0.02
 """A path is good enough if no path of the lattice costs less by more than this share."""
 
 
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A piece of a path."""
+
+    poses: NDArray[np.float64]
+    """(n, 3) waypoints, x, y [m], yaw [rad], map frame."""
+    gear: Gear
+    """How it is driven."""
+    cost: float = np.nan
+    """Its cost [m], NaN if it is not judged."""
+
+
 @dataclass
 class Progress:
     """What a search has found so far."""
@@ -52,7 +64,9 @@ class Progress:
     exhausted: bool = False
     """Whether the lattice has no path left to look at."""
     first_time: float = np.nan
-    """Time to the first path [s]."""
+    """Time of the monotonic clock when the first path was found [s]."""
+    stretches: list[Stretch] = field(default_factory=list)
+    """The pieces of the best path."""
 
 
 class _Ends:
@@ -63,6 +77,7 @@ class _Ends:
         self.nodes = np.array([one.node for one in connections], np.int64)
         self.costs = np.array([one.least_cost for one in connections])
         self.judged = np.zeros(len(connections), bool)
+        self.codes: list[str] = []
 
     @property
     def seeds(self) -> Seeds:
@@ -102,13 +117,34 @@ class LatticeSearch:
         self._ends = _Ends(self.starts), _Ends(self.goals)
         self.shortest = ShortestPaths(self.known, self.doubt, self._ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
+        self._judged = 0
 
-    def run(self, go_on: Callable[[], bool]) -> Progress:
-        """Search until the best path is found, no path is left, or `go_on` returns False."""
-        self._began = time.perf_counter()
+    @property
+    def judged(self) -> int:
+        """Number of edges that the model has judged in this search."""
+        return self._judged
+
+    def open_ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the nodes of the start's and of the goal's connections that may pass."""
+        starts, goals = (ends.nodes[np.isfinite(ends.costs)] for ends in self._ends)
+        return starts, goals
+
+    def refused_ends(self) -> tuple[list[str], list[str]]:
+        """Return the codes of the connections of the start and of the goal that were refused."""
+        starts, goals = self._ends
+        return starts.codes, goals.codes
+
+    def offer(self, stretch: Stretch) -> None:
+        """Judge a path from start to goal; keep it if it passes and is the best."""
+        cost = self.judge.judge([stretch.poses], [stretch.gear])[0].cost
+        if cost < self.progress.cost:
+            self._keep([replace(stretch, cost=cost)], self.judge.check(stretch.poses))
+
+    def run(self, allowed: Callable[["LatticeSearch"], bool]) -> Progress:
+        """Search until the best path is found, no path is left, or it is not allowed to go on."""
         try:
             for caution in CAUTIONS:
-                while go_on() and not self._step(caution):
+                while allowed(self) and not self._step(caution):
                     check_interruption()
                 if self.progress.exhausted:
                     break
@@ -204,11 +240,13 @@ class LatticeSearch:
         for piece, judged in zip(pieces, found, strict=True):
             side, index = piece.place
             if side is None:
+                self._judged += 1
                 self.known.write(index, judged.code, judged.cost)
                 if judged.code:
                     self._doubt_around(index)
             else:
                 side.judged[index], side.costs[index] = True, judged.cost
+                side.codes += [judged.code] if judged.code else []
         return [not judged.code for judged in found]
 
     def _doubt_around(self, edge: int) -> None:
@@ -219,33 +257,47 @@ class LatticeSearch:
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""
-        starts, goals = (ends.seeds for ends in self._ends)
-        cost = float(starts.costs[route.start] + goals.costs[route.goal])
-        cost += float(self.known.cost.flat[route.edges].sum())
-        if cost >= self.progress.cost:
+        stretches = self._stretches(route)
+        if sum(one.cost for one in stretches) >= self.progress.cost:
             return True
-        poses, owners = self._join(route)
+        poses, owners = join_pieces([one.poses for one in stretches])
         candidate = self.judge.check(poses)
-        if not candidate.verdict.traversable:
+        if not self._keep(stretches, candidate):
             owner = owners[candidate.verdict.first_failure]
             self._refuse(route, int(owner), candidate.verdict.code)
             return False
-        progress = self.progress
-        progress.best, progress.cost = candidate, cost
-        if np.isnan(progress.first_time):
-            progress.first_time = time.perf_counter() - self._began
         return True
 
-    def _join(self, route: Route) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return the waypoints (n, 3) of a route, and which piece leads to each (n,)."""
-        start_ends, goal_ends = self._ends
-        pieces = [start_ends.connections[route.start].poses]
-        pieces += [self.known.edges.poses(edge) for edge in route.edges]
-        pieces += [goal_ends.connections[route.goal].poses]
-        return join_pieces(pieces)
+    def _keep(self, stretches: list[Stretch], candidate: Candidate) -> bool:
+        """Keep a path as the best if it passes; return whether it does."""
+        if not candidate.verdict.traversable:
+            return False
+        progress = self.progress
+        progress.best, progress.stretches = candidate, stretches
+        progress.cost = sum(one.cost for one in stretches)
+        if np.isnan(progress.first_time):
+            progress.first_time = time.perf_counter()
+        return True
+
+    def _stretches(self, route: Route) -> list[Stretch]:
+        """Return the pieces of a route that is judged."""
+        (starts, goals), edges = self._ends, self.known.edges
+        first, last = starts.connections[route.start], goals.connections[route.goal]
+        return [
+            Stretch(first.poses, first.gear, float(starts.costs[route.start])),
+            *(
+                Stretch(
+                    edges.poses(edge),
+                    edges.primitive(edge).gear,
+                    float(self.known.cost.flat[edge]),
+                )
+                for edge in route.edges
+            ),
+            Stretch(last.poses, last.gear, float(goals.costs[route.goal])),
+        ]
 
     def _refuse(self, route: Route, piece: int, code: str) -> None:
-        """Close a piece of a route for this search: its edges pass, but the whole path does not."""
+        """Close a piece of a route for this search: it passes, but the whole path does not."""
         start_ends, goal_ends = self._ends
         if piece == 0:
             start_ends.costs[route.start] = np.inf

@@ -92,9 +92,7 @@ class ShortestPaths:
     def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
         """Measure the costs to the goal again."""
         self._misled = 0
-        self._limit, self._measured = measure_to_goal(
-            graph, goals, starts, SLACK, self._to_goal
-        )
+        self._limit, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
 
     def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
         """Return the start's connection and the edges (k,) that lead to a node."""

@@ -1,0 +1,29 @@
+"""A question for a way between two poses."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.path_query import PathQueryOptions
+
+
+@dataclass(frozen=True, eq=False)
+class WayQuestion:
+    """A question for a way."""
+
+    rover: Rover
+    """The rover."""
+    terrain: Terrain
+    """The ground, map frame."""
+    start: NDArray[np.float64]
+    """(3,) x, y [m] and yaw [rad] of the body origin, map frame."""
+    goal: NDArray[np.float64]
+    """(3,) as `start`."""
+    options: PathQueryOptions
+    """How paths are judged."""
+    joint_angles: Mapping[str, float] | None = None
+    """Angles [rad] of the manipulator's joints by name; None is stowed."""

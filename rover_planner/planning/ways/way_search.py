@@ -1,0 +1,268 @@
+"""Searches a way between two poses, smooths it, and explains where there is none."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.rover.turning import tightest_radius, wheelbase
+from rover_planner.errors import PlanningError
+from rover_planner.planning.angles import wrap
+from rover_planner.planning.candidates import generate_candidates
+from rover_planner.planning.lattice.connections import connect_goal, connect_start
+from rover_planner.planning.lattice.ground_estimate import estimate_ground
+from rover_planner.planning.lattice.headings import HEADINGS
+from rover_planner.planning.lattice.judge import Judge
+from rover_planner.planning.lattice.nodes import Nodes, nodes_within
+from rover_planner.planning.lattice.primitives import Gear
+from rover_planner.planning.lattice.search import LatticeSearch, Progress, Stretch, join_pieces
+from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.planning.ways.no_way import ClosedArea, find_closed_area
+from rover_planner.planning.ways.question import WayQuestion
+from rover_planner.planning.ways.smoothing import smooth
+
+FOUND, NO_WAY, OUT_OF_TIME = "found", "no_way", "out_of_time"
+START_REFUSED, GOAL_REFUSED = "start_refused", "goal_refused"
+"""Outcomes of a search."""
+
+MAX_NODES = 1_500_000
+"""Largest number of nodes of a window; each takes 70 bytes."""
+POSES_PER_SECOND = 20_000
+"""Poses that the model may be asked about per second of the budget."""
+EXPANSIONS_PER_POSE = 40
+"""Expanded nodes that count as much as one pose."""
+SMOOTHING = 0.2
+"""Share of the budget for smoothing."""
+
+
+@dataclass(frozen=True)
+class LatticeSettings:
+    """How a way is searched."""
+
+    budget: float = 2.0
+    """Time for the search [s]."""
+    cell: float | None = None
+    """Distance of neighbouring nodes [m]; None: a quarter of the wheelbase."""
+
+    def __post_init__(self) -> None:
+        for name in ("budget", "cell"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise PlanningError(f"{name} is {value}; it must be a finite number above 0")
+
+
+@dataclass(frozen=True, eq=False)
+class WayAnswer:
+    """The way that was found, or why there is none."""
+
+    outcome: str
+    """FOUND, NO_WAY, OUT_OF_TIME, START_REFUSED or GOAL_REFUSED."""
+    reason: str
+    """One sentence for people."""
+    path: Candidate | None
+    """The way with prediction and verdict; None unless it was found."""
+    cost: float
+    """Its cost [m of level ground]; infinite without a way."""
+    bound: float
+    """How much more it costs, at most, than the best path of the lattice, as a factor; infinite
+    if that is not known."""
+    expanded: int
+    """Number of expanded nodes."""
+    edges_judged: int
+    """Number of edges that the model has judged."""
+    edges: int
+    """Number of edges of the lattice."""
+    seconds_first: float
+    """Time until the first way was known [s], NaN without one."""
+    seconds: float
+    """Time of the whole search [s]."""
+    repeatable: bool
+    """Whether the same question gives the same answer to the bit: the clock did not end it."""
+    nodes: Nodes
+    """The nodes of the lattice."""
+    closed: ClosedArea | None
+    """What is closed in where no way exists; else None."""
+
+
+def find_way(
+    question: WayQuestion,
+    settings: LatticeSettings | None = None,
+    memory: EdgeMemory | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> WayAnswer:
+    """Search a way from start to goal.
+
+    Args:
+        question: What is asked.
+        settings: How it is searched.
+        memory: What earlier searches have found; None begins anew.
+        on_progress: Called after each step of the search with what is known so far.
+
+    Raises:
+        PlanningError: Start or goal are not finite or not on the map.
+        RoverError: The model refuses an option.
+    """
+    return _WaySearch(question, settings or LatticeSettings(), memory, on_progress).answer()
+
+
+class _WaySearch:
+    """One search with all that belongs to it."""
+
+    def __init__(
+        self,
+        question: WayQuestion,
+        settings: LatticeSettings,
+        memory: EdgeMemory | None,
+        on_progress: Callable[[Progress], None] | None,
+    ):
+        self._began = time.perf_counter()
+        self._question, self._settings, self._on_progress = question, settings, on_progress
+        self._start, self._goal = _check_end("start", question), _check_end("goal", question)
+        self._judge = Judge(
+            question.rover, question.terrain, question.options, question.joint_angles
+        )
+        cell = settings.cell or 0.25 * wheelbase(question.rover)
+        self._nodes, self._is_limited = choose_window(question, cell)
+        self._memory = memory or EdgeMemory()
+        self._repeatable = True
+
+    def answer(self) -> WayAnswer:
+        """Search the way."""
+        for name, outcome, pose in (
+            ("start", START_REFUSED, self._start),
+            ("goal", GOAL_REFUSED, self._goal),
+        ):
+            refusal = self._judge.refuse(pose)
+            if refusal:
+                return self._answer(outcome, f"the rover cannot stand at the {name}: {refusal}")
+        search = self._prepare()
+        self._try_directly(search)
+        progress = search.run(self._allowed)
+        if progress.best is not None:
+            return self._answer(FOUND, "", search, best=self._smooth(search))
+        if not progress.exhausted:
+            budget = self._settings.budget
+            reason = f"no way was found within the budget of {budget:g} s; there may be one"
+            return self._answer(OUT_OF_TIME, reason, search)
+        closed = find_closed_area(search)
+        where = "the window that was searched" if self._is_limited else "the map"
+        reason = f"no way within {where}: {closed.describe()}"
+        return self._answer(NO_WAY, reason, search, closed=closed)
+
+    def _prepare(self) -> LatticeSearch:
+        """Return the search, with the estimates of the ground and the connections of the ends."""
+        question, nodes = self._question, self._nodes
+        spacing = question.options.waypoint_spacing
+        known = self._memory.recall(question, nodes)
+        friction = question.options.friction or question.rover.friction
+        ground = estimate_ground(question.rover, question.terrain, nodes, friction)
+        known.standing[ground.groundless] = known.state_of("unknown_ground")
+        return LatticeSearch(
+            self._judge,
+            known,
+            connect_start(question.rover, nodes, self._start, spacing),
+            connect_goal(question.rover, nodes, self._goal, spacing),
+            ground.doubt,
+        )
+
+    def _try_directly(self, search: LatticeSearch) -> None:
+        """Let the search begin with the direct curve, if the rover may drive it."""
+        poses = generate_candidates(
+            self._start,
+            self._goal,
+            count=1,
+            waypoint_spacing=self._question.options.waypoint_spacing,
+            min_radius=tightest_radius(self._question.rover),
+        )[0]
+        if len(poses) > 1:
+            search.offer(Stretch(poses, Gear.FORWARD))
+
+    def _allowed(self, search: LatticeSearch) -> bool:
+        """Return whether the search may go on; tell of its progress."""
+        if self._on_progress is not None:
+            self._on_progress(search.progress)
+        budget = self._settings.budget
+        work = self._judge.poses + search.shortest.expanded / EXPANSIONS_PER_POSE
+        if work > POSES_PER_SECOND * budget:
+            return False
+        in_time = time.perf_counter() - self._began < budget
+        self._repeatable &= in_time
+        return in_time
+
+    def _smooth(self, search: LatticeSearch) -> Candidate:
+        """Return the smoothed path, or the path itself where the smoothed one does not pass."""
+        best, budget = search.progress.best, self._settings.budget
+        assert best is not None
+        spent = time.perf_counter() - self._began
+        share = SMOOTHING if self._repeatable else SMOOTHING * min(1.0, budget / spent)
+        most = round(share * budget * POSES_PER_SECOND)
+        radius = tightest_radius(self._question.rover)
+        stretches = smooth(self._judge, search.progress.stretches, radius, most)
+        if len(stretches) == len(search.progress.stretches):
+            return best
+        poses, _ = join_pieces([one.poses for one in stretches])
+        smoothed = self._judge.check(poses)
+        return smoothed if smoothed.verdict.traversable else best
+
+    def _answer(
+        self,
+        outcome: str,
+        reason: str,
+        search: LatticeSearch | None = None,
+        best: Candidate | None = None,
+        closed: ClosedArea | None = None,
+    ) -> WayAnswer:
+        progress = Progress() if search is None else search.progress
+        bound = progress.cost / progress.bound if progress.bound > 0.0 else math.inf
+        return WayAnswer(
+            outcome=outcome,
+            reason=reason,
+            path=best,
+            cost=progress.cost,
+            bound=bound if best is not None else math.inf,
+            expanded=0 if search is None else search.shortest.expanded,
+            edges_judged=0 if search is None else search.judged,
+            edges=0 if search is None else search.known.edges.count,
+            seconds_first=progress.first_time - self._began,
+            seconds=time.perf_counter() - self._began,
+            repeatable=self._repeatable,
+            nodes=self._nodes,
+            closed=closed,
+        )
+
+
+def choose_window(question: WayQuestion, cell: float) -> tuple[Nodes, bool]:
+    """Return the nodes to search, and whether they are fewer than those of the map.
+
+    A window that must be limited is a square around start and goal.
+    """
+    xmin, xmax, ymin, ymax = question.terrain.bounds
+    nodes = nodes_within(cell, (xmin, ymin), (xmax, ymax))
+    if nodes.count <= MAX_NODES:
+        return nodes, False
+    half = 0.5 * cell * math.sqrt(MAX_NODES / HEADINGS)
+    centre = 0.5 * (np.asarray(question.start)[:2] + np.asarray(question.goal)[:2])
+    low = np.maximum(centre - half, (xmin, ymin))
+    high = np.minimum(centre + half, (xmax, ymax))
+    return nodes_within(cell, (low[0], low[1]), (high[0], high[1])), True
+
+
+def _check_end(name: str, question: WayQuestion) -> NDArray[np.float64]:
+    """Return the start or the goal (3,), checked."""
+    pose = np.array(getattr(question, name), dtype=float)
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        raise PlanningError(
+            f"{name} is {pose.tolist()}; it must be three finite numbers x, y, yaw"
+        )
+    if not question.terrain.contains(pose[0], pose[1]):
+        xmin, xmax, ymin, ymax = question.terrain.bounds
+        raise PlanningError(
+            f"{name} is at ({pose[0]:g}, {pose[1]:g}), off the map, which goes from x {xmin:g} to "
+            f"{xmax:g} and y {ymin:g} to {ymax:g} m"
+        )
+    pose[2] = wrap(pose[2])
+    return pose
