@@ -25,6 +25,8 @@ pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExce
 def page():
     """A page without visitors."""
     served = Page(session_on(ramp), port=0)
+    wait_until(lambda: not served.is_busy, "the ground")
+    do(served, lambda: None)
     yield served
     served.close()
 
@@ -86,8 +88,7 @@ def test_a_path_that_is_judged_again_replaces_its_own_candidate(index):
 
 def test_a_page_shows_that_its_path_is_refused_and_goes_on(page):
     do(page, lambda: page.session.change_rover([("friction",)], 0.4))
-    do(page, page._show_path)
-    assert "not traversable" in page.drive_tab._verdict.content
+    wait_until(lambda: "not traversable" in page.drive_tab._verdict.content, "the verdict")
     assert shown_errors(page) == ""
 
 
@@ -104,7 +105,7 @@ def test_the_verdict_is_right_and_the_rover_drives_if_the_paths_cannot_be_drawn(
     with monkeypatch.context() as patch:
         patch.setattr(page.scene.paths, "show", fail)
         do(page, lambda: page.session.change_rover([("friction",)], 0.4))
-        do(page, page._show_path)
+        wait_until(lambda: "the paths are not drawn" in shown_errors(page), "the notice")
         assert "the paths are not drawn" in shown_errors(page)
         assert "not traversable" in page.drive_tab._verdict.content
         do(page, page.playback.play)

@@ -1,7 +1,7 @@
 """Drawings over the ground: candidate paths, ghosts where they are refused, start and goal."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,10 @@ class PathOverlay:
         """Draw nothing yet."""
         self._scene = scene
         self._nodes: list[Any] = []
+        self._coloured: list[tuple[int, Any, Any]] = []
+        """Lines with the index of their path and their colour (3,)."""
+        self._old: set[int] = set()
+        """Indices of the paths that are greyed."""
 
     def show(
         self, rover: Rover, terrain: Terrain, candidates: Sequence[Candidate], shown: int
@@ -53,8 +57,11 @@ class PathOverlay:
         self.clear()
         height = CLEARANCE * rover.wheel.radius
         for index in sorted(range(len(candidates)), key=lambda index: index == shown):
-            name = f"/paths/{index}"
-            self._draw_candidate(name, terrain, candidates[index], height, index == shown)
+            first = len(self._nodes)
+            self._draw_candidate(
+                f"/paths/{index}", terrain, candidates[index], height, index == shown
+            )
+            self._coloured += [(index, node, node.colors) for node in self._nodes[first:]]
         for k, (index, row) in enumerate(choose_ghosts(rover, candidates, shown)):
             verdict = candidates[index].verdict
             if index == shown:
@@ -79,6 +86,16 @@ class PathOverlay:
         for node in self._nodes:
             node.remove()
         self._nodes.clear()
+        self._coloured.clear()
+        self._old.clear()
+
+    def mark_old(self, indices: Iterable[int]) -> None:
+        """Grey the lines of paths whose verdicts are of old values, and colour all others."""
+        old = set(indices)
+        for index, line, colour in self._coloured:
+            if (index in old) != (index in self._old):
+                line.colors = np.array(UNKNOWN, np.uint8) if index in old else colour
+        self._old = old
 
     def _draw_candidate(
         self, name: str, terrain: Terrain, candidate: Candidate, height: float, wide: bool
