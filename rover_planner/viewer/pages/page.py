@@ -189,7 +189,7 @@ class Page(PageBase):
 
     def _show_scenario(self, before: Scenario, now: Scenario) -> None:
         """Show the rover for which was judged, and begin another path at its start."""
-        if (before.start, before.goal) != (now.start, now.goal):
+        if before.start is not now.start or before.goal is not now.goal:
             self.playback.pause()
             self.playback.seek(0.0)
         if before.loaded is not now.loaded:
