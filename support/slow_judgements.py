@@ -25,21 +25,19 @@ def tolerant_rover():
         LSR1.limits,
         tilt=1.4,
         tip_over_ratio=0.01,
-        friction_utilisation=50.0,
-        torque_saturation=50.0,
         belly_clearance=0.001,
         wheel_drop=5.0,
     )
     wheel = replace(LSR1.wheel, max_torque=100.0)
-    return replace(LSR1, friction=5.0, wheel=wheel, limits=limits)
+    return replace(LSR1, friction=2.0, wheel=wheel, limits=limits)
 
 
-def slow_options(waypoint_spacing: float = 2e-4) -> PathQueryOptions:
-    """Return options for three candidates of 3 m, each with waypoints for a second."""
-    return PathQueryOptions(count=3, spacing=0.2, waypoint_spacing=waypoint_spacing)
+def slow_options(count: int = 3, waypoint_spacing: float = 2e-4) -> PathQueryOptions:
+    """Return options for candidates with so many waypoints that they take seconds."""
+    return PathQueryOptions(count=count, spacing=0.2, waypoint_spacing=waypoint_spacing)
 
 
-def slow_scenario(friction: float = 5.0) -> Scenario:
+def slow_scenario(friction: float = 2.0) -> Scenario:
     """Return a scenario that takes seconds, with a friction coefficient."""
     rover = replace(tolerant_rover(), friction=friction)
     return Scenario(rover, rover, lowered_reef(), START, GOAL, slow_options(), {})

@@ -1,4 +1,4 @@
-"""The page in a real browser while it judges for seconds, and after sliders dragged to their ends."""
+"""The page in a real browser: alive while it judges, right after sliders are dragged."""
 
 import time
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ def browser() -> Iterator[object]:
 @pytest.fixture(scope="module")
 def slow_page() -> Iterator[Page]:
     """A page on a reef that needs seconds for each change."""
-    session = ViewSession(tolerant_rover(), lowered_reef(), START, GOAL, slow_options())
+    session = ViewSession(tolerant_rover(), lowered_reef(), START, GOAL, slow_options(2, 1e-4))
     page = Page(session, port=0)
     yield page
     page.close()
@@ -85,19 +85,19 @@ def test_while_a_change_is_judged_the_page_says_so_and_the_rover_drives_on(visit
     before, shown = session.wanted, session.shown
     slow_page.playback.speed = 1.0
     slow_page.requests.add(slow_page.playback.play)
-    visitor.set_slider(FRICTION, "4.5")
+    visitor.set_slider(FRICTION, "1.9")
     visitor.tab.wait_for_selector("#judging")
     assert "judging" in visitor.text("#judging")
     assert session.wanted is not before and session.progress is not None
     pause = longest_pause(slow_page, lambda: session.progress is None)
-    assert session.rover.friction == 4.5 and session.shown is not shown
+    assert session.rover.friction == 1.9 and session.shown is not shown
     assert pause < MAX_PAUSE
     slow_page.requests.add(slow_page.playback.pause)
     visitor.tab.wait_for_selector("#judging", state="hidden")
 
 
 def test_the_old_verdict_is_greyed_until_the_new_one_is_there(visitor, slow_page):
-    visitor.set_slider(FRICTION, "4.0")
+    visitor.set_slider(FRICTION, "1.8")
     visitor.tab.locator("#old:visible").wait_for()
     assert "old values: judging" in visitor.text("#verdict:visible")
     assert slow_page.scene.paths._old == set(range(len(slow_page.session.candidates)))
@@ -110,7 +110,7 @@ def test_camera_and_second_visitor_are_served_while_a_change_is_judged(
     visitor, slow_page, browser
 ):
     second = Visitor(browser, slow_page.url)
-    visitor.set_slider(FRICTION, "3.5")
+    visitor.set_slider(FRICTION, "1.7")
     second.wait_for("judging")
     visitor.wait_for("judging")
     picture = visitor.picture()
@@ -128,17 +128,17 @@ def test_camera_and_second_visitor_are_served_while_a_change_is_judged(
 def test_a_cancelled_judgement_leaves_the_old_verdict_and_can_be_begun_again(visitor, slow_page):
     session = slow_page.session
     friction, shown = session.rover.friction, session.shown
-    visitor.set_slider(FRICTION, "3.0")
+    visitor.set_slider(FRICTION, "1.6")
     visitor.press("Cancel")
     wait_until(lambda: session.is_stopped, "the end of the work")
     visitor.wait_for("Judge again")
     if session.is_outdated:  # else it was so late that the path itself had been judged
         assert session.rover.friction == friction and session.shown is shown
         visitor.wait_for("old values: the judgement was stopped")
-    assert visitor.slider_value(FRICTION) == session.wanted.rover.friction == 3.0
+    assert visitor.slider_value(FRICTION) == session.wanted.rover.friction == 1.6
     visitor.press("Judge again")
     wait_for_rest(slow_page)
-    assert session.rover.friction == 3.0
+    assert session.rover.friction == 1.6
     visitor.tab.locator("#old").first.wait_for(state="detached")
 
 
