@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -177,6 +178,7 @@ class Page(PageBase):
             now = session.finished
             if session.refusal:
                 self._changed_at = time.monotonic()
+            self._show_verdict()
             if now.scenario is not before.scenario:
                 self._show_scenario(before.scenario, now.scenario)
             if now.answered is not before.answered:
@@ -184,8 +186,6 @@ class Page(PageBase):
                 self._draw_predicted_ground()
             if now.shown.candidate is not before.shown.candidate:
                 self._show_path()
-            else:
-                self._show_verdict()
 
     def _show_scenario(self, before: Scenario, now: Scenario) -> None:
         """Show the rover for which was judged, and begin another path at its start."""
@@ -194,7 +194,7 @@ class Page(PageBase):
             self.playback.seek(0.0)
         if before.loaded is not now.loaded:
             self.rover_tab.set_rover(self.session.wanted.rover)
-        if before.rover is not now.rover:
+        if not _look_alike(before.rover, now.rover):
             self._draw_rover()
         elif before.arm_angles is not now.arm_angles:
             self.errors.run(NO_ROVER, lambda: self.scene.turn_arm(now.arm_angles))
@@ -268,3 +268,12 @@ class Page(PageBase):
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s]."""
         self._display.advance(seconds)
+
+
+def _look_alike(one: Rover, other: Rover) -> bool:
+    """Return whether two rovers are drawn the same."""
+    wheel = replace(one.wheel, max_torque=other.wheel.max_torque)
+    friction, speed, limits = other.friction, other.nominal_speed, other.limits
+    return (
+        replace(one, wheel=wheel, friction=friction, nominal_speed=speed, limits=limits) == other
+    )
