@@ -62,13 +62,16 @@ class PathOverlay:
                 f"/paths/{index}", terrain, candidates[index], height, index == shown
             )
             self._coloured += [(index, node, node.colors) for node in self._nodes[first:]]
-        for k, (index, row) in enumerate(choose_ghosts(rover, candidates, shown)):
+        ghosts = choose_ghosts(rover, candidates, shown)
+        mesh = make_ghost(rover) if ghosts else None
+        for k, (index, row) in enumerate(ghosts):
             verdict = candidates[index].verdict
             if index == shown:
                 text = "\n".join(textwrap.wrap(verdict.reasons[row], LABEL_WIDTH))
             else:
                 text = f"path {index + 1}: {verdict.codes[row].replace('_', ' ')}"
-            self._draw_ghost(f"/ghosts/{k}", rover, terrain, candidates[index], row, text)
+            place = _place_ghost(rover, terrain, candidates[index], row)
+            self._draw_ghost(f"/ghosts/{k}", mesh, place, 3.0 * rover.wheel.radius, text)
         poses = candidates[shown].poses
         for name, pose in (("start", poses[0]), ("goal", poses[-1])):
             self._draw_flag(name, terrain, pose, rover.wheel.radius)
@@ -133,30 +136,15 @@ class PathOverlay:
             )
 
     def _draw_ghost(
-        self,
-        name: str,
-        rover: Rover,
-        terrain: Terrain,
-        candidate: Candidate,
-        row: int,
-        text: str,
+        self, name: str, mesh: Any, place: tuple[Floats, Floats], height: float, text: str
     ) -> None:
-        """Draw the rover at a waypoint; level above the ground where it does not settle."""
-        prediction = candidate.prediction
-        x, y, yaw = prediction.poses[row]
-        if prediction.settled[row]:
-            position = prediction.position[row]
-            attitude = wxyz_from_rpy(prediction.roll[row], prediction.pitch[row], yaw)
-        else:
-            standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
-            position = np.array([x, y, _ground_height(terrain, x, y) + standing])
-            attitude = wxyz_from_rpy(0.0, 0.0, yaw)
-        mesh = make_ghost(rover)
+        """Draw the rover's mesh at a position and attitude, and a label above it [m]."""
+        position, attitude = place
         ghost = self._scene.add_mesh_simple(
             name, mesh.vertices, mesh.faces, color=REFUSED, opacity=0.3, cast_shadow=False,
             position=position, wxyz=attitude,
         )  # fmt: skip
-        above = np.array([0.0, 0.0, 3.0 * rover.wheel.radius])
+        above = np.array([0.0, 0.0, height])
         self._scene.add_label(
             f"{name}/reason", text, position=above, anchor="bottom-center", font_screen_scale=0.8
         )
@@ -207,6 +195,23 @@ def choose_ghosts(
         if len(chosen) < MAX_GHOSTS and all(distance >= min_distance for distance in distances):
             chosen.append((index, row))
     return chosen
+
+
+def _place_ghost(
+    rover: Rover, terrain: Terrain, candidate: Candidate, row: int
+) -> tuple[Floats, Floats]:
+    """Return position (3,) and attitude (4,), w first, of the rover at a waypoint.
+
+    Where it does not settle it is level above the ground.
+    """
+    prediction = candidate.prediction
+    x, y, yaw = prediction.poses[row]
+    if prediction.settled[row]:
+        attitude = wxyz_from_rpy(prediction.roll[row], prediction.pitch[row], yaw)
+        return prediction.position[row], attitude
+    standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
+    position = np.array([x, y, _ground_height(terrain, x, y) + standing])
+    return position, wxyz_from_rpy(0.0, 0.0, yaw)
 
 
 def _refused_stretches(reasons: tuple[str, ...]) -> list[int]:
