@@ -12,8 +12,15 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession
 from support.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
 from support.grounds import make_terrain
-from support.slow_judgements import GOAL, START, lowered_reef, slow_options, tolerant_rover
-from support.viewer_sessions import LSR1, ramp
+from support.viewer_sessions import (
+    GOAL,
+    LSR1,
+    START,
+    lowered_reef,
+    ramp,
+    slow_options,
+    tolerant_rover,
+)
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
