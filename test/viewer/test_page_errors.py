@@ -148,11 +148,12 @@ def test_an_error_of_a_judgement_is_shown_and_the_old_verdict_is_marked(page):
     wait_until(lambda: "not judged" in shown_errors(page), "the notice")
     assert "could not convert string to float" in shown_errors(page)
     wait_until(lambda: "old values" in page.drive_tab._verdict.content, "the mark")
-    assert page._notice._again.visible and not page._notice._cancel.visible
+    wait_until(lambda: page._notice._again.visible, "the button")
+    assert not page._notice._cancel.visible
     do(page, lambda: page._change_options(map_sigmas=3.0))
     wait_until(lambda: not shown_errors(page), "the notice to go")
     wait_until(lambda: not page._notice._again.visible, "the button to go")
-    assert "old values" not in page.drive_tab._verdict.content
+    wait_until(lambda: "old values" not in page.drive_tab._verdict.content, "the mark to go")
 
 
 def test_a_page_that_fails_between_pictures_says_that_it_stopped_and_starts_again(
