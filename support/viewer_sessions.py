@@ -1,12 +1,21 @@
-"""Paths, grounds and sessions for tests of the viewer."""
+"""Paths, grounds, sessions and slow scenarios for tests of the viewer."""
+
+from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.grounds import made_reef
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 
 LSR1 = load_rover("lsr1")
+SHARE = 0.2
+"""Heights over those of the made reef, on which every path ends after a few centimetres."""
+START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 
 
 def straight(length: float = 2.0, spacing: float = 0.02) -> np.ndarray:
@@ -23,3 +32,33 @@ def ramp(x, y):
 def session_on(height, start=(-2.0, 0.0, 0.0), goal=(1.0, 0.0, 0.0)) -> ViewSession:
     """Return a session of the LSR-1 on a ground with heights height(x, y) [m]."""
     return ViewSession(LSR1, make_terrain(height), start, goal)
+
+
+def lowered_reef() -> Terrain:
+    """Return the made reef with lower heights, so that paths do not end at once."""
+    reef = made_reef()
+    return Terrain(SHARE * reef.elevation, reef.resolution, reef.origin)
+
+
+def tolerant_rover():
+    """Return an LSR-1 that hardly slips and whose limits are wide, so that its paths are long."""
+    limits = replace(
+        LSR1.limits,
+        tilt=1.4,
+        tip_over_ratio=0.01,
+        belly_clearance=0.001,
+        wheel_drop=5.0,
+    )
+    wheel = replace(LSR1.wheel, max_torque=100.0)
+    return replace(LSR1, friction=2.0, wheel=wheel, limits=limits)
+
+
+def slow_options(count: int = 3, waypoint_spacing: float = 2e-4) -> PathQueryOptions:
+    """Return options for candidates with so many waypoints that they take seconds."""
+    return PathQueryOptions(count=count, spacing=0.2, waypoint_spacing=waypoint_spacing)
+
+
+def slow_scenario(friction: float = 2.0) -> Scenario:
+    """Return a scenario that takes seconds, with a friction coefficient."""
+    rover = replace(tolerant_rover(), friction=friction)
+    return Scenario(rover, rover, lowered_reef(), START, GOAL, slow_options(), {})

@@ -166,15 +166,7 @@ def answer_path_query(
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
     options = options or PathQueryOptions()
-    paths = generate_candidates(
-        start,
-        goal,
-        count=options.count,
-        spacing=options.spacing,
-        waypoint_spacing=options.waypoint_spacing,
-        min_radius=tightest_radius(rover),
-        swing_radius=swing_radius(rover) if can_turn_on_the_spot(rover) else None,
-    )
+    paths = generate_paths(rover, start, goal, options)
     sweep_options = options.sweep_options(joint_angles)
     judged = judge_paths(
         rover,
@@ -189,6 +181,25 @@ def answer_path_query(
             Candidate(poses, prediction, verdict, path_cost(rover, prediction, verdict))
             for poses, (prediction, verdict) in zip(paths, judged, strict=True)
         )
+    )
+
+
+def generate_paths(
+    rover: Rover, start, goal, options: PathQueryOptions
+) -> list[NDArray[np.float64]]:
+    """Return the poses (n, 3) of the candidate paths of `answer_path_query`, the direct one first.
+
+    Raises:
+        PlanningError: Start, goal or options are invalid.
+    """
+    return generate_candidates(
+        start,
+        goal,
+        count=options.count,
+        spacing=options.spacing,
+        waypoint_spacing=options.waypoint_spacing,
+        min_radius=tightest_radius(rover),
+        swing_radius=swing_radius(rover) if can_turn_on_the_spot(rover) else None,
     )
 
 

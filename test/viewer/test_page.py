@@ -61,17 +61,15 @@ def visitor(opened, page) -> Visitor:
     """A visitor at the start of the path from (-2, 0) to (1, 0), with the preset lsr1."""
 
     def reset() -> None:
-        page.session.start = (-2.0, 0.0, 0.0)
+        page.session.move(start=(-2.0, 0.0, 0.0))
         if page.session.rover != LSR1:
-            page.session.rover = LSR1
-            page.rover_tab.show_values(LSR1)
-            page.scene.draw_rover(LSR1, {})
+            page.session.take_rover(LSR1)
         page.plan(np.array([1.0, 0.0]))
         done.append(True)
 
     done: list[bool] = []
     page.requests.add(reset)
-    wait_until(lambda: done, "the start")
+    wait_until(lambda: done and not page.is_busy, "the start")
     opened.open_tab("Drive")
     opened.wait_for("paused")
     wait_until(lambda: opened.number("Time") == 0.0, "the dashboard to show the start")

@@ -25,6 +25,8 @@ pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExce
 def page():
     """A page without visitors."""
     served = Page(session_on(ramp), port=0)
+    wait_until(lambda: not served.is_busy, "the ground")
+    do(served, lambda: None)
     yield served
     served.close()
 
@@ -86,8 +88,7 @@ def test_a_path_that_is_judged_again_replaces_its_own_candidate(index):
 
 def test_a_page_shows_that_its_path_is_refused_and_goes_on(page):
     do(page, lambda: page.session.change_rover([("friction",)], 0.4))
-    do(page, page._show_path)
-    assert "not traversable" in page.drive_tab._verdict.content
+    wait_until(lambda: "not traversable" in page.drive_tab._verdict.content, "the verdict")
     assert shown_errors(page) == ""
 
 
@@ -104,7 +105,7 @@ def test_the_verdict_is_right_and_the_rover_drives_if_the_paths_cannot_be_drawn(
     with monkeypatch.context() as patch:
         patch.setattr(page.scene.paths, "show", fail)
         do(page, lambda: page.session.change_rover([("friction",)], 0.4))
-        do(page, page._show_path)
+        wait_until(lambda: "the paths are not drawn" in shown_errors(page), "the notice")
         assert "the paths are not drawn" in shown_errors(page)
         assert "not traversable" in page.drive_tab._verdict.content
         do(page, page.playback.play)
@@ -140,6 +141,40 @@ def test_all_candidates_are_judged_after_a_change_though_drawing_has_stopped(pag
     do(page, lambda: page._change_value(friction, 0.4))
     wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
     wait_until(lambda: "0 of 5 candidate paths" in page.drive_tab._verdict.content, "the answer")
+
+
+def test_an_error_of_a_judgement_is_shown_and_the_old_verdict_is_marked(page):
+    do(page, lambda: page._change_options(map_sigmas="many"))
+    wait_until(lambda: "not judged" in shown_errors(page), "the notice")
+    assert "could not convert string to float" in shown_errors(page)
+    wait_until(lambda: "old values" in page.drive_tab._verdict.content, "the mark")
+    wait_until(lambda: page._notice._again.visible, "the button")
+    assert not page._notice._cancel.visible
+    do(page, lambda: page._change_options(map_sigmas=3.0))
+    wait_until(lambda: not shown_errors(page), "the notice to go")
+    wait_until(lambda: not page._notice._again.visible, "the button to go")
+    wait_until(lambda: "old values" not in page.drive_tab._verdict.content, "the mark to go")
+
+
+def test_a_page_that_fails_between_pictures_says_that_it_stopped_and_starts_again(
+    page, monkeypatch
+):
+    with monkeypatch.context() as patch:
+        patch.setattr(page, "add_due_requests", fail)
+        wait_until(lambda: "stopped" in shown_errors(page), "the notice")
+        assert "ValueError: a line of &lt;no&gt; points" in shown_errors(page)
+    wait_until(lambda: not shown_errors(page), "the notice to go")
+    do(page, page.playback.play)
+    wait_until(lambda: page.playback.time > 0.0, "the rover to drive")
+
+
+def test_a_closed_page_leaves_no_thread_behind():
+    before = set(threading.enumerate())
+    page = Page(session_on(ramp), port=0)
+    page.requests.add(lambda: page.session.plan_again())
+    page.close()
+    left = {thread.name for thread in set(threading.enumerate()) - before}
+    assert not left & {"page", "judge", "ground"}
 
 
 def test_a_path_that_does_not_exist_is_refused_by_its_number(page):

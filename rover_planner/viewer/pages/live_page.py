@@ -135,7 +135,8 @@ class LivePage(PageBase):
             return
         if now - self._ground_at < GROUND_PERIOD:
             return
-        self._last_terrain = self.session.terrain = terrain
+        self._last_terrain = terrain
+        self.session.move(terrain=terrain)
         self._ground_at, self._has_ground, self._shown = now, True, None
         self._draw_ground()
 
@@ -170,6 +171,6 @@ class LivePage(PageBase):
     def _aim_cameras(self, position: np.ndarray) -> None:
         """Aim the cameras of all visitors, present and future, at the rover."""
         ahead = (float(position[0]) + 4.0, float(position[1]), 0.0)
-        self.session.start, self.session.goal = (*position[:2], 0.0), ahead
+        self.session.move(start=(float(position[0]), float(position[1]), 0.0), goal=ahead)
         for client in self.server.get_clients().values():
             self._aim_camera(client)

@@ -17,6 +17,8 @@ from rover_planner.viewer.state.visitor_requests import Action, VisitorRequests
 
 PERIOD = 0.04
 """Time between two pictures [s]."""
+RESTART = 1.0
+"""Time until a stopped page starts again [s]."""
 PANEL_WIDTH, PLOTS_WIDTH = 380, 300
 """Widths of the panels on the right and on the left [px]; a laptop's screen shows the scene."""
 
@@ -25,7 +27,8 @@ class PageBase(ABC):
     """A served page. Callbacks of the browser only add requests for the page's own thread.
 
     No error ends that thread. The page shows an error in a request and takes the next request. An
-    error in a picture stops the pictures until the next request, or for `retry_after` [s].
+    error in a picture stops the pictures until the next request, or for `retry_after` [s]. After
+    any other error the page says that it has stopped and why, and starts again by itself.
     """
 
     retry_after = math.inf
@@ -55,7 +58,8 @@ class PageBase(ABC):
         self.server.scene.on_click(modifier="shift")(
             lambda event: self._request_click(event, True)
         )
-        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._last = self._due = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
 
     @property
     def url(self) -> str:
@@ -70,12 +74,21 @@ class PageBase(ABC):
         """End the page."""
         self._ended.set()
         self._thread.join(5.0)
+        self.end_work()
         self.server.stop()
 
     def wait(self) -> None:
         """Serve until the page is closed or the program is interrupted."""
         while not self._ended.wait(0.5):
             pass
+
+    def end_work(self) -> None:
+        """End what the page does in other threads."""
+        return
+
+    def add_notices(self) -> None:
+        """Add notices above the tabs."""
+        return
 
     @abstractmethod
     def fill_panel(self, tabs: Any) -> None:
@@ -102,6 +115,7 @@ class PageBase(ABC):
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
         self.errors = ErrorNotice(gui)
+        self.add_notices()
         self.fill_panel(gui.add_tab_group())
         left = gui.add_panel()
         with left.add_tab("Plots over distance [m]"):
@@ -122,16 +136,20 @@ class PageBase(ABC):
         self.requests.add(click, "click")
 
     def _run(self) -> None:
-        last = due = time.monotonic()
         while not self._ended.is_set():
-            self.requests.wait(due - time.monotonic())
-            self.add_due_requests()
-            for action in self.requests.take_all():
-                self._fulfil(action)
-            now = time.monotonic()
-            passed, last, due = now - last, now, now + PERIOD
-            if self._stopped_at is None or now - self._stopped_at > self.retry_after:
-                self._draw_picture(passed)
+            if not self.errors.run("stopped", self._run_period):
+                self._ended.wait(RESTART)
+
+    def _run_period(self) -> None:
+        """Fulfil the requests until the next picture is due, and draw it."""
+        self.requests.wait(self._due - time.monotonic())
+        self.add_due_requests()
+        for action in self.requests.take_all():
+            self._fulfil(action)
+        now = time.monotonic()
+        passed, self._last, self._due = now - self._last, now, now + PERIOD
+        if self._stopped_at is None or now - self._stopped_at > self.retry_after:
+            self._draw_picture(passed)
 
     def _fulfil(self, request: Action) -> None:
         """Act on a request; the pictures go on if an error had stopped them."""

@@ -31,12 +31,21 @@ class PathDisplay:
         self._scene, self._tab, self._plots = scene, tab, plots
         self._updated_at = 0.0
 
-    def show_verdict(self) -> str:
-        """Show the verdict in the tab of the drive; return it as HTML."""
+    def show_verdict(self, old: str = "") -> str:
+        """Show the verdict in the tab of the drive; return it as HTML.
+
+        Args:
+            old: Why it is a verdict on old values; empty if it is not.
+        """
         session, shown = self._session, self._session.shown
         verdict = shown.verdict
         text = describe_verdict(
-            verdict.traversable, verdict.reason, session.refusal, shown.summary, shown.by_policy
+            verdict.traversable,
+            verdict.reason,
+            session.refusal,
+            shown.summary,
+            shown.by_policy,
+            old,
         )
         self._tab.show_verdict(text)
         return text
@@ -60,6 +69,14 @@ class PathDisplay:
         self._scene.paths.show(
             session.rover, session.terrain, session.candidates, session.shown.index
         )
+
+    def mark_old(self, path_is_old: bool) -> None:
+        """Grey the lines of other paths with old verdicts, and of the shown path if it has one."""
+        session = self._session
+        index = session.shown.index
+        others = session.has_old_candidates
+        old = {k for k in range(len(session.candidates)) if others and k != index}
+        self._scene.paths.mark_old(old | {index} if path_is_old else old)
 
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s], and draw what has changed."""

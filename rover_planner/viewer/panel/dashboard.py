@@ -197,6 +197,7 @@ def describe_verdict(
     refusal: str,
     summary: str,
     by_policy: Sequence[PolicyVerdict] = (),
+    old: str = "",
 ) -> str:
     """Return a verdict as HTML.
 
@@ -206,6 +207,7 @@ def describe_verdict(
         refusal: Why the last change was refused, empty if it was not.
         summary: What was judged and how long that took, empty for none.
         by_policy: The verdicts under all torque policies, side by side below it.
+        old: Why this is a verdict on old values, which is greyed; empty if it is not.
     """
     colour = to_css(UNKNOWN if traversable is None else PASSABLE if traversable else REFUSED)
     word = {None: "no verdict", True: "traversable", False: "not traversable"}[traversable]
@@ -213,6 +215,9 @@ def describe_verdict(
     lines = [f'<div style="border-left:5px solid {colour};padding-left:.5em">{text}</div>']
     if by_policy:
         lines.append(_compare_policies(by_policy))
+    if old:
+        faded = f'<div id="old" style="opacity:.45;filter:grayscale(1)">{"".join(lines)}</div>'
+        lines = [faded, f"<div><b>old values</b>: {html.escape(old)}</div>"]
     if refusal:
         lines.append(
             f'<div id="refusal" style="border-left:5px solid {to_css(NOTICE)};padding-left:.5em">'
@@ -228,11 +233,12 @@ def _compare_policies(by_policy: Sequence[PolicyVerdict]) -> str:
     boxes = []
     for one in by_policy:
         known = one.traversable is not None
+        faded = "opacity:.45;" if one.is_old else ""
         colour = (PASSABLE if one.traversable else REFUSED) if known else UNKNOWN
         word = ("passes" if one.traversable else "refused") if known else "not judged"
         boxes.append(
             f'<div title="{html.escape(one.reason or word)}" '
-            f'style="border-top:4px solid {to_css(colour)};padding:.1em .3em">'
+            f'style="{faded}border-top:4px solid {to_css(colour)};padding:.1em .3em">'
             f"{POLICY_TITLES[one.policy]}<br><b>{word}</b></div>"
         )
     return (

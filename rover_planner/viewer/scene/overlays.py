@@ -1,7 +1,7 @@
 """Drawings over the ground: candidate paths, ghosts where they are refused, start and goal."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,10 @@ class PathOverlay:
         """Draw nothing yet."""
         self._scene = scene
         self._nodes: list[Any] = []
+        self._coloured: list[tuple[int, Any, Any]] = []
+        """Lines with the index of their path and their colour (3,)."""
+        self._old: set[int] = set()
+        """Indices of the paths that are greyed."""
 
     def show(
         self, rover: Rover, terrain: Terrain, candidates: Sequence[Candidate], shown: int
@@ -53,15 +57,21 @@ class PathOverlay:
         self.clear()
         height = CLEARANCE * rover.wheel.radius
         for index in sorted(range(len(candidates)), key=lambda index: index == shown):
-            name = f"/paths/{index}"
-            self._draw_candidate(name, terrain, candidates[index], height, index == shown)
-        for k, (index, row) in enumerate(choose_ghosts(rover, candidates, shown)):
+            first = len(self._nodes)
+            self._draw_candidate(
+                f"/paths/{index}", terrain, candidates[index], height, index == shown
+            )
+            self._coloured += [(index, node, node.colors) for node in self._nodes[first:]]
+        ghosts = choose_ghosts(rover, candidates, shown)
+        mesh = make_ghost(rover) if ghosts else None
+        for k, (index, row) in enumerate(ghosts):
             verdict = candidates[index].verdict
             if index == shown:
                 text = "\n".join(textwrap.wrap(verdict.reasons[row], LABEL_WIDTH))
             else:
                 text = f"path {index + 1}: {verdict.codes[row].replace('_', ' ')}"
-            self._draw_ghost(f"/ghosts/{k}", rover, terrain, candidates[index], row, text)
+            place = _place_ghost(rover, terrain, candidates[index], row)
+            self._draw_ghost(f"/ghosts/{k}", mesh, place, 3.0 * rover.wheel.radius, text)
         poses = candidates[shown].poses
         for name, pose in (("start", poses[0]), ("goal", poses[-1])):
             self._draw_flag(name, terrain, pose, rover.wheel.radius)
@@ -79,6 +89,16 @@ class PathOverlay:
         for node in self._nodes:
             node.remove()
         self._nodes.clear()
+        self._coloured.clear()
+        self._old.clear()
+
+    def mark_old(self, indices: Iterable[int]) -> None:
+        """Grey the lines of paths whose verdicts are of old values, and colour all others."""
+        old = set(indices)
+        for index, line, colour in self._coloured:
+            if (index in old) != (index in self._old):
+                line.colors = np.array(UNKNOWN, np.uint8) if index in old else colour
+        self._old = old
 
     def _draw_candidate(
         self, name: str, terrain: Terrain, candidate: Candidate, height: float, wide: bool
@@ -116,30 +136,15 @@ class PathOverlay:
             )
 
     def _draw_ghost(
-        self,
-        name: str,
-        rover: Rover,
-        terrain: Terrain,
-        candidate: Candidate,
-        row: int,
-        text: str,
+        self, name: str, mesh: Any, place: tuple[Floats, Floats], height: float, text: str
     ) -> None:
-        """Draw the rover at a waypoint; level above the ground where it does not settle."""
-        prediction = candidate.prediction
-        x, y, yaw = prediction.poses[row]
-        if prediction.settled[row]:
-            position = prediction.position[row]
-            attitude = wxyz_from_rpy(prediction.roll[row], prediction.pitch[row], yaw)
-        else:
-            standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
-            position = np.array([x, y, _ground_height(terrain, x, y) + standing])
-            attitude = wxyz_from_rpy(0.0, 0.0, yaw)
-        mesh = make_ghost(rover)
+        """Draw the rover's mesh at a position and attitude, and a label above it [m]."""
+        position, attitude = place
         ghost = self._scene.add_mesh_simple(
             name, mesh.vertices, mesh.faces, color=REFUSED, opacity=0.3, cast_shadow=False,
             position=position, wxyz=attitude,
         )  # fmt: skip
-        above = np.array([0.0, 0.0, 3.0 * rover.wheel.radius])
+        above = np.array([0.0, 0.0, height])
         self._scene.add_label(
             f"{name}/reason", text, position=above, anchor="bottom-center", font_screen_scale=0.8
         )
@@ -190,6 +195,23 @@ def choose_ghosts(
         if len(chosen) < MAX_GHOSTS and all(distance >= min_distance for distance in distances):
             chosen.append((index, row))
     return chosen
+
+
+def _place_ghost(
+    rover: Rover, terrain: Terrain, candidate: Candidate, row: int
+) -> tuple[Floats, Floats]:
+    """Return position (3,) and attitude (4,), w first, of the rover at a waypoint.
+
+    Where it does not settle it is level above the ground.
+    """
+    prediction = candidate.prediction
+    x, y, yaw = prediction.poses[row]
+    if prediction.settled[row]:
+        attitude = wxyz_from_rpy(prediction.roll[row], prediction.pitch[row], yaw)
+        return prediction.position[row], attitude
+    standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
+    position = np.array([x, y, _ground_height(terrain, x, y) + standing])
+    return position, wxyz_from_rpy(0.0, 0.0, yaw)
 
 
 def _refused_stretches(reasons: tuple[str, ...]) -> list[int]:

@@ -29,8 +29,9 @@ class RoverVisual:
         self._joints: dict[str, Any] = {}
         self._tyres: list[Any] = []
         self._add("body", make_body(rover), BODY)
+        wheel = make_wheel(rover)
         for side in SIDES:
-            self._add_side(rover, side)
+            self._add_side(rover, side, wheel)
         self.turn_arm(rover, arm_angles or {})
 
     def _add(self, name: str, mesh: trimesh.Trimesh, colour: tuple[int, int, int]) -> Any:
@@ -43,8 +44,10 @@ class RoverVisual:
             f"{self._name}/{path}", show_axes=False, position=position
         )
 
-    def _add_side(self, rover: Rover, side: str) -> None:
-        """Add rocker, bogie and wheels of a side."""
+    def _add_side(
+        self, rover: Rover, side: str, wheel: tuple[trimesh.Trimesh, trimesh.Trimesh]
+    ) -> None:
+        """Add rocker, bogie and wheels of a side; `wheel` is as `make_wheel` returns it."""
         suspension = rover.suspension
         rocker = on_side(suspension.rocker_pivot, side)
         bogie = on_side(suspension.bogie_pivot, side)
@@ -61,9 +64,8 @@ class RoverVisual:
             on_bogie = name in suspension.bogie_wheels
             path = f"{bogie_path if on_bogie else rocker_path}/{name}"
             self._add_joint(f"{name}_{side}", path, centre - (bogie if on_bogie else rocker))
-            tyre, grousers = make_wheel(rover)
-            self._tyres.append(self._add(f"{path}/tyre", tyre, METAL))
-            self._add(f"{path}/grousers", grousers, DARK)
+            self._tyres.append(self._add(f"{path}/tyre", wheel[0], METAL))
+            self._add(f"{path}/grousers", wheel[1], DARK)
 
     def turn_arm(self, rover: Rover, angles: Mapping[str, float]) -> None:
         """Show the arm at angles [rad] by joint name; joints without an angle are stowed."""
@@ -160,9 +162,10 @@ def make_arm(
 def make_ghost(rover: Rover) -> trimesh.Trimesh:
     """Return body and wheels, in their places on flat ground, as one mesh."""
     parts = [make_body(rover)]
+    tyre, _ = make_wheel(rover)
     for centre in rover.suspension.wheels.values():
         for side in SIDES:
-            tyre, _ = make_wheel(rover)
-            tyre.apply_translation(on_side(centre, side))
-            parts.append(tyre)
+            placed = tyre.copy()
+            placed.apply_translation(on_side(centre, side))
+            parts.append(placed)
     return join_meshes(parts)

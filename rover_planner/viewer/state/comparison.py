@@ -1,13 +1,8 @@
-"""The verdicts of one path under all torque policies, side by side."""
+"""The verdict of one path under one torque policy, of several shown side by side."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from rover_physics.errors import RoverError
-from rover_physics.names import EQUAL, OPTIMAL, SERVO, TORQUE_POLICIES
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.path_query import Candidate, PathQueryOptions, check_path
+from rover_physics.names import EQUAL, OPTIMAL, SERVO
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
 """What the page calls the policies."""
@@ -20,39 +15,8 @@ class PolicyVerdict:
     policy: str
     """One of `TORQUE_POLICIES`."""
     traversable: bool | None
-    """Whether the rover can drive the path; None if this policy cannot judge it."""
+    """Whether the rover can drive the path; None if this policy cannot judge it or did not yet."""
     reason: str
     """Why not; empty if it can."""
-
-
-def judge_by_policy(
-    rover: Rover,
-    terrain: Terrain,
-    candidate: Candidate,
-    options: PathQueryOptions,
-    arm_angles: Mapping[str, float],
-) -> tuple[PolicyVerdict, ...]:
-    """Return the verdicts of a judged path under all policies, up to their first failures.
-
-    Args:
-        rover: The rover.
-        terrain: The ground.
-        candidate: The path; its own verdict counts for its policy.
-        options: As for `check_path`; the policy is replaced.
-        arm_angles: Angles [rad] of the arm's joints by name.
-    """
-    found = []
-    for policy in TORQUE_POLICIES:
-        verdict = candidate.verdict
-        if verdict.policy != policy:
-            asked = replace(options, policy=policy)
-            try:
-                judged = check_path(
-                    rover, terrain, candidate.poses, asked, arm_angles, stop_at_failure=True
-                )
-            except RoverError as error:
-                found.append(PolicyVerdict(policy, None, str(error)))
-                continue
-            verdict = judged.verdict
-        found.append(PolicyVerdict(policy, verdict.traversable, verdict.reason))
-    return tuple(found)
+    is_old: bool = False
+    """Whether it is of other values than the verdict beside it, or not known yet."""

@@ -1,9 +1,8 @@
-"""The state behind the page: rover, terrain, start, goal, and the model's answer for them."""
+"""The state behind the page: what visitors want judged, and what was judged last."""
 
 import dataclasses
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,48 +13,25 @@ from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.verdict import judge
 from rover_planner.errors import PlanningError
-from rover_planner.planning.path_query import (
-    Candidate,
-    PathAnswer,
-    PathQueryOptions,
-    answer_path_query,
-    check_path,
-    choose,
-)
+from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
 from rover_planner.studies.rover_values import with_value
-from rover_planner.viewer.state.comparison import PolicyVerdict, judge_by_policy
+from rover_planner.viewer.state.background_work import BackgroundWork, Progress
+from rover_planner.viewer.state.judging import JudgeRequest, judge_request
+from rover_planner.viewer.state.scenario import Judgement, Pose, Scenario, ShownPath
 from rover_planner.viewer.state.trajectory import Trajectory
 
 REFUSALS = (RoverError, PlanningError)
 """Errors that say what is wrong with a request."""
-Pose = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class ShownPath:
-    """The path that is shown, and its verdict."""
-
-    index: int
-    """Its index among the candidates of the last answer."""
-    candidate: Candidate
-    """The path as it was judged last."""
-    trajectory: Trajectory
-    """The drive along it."""
-    summary: str
-    """What was judged and how long that took; empty for a recorded path."""
-    by_policy: tuple[PolicyVerdict, ...] = ()
-    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
-
-    @property
-    def verdict(self) -> Verdict:
-        """Whether the rover can drive it, and why not."""
-        return self.candidate.verdict
 
 
 class ViewSession:
-    """Keeps the last good state: a refused change alters nothing but `refusal`."""
+    """What is wanted and what is finished; both are frozen values that are replaced as a whole.
+
+    It judges at once, or in the background after `judge_in_background`. All changes belong to one
+    thread, the owner's. A refused change alters nothing but `refusal`.
+    """
 
     def __init__(
         self,
@@ -77,121 +53,127 @@ class ViewSession:
         Raises:
             RoverError, PlanningError: The rover, the poses or the options are invalid.
         """
-        self.rover, self.terrain = rover, terrain
-        self.start, self.goal = start, goal
-        self.options = options or PathQueryOptions(count=5, spacing=0.5)
-        self.arm_angles: dict[str, float] = {}
-        """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
+        options = options or PathQueryOptions(count=5, spacing=0.5)
+        self.wanted = Scenario(rover, rover, terrain, start, goal, options, {})
+        """What visitors want judged."""
         self.refusal = ""
         """Why the last change was refused, empty if it was not."""
-        self.recorded = False
+        self.is_stopped = False
+        """Whether the judgement of `wanted` was cancelled or failed."""
+        self._background: BackgroundWork[JudgeRequest, Judgement] | None = None
+        self._asked = JudgeRequest(self.wanted)
+        """The newest request."""
+        *_, self.finished = judge_request(self._asked, _ignore)
+        """The last judgement."""
+        self._index = self.finished.shown.index
+        """Index of the candidate that is wanted."""
+
+    # What is shown.
+
+    @property
+    def rover(self) -> Rover:
+        """The rover of the last judgement; `wanted` has the newest values."""
+        return self.finished.scenario.rover
+
+    @property
+    def terrain(self) -> Terrain:
+        """The ground."""
+        return self.finished.scenario.terrain
+
+    @property
+    def start(self) -> Pose:
+        """Start of the shown path: x, y [m] and yaw [rad], map frame."""
+        return self.finished.scenario.start
+
+    @property
+    def goal(self) -> Pose:
+        """Its goal."""
+        return self.finished.scenario.goal
+
+    @property
+    def options(self) -> PathQueryOptions:
+        """How the candidates were made and judged."""
+        return self.finished.scenario.options
+
+    @property
+    def arm_angles(self) -> Mapping[str, float]:
+        """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
+        return self.finished.scenario.arm_angles
+
+    @property
+    def recorded(self) -> bool:
         """Whether the path is a recorded one, so that no other is planned."""
-        self.answer: PathAnswer
-        self.shown: ShownPath
-        self._plan()
+        return self.finished.scenario.recorded is not None
 
-    def _plan(self) -> None:
-        """Judge all candidate paths, or the recorded path, and show the one that is chosen."""
-        began = time.perf_counter()
-        if self.recorded:
-            poses = self.shown.candidate.poses
-            only = self._check(self.rover, poses, self.arm_angles)
-            self.answer = choose((only,))
-        else:
-            self.answer = answer_path_query(
-                self.rover, self.terrain, self.start, self.goal, self.options, self.arm_angles
-            )
-        passable = sum(candidate.verdict.traversable for candidate in self.answer.candidates)
-        total = len(self.answer.candidates)
-        words = f"{passable} of {total} candidate paths passable, judged in"
-        if self.recorded:
-            words = "recorded path judged again in"
-        self._show(self.answer.nearest, self.answer.chosen, f"{words} {_milliseconds(began)}")
+    @property
+    def answer(self) -> PathAnswer:
+        """The candidates as they were judged together last."""
+        return self.finished.answer
 
-    def _check(
-        self, rover: Rover, poses: NDArray[np.float64], arm_angles: dict[str, float]
-    ) -> Candidate:
-        """Judge a path up to its first failure, where its playback ends."""
-        return check_path(
-            rover, self.terrain, poses, self.options, arm_angles, stop_at_failure=True
-        )
-
-    def _show(self, index: int, candidate: Candidate, summary: str) -> None:
-        trajectory = Trajectory(self.rover, candidate.prediction, candidate.verdict)
-        by_policy: tuple[PolicyVerdict, ...] = ()
-        if not self.recorded:
-            by_policy = judge_by_policy(
-                self.rover, self.terrain, candidate, self.options, self.arm_angles
-            )
-        self.shown = ShownPath(index, candidate, trajectory, summary, by_policy)
+    @property
+    def shown(self) -> ShownPath:
+        """The shown path and its verdict."""
+        return self.finished.shown
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
         """The candidates of the last answer, with the shown one as it was judged last."""
-        candidates = list(self.answer.candidates)
-        candidates[self.shown.index] = self.shown.candidate
-        return tuple(candidates)
+        return self.finished.candidates
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether the shown verdict is of other values than those that are wanted."""
+        return self.finished.scenario is not self.wanted
+
+    @property
+    def has_old_candidates(self) -> bool:
+        """Whether the other candidates were judged for other values."""
+        return self.finished.answered is not self.wanted
 
     def sweep_options(self) -> SweepOptions:
-        """Return the options of the model that hold now."""
+        """Return the options of the model of the last judgement."""
         return self.options.sweep_options(self.arm_angles)
 
-    def show_candidate(self, index: int) -> None:
+    # What is wanted. All return whether the change was accepted; if not, `refusal` says why. In
+    # the background a change may be accepted and still be refused when it is judged.
+
+    def show_candidate(self, index: int) -> bool:
         """Show another candidate of the last answer.
 
         Raises:
-            PlanningError: The last answer has no candidate of this index.
+            PlanningError: There is no candidate of this index, or other paths are wanted.
         """
-        candidates = self.answer.candidates
-        if not 0 <= index < len(candidates):
-            raise PlanningError(f"no path {index + 1}; there are paths 1 to {len(candidates)}")
-        self._show(index, candidates[index], self.shown.summary)
+        count = len(self.answer.candidates)
+        if not 0 <= index < count:
+            raise PlanningError(f"no path {index + 1}; there are paths 1 to {count}")
+        if not self.wanted.has_paths_of(self.finished.answered):
+            raise PlanningError("the listed paths are old; judge again first")
+        return self._ask(self.wanted, index)
 
     def plan_to(self, goal: NDArray[np.float64]) -> bool:
-        """Plan to a goal (2,) [m] with the yaw of the straight line there.
-
-        Returns:
-            Whether the goal was accepted, as of all changes: if not, `refusal` says why.
-        """
-        return self._take_ends(self.start, _facing(self.start, goal))
+        """Plan to a goal (2,) [m] with the yaw of the straight line there."""
+        start = self.wanted.start
+        return self._want(start=start, goal=_facing(start, goal), recorded=None)
 
     def plan_from(self, start: NDArray[np.float64]) -> bool:
         """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
-        ahead = np.asarray(self.goal[:2]) - np.asarray(start)
+        goal = self.wanted.goal
+        ahead = np.asarray(goal[:2]) - np.asarray(start)
         yaw = float(np.arctan2(ahead[1], ahead[0]))
         pose = (float(start[0]), float(start[1]), yaw)
-        return self._take_ends(pose, (self.goal[0], self.goal[1], yaw))
-
-    def _take_ends(self, start: Pose, goal: Pose) -> bool:
-        return self._plan_with(start=start, goal=goal, recorded=False)
+        return self._want(start=pose, goal=(goal[0], goal[1], yaw), recorded=None)
 
     def change_options(self, **changes: object) -> bool:
         """Change fields of PathQueryOptions and plan again."""
-        options = dataclasses.replace(self.options, **changes)  # type: ignore[arg-type]
-        return self._plan_with(options=options)
+        return self._want(options=dataclasses.replace(self.wanted.options, **changes))  # type: ignore[arg-type]
 
     def take_rover(self, rover: Rover) -> bool:
         """Take another rover and plan again."""
-        return self._plan_with(rover=rover, arm_angles={})
+        return self._want(loaded=rover, rover=rover, arm_angles={})
 
     def plan_again(self) -> bool:
         """Judge all candidates again, after a change of the rover."""
-        return self._plan_with()
-
-    def _plan_with(self, **changes: object) -> bool:
-        """Plan with other attributes; restore the old ones if that is refused."""
-        before = {name: getattr(self, name) for name in changes}
-        for name, value in changes.items():
-            setattr(self, name, value)
-        try:
-            self._plan()
-        except REFUSALS as error:
-            for name, value in before.items():
-                setattr(self, name, value)
-            self.refusal = str(error)
-            return False
-        self.refusal = ""
-        return True
+        return self._ask(self.wanted)
 
     def change_rover(self, keys: Sequence[Key], value: float) -> bool:
         """Change a number of the rover and judge the shown path again.
@@ -201,34 +183,113 @@ class ViewSession:
         Args:
             keys: Keys of the number in the rover file; several get the same value.
             value: The new value.
-
-        Returns:
-            Whether it was accepted; if not, `refusal` says why and the last good rover stays.
         """
         try:
-            rover = with_value(self.rover, keys, value)
+            rover = with_value(self.wanted.rover, keys, value)
         except REFUSALS as error:
             self.refusal = str(error)
             return False
-        return self._judge_shown(rover, self.arm_angles)
+        return self._judge_shown(rover=rover)
 
     def change_arm(self, joint: str, angle: float) -> bool:
         """Turn a joint of the arm to an angle [rad]; otherwise like `change_rover`."""
-        return self._judge_shown(self.rover, {**self.arm_angles, joint: angle})
+        return self._judge_shown(arm_angles={**self.wanted.arm_angles, joint: angle})
 
-    def _judge_shown(self, rover: Rover, arm_angles: dict[str, float]) -> bool:
-        """Judge the shown path with another rover or arm; keep both if they are accepted."""
-        began = time.perf_counter()
+    def _want(self, **changes: Any) -> bool:
+        """Plan with other values."""
+        return self._ask(dataclasses.replace(self.wanted, **changes))
+
+    def _judge_shown(self, **changes: Any) -> bool:
+        """Judge the shown path again with other values; all, if others are wanted meanwhile."""
+        wanted = dataclasses.replace(self.wanted, **changes)
+        same = wanted.has_paths_of(self.finished.answered)
+        return self._ask(wanted, self._index if same else None)
+
+    def _ask(self, wanted: Scenario, index: int | None = None) -> bool:
+        """Judge a candidate by its index, or all; without background do it at once."""
+        before = None if index is None else self.finished
+        request = JudgeRequest(wanted, before, index or 0)
+        self.wanted, self._asked = wanted, request
+        self._index = self._index if index is None else index
+        self.refusal, self.is_stopped = "", False
+        if self._background is not None:
+            self._background.ask(request)
+            return True
         try:
-            poses = self.shown.candidate.poses
-            candidate = self._check(rover, poses, arm_angles)
+            for judgement in judge_request(request, _ignore):
+                self._finish(request, judgement)
         except REFUSALS as error:
-            self.refusal = str(error)
+            self._refuse(error)
             return False
-        self.rover, self.arm_angles, self.refusal = rover, arm_angles, ""
-        words = f"path of {candidate.length:.1f} m judged again in {_milliseconds(began)}"
-        self._show(self.shown.index, candidate, words)
         return True
+
+    def _finish(self, request: JudgeRequest, judgement: Judgement) -> None:
+        """Take a judgement; one of a single path leaves the others as they were judged last."""
+        now = self.finished
+        if request.before is not None and request.scenario.has_paths_of(now.answered):
+            judgement = dataclasses.replace(judgement, answer=now.answer, answered=now.answered)
+        self.finished = judgement
+        if request is self._asked:
+            self._index = judgement.shown.index
+
+    def _refuse(self, error: Exception) -> None:
+        """Want again what was judged last."""
+        self.refusal = str(error)
+        self.wanted, self._index = self.finished.scenario, self.finished.shown.index
+
+    # In the background.
+
+    def judge_in_background(self, wake: Callable[[], object]) -> None:
+        """Judge in a thread from now on, until `close`.
+
+        Args:
+            wake: Called in that thread when there is something to take with `take_finished`.
+        """
+        self._background = BackgroundWork(judge_request, wake, "judge")
+
+    @property
+    def progress(self) -> Progress | None:
+        """How far the judgement in the background is; None if nothing is judged."""
+        return self._background.progress if self._background is not None else None
+
+    @property
+    def has_news(self) -> bool:
+        """Whether there is something for `take_finished`."""
+        return self._background is not None and self._background.has_news
+
+    def take_finished(self) -> bool:
+        """Take what was judged in the background; return whether there was anything.
+
+        Raises:
+            Exception: The newest judgement failed by an error that is no refusal.
+        """
+        done = self._background.take() if self._background is not None else []
+        for one in done:
+            if one.result is not None:
+                self._finish(one.request, one.result)
+            elif one.request is self._asked and isinstance(one.error, REFUSALS):
+                self._refuse(one.error)
+            elif one.request is self._asked and one.error is not None:
+                self.is_stopped = True
+                raise one.error
+        return bool(done)
+
+    def cancel(self) -> None:
+        """Stop the judgement in the background; the last one stays, and `wanted` stays."""
+        if self._background is not None and self._background.cancel():
+            self.is_stopped = True
+
+    def close(self) -> bool:
+        """End the thread; return whether it has ended."""
+        return self._background is None or self._background.close()
+
+    # Without a judgement.
+
+    def move(self, **places: Any) -> None:
+        """Replace terrain, start or goal without a judgement, for a page that follows a rover."""
+        scenario = dataclasses.replace(self.finished.scenario, **places)
+        self.finished = dataclasses.replace(self.finished, scenario=scenario)
+        self.wanted = scenario
 
     def replay(self, prediction: PathPrediction, reasons: Sequence[str]) -> None:
         """Show a recorded prediction with the recorded reasons (n,) of its waypoints."""
@@ -240,16 +301,19 @@ class ViewSession:
             first_failure=first,
             reason=reasons[first] if first >= 0 else "",
         )
-        candidate = Candidate(prediction.poses, prediction, verdict, (0.0, 0.0))
-        self.answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
-        self.start, self.goal = (_as_pose(prediction.poses[row]) for row in (0, -1))
-        self.recorded = True
-        self._show(0, candidate, "recorded")
+        poses = prediction.poses
+        candidate = Candidate(poses, prediction, verdict, (0.0, 0.0))
+        answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
+        start, goal = (_as_pose(poses[row]) for row in (0, -1))
+        self.wanted = scenario = dataclasses.replace(
+            self.wanted, start=start, goal=goal, recorded=poses
+        )
+        shown = ShownPath(0, candidate, Trajectory(self.rover, prediction, verdict), "recorded")
+        self.finished, self._index = Judgement(scenario, answer, scenario, shown), 0
 
 
-def _milliseconds(began: float) -> str:
-    """Return the time since `began` as text."""
-    return f"{1e3 * (time.perf_counter() - began):.0f} ms"
+def _ignore(_what: str, _step: int, _steps: int) -> None:
+    """Report progress to nobody."""
 
 
 def _as_pose(pose: NDArray[np.float64]) -> Pose:

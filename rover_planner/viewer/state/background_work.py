@@ -1,0 +1,197 @@
+"""One worker thread that does the newest request: progress, cancel, and results as values."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from rover_physics.numerics.interruption import interruptible
+from rover_planner.errors import PlanningError
+
+PATIENCE = 0.2
+"""Time for which work may go on although a newer request waits [s]: a slider that is dragged still
+gets results where they take less."""
+END_TIME = 5.0
+"""Longest wait for the thread when the work is closed [s]."""
+
+Request = TypeVar("Request")
+Result = TypeVar("Result")
+Report = Callable[[str, int, int], None]
+"""Takes what is worked on, such as "judging path", its number from 1, and how many there are."""
+Work = Callable[[Request, Report], Iterator[Result]]
+"""Yields the results of a request, each as soon as it is known."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the work is."""
+
+    what: str = ""
+    """What is worked on; empty before the first report."""
+    step: int = 0
+    """Its number, from 1."""
+    steps: int = 0
+    """How many there are."""
+    seconds: float = 0.0
+    """Time since the work began, or since its last result [s]."""
+
+    def describe(self) -> str:
+        """Return the progress in words, such as "judging path 2 of 5"."""
+        many = f" {self.step} of {self.steps}" if self.steps > 1 else ""
+        return f"{self.what or 'waiting'}{many}"
+
+
+@dataclass(frozen=True, eq=False)
+class Delivery(Generic[Request, Result]):
+    """A result of a request, or the error that ended it."""
+
+    request: Request
+    """The request, the same object as was asked."""
+    result: Result | None
+    """The result; None after an error."""
+    error: BaseException | None = None
+    """The error; None with a result."""
+
+
+class _StoppedError(PlanningError):
+    """Leaves work that was cancelled or replaced."""
+
+
+@dataclass(eq=False)
+class _Job(Generic[Request]):
+    """A request in the thread."""
+
+    request: Request
+    began: float
+    is_stopped: bool = False
+
+
+class BackgroundWork(Generic[Request, Result]):
+    """Does one request at a time, the newest; those that a newer one replaces are dropped.
+
+    Work that takes longer than PATIENCE is stopped by a newer request. What is finished is handed
+    over by `take`, each result once and in the order of the requests. The methods may be called
+    from any thread.
+    """
+
+    def __init__(
+        self, work: Work[Request, Result], wake: Callable[[], object], name: str = "background"
+    ):
+        """Start the thread.
+
+        Args:
+            work: Does a request. Between the slices of the model's sweeps and at each report it
+                may be stopped by an error, which it must let pass.
+            wake: Called in the thread when there is something to take.
+            name: Name of the thread.
+        """
+        self._work, self._wake = work, wake
+        self._changed = threading.Condition()
+        # The lock of _changed guards all that follows.
+        self._waiting: Request | None = None
+        self._job: _Job[Request] | None = None
+        self._done: deque[Delivery[Request, Result]] = deque()
+        self._progress = Progress()
+        self._since = 0.0
+        self._ending = False
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def ask(self, request: Request) -> None:
+        """Do a request instead of the one that waits, and soon instead of the one in work."""
+        with self._changed:
+            if not self._is_busy():
+                self._progress, self._since = Progress(), time.monotonic()
+            self._waiting = request
+            self._changed.notify()
+
+    def cancel(self) -> bool:
+        """Stop all work; what it finds after this is dropped. Return whether there was any."""
+        with self._changed:
+            was_busy = self._is_busy()
+            self._waiting = None
+            if self._job is not None:
+                self._job.is_stopped = True
+        return was_busy
+
+    def take(self) -> list[Delivery[Request, Result]]:
+        """Return what was finished since the last call, the oldest first."""
+        with self._changed:
+            done = list(self._done)
+            self._done.clear()
+        return done
+
+    @property
+    def has_news(self) -> bool:
+        """Whether there is something to take."""
+        with self._changed:
+            return bool(self._done)
+
+    @property
+    def progress(self) -> Progress | None:
+        """How far the work is; None if there is none."""
+        with self._changed:
+            if not self._is_busy():
+                return None
+            return replace(self._progress, seconds=time.monotonic() - self._since)
+
+    def close(self) -> bool:
+        """Stop all work and end the thread; return whether it has ended within END_TIME."""
+        self.cancel()
+        with self._changed:
+            self._ending = True
+            self._changed.notify()
+        self._thread.join(END_TIME)
+        return not self._thread.is_alive()
+
+    def _is_busy(self) -> bool:
+        in_work = self._job is not None and not self._job.is_stopped
+        return in_work or self._waiting is not None
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._job = None
+                self._changed.wait_for(lambda: self._waiting is not None or self._ending)
+                if self._ending or self._waiting is None:
+                    return
+                job = self._job = _Job(self._waiting, time.monotonic())
+                self._waiting = None
+            self._do(job)
+
+    def _do(self, job: _Job[Request]) -> None:
+        def check() -> None:
+            late = time.monotonic() - job.began > PATIENCE
+            if job.is_stopped or (late and self._waiting is not None):
+                raise _StoppedError("a newer request or a visitor stopped the work")
+
+        def report(what: str, step: int, steps: int) -> None:
+            check()
+            with self._changed:
+                self._progress = Progress(what, step, steps)
+
+        try:
+            with interruptible(check):
+                for result in self._work(job.request, report):
+                    self._deliver(job, Delivery(job.request, result))
+        except _StoppedError:
+            return
+        except BaseException as error:  # the thread must go on; whoever takes it tells of it
+            self._deliver(job, Delivery(job.request, None, error))
+
+    def _deliver(self, job: _Job[Request], done: Delivery[Request, Result]) -> None:
+        """Hand over what was found, unless it was cancelled; stop work that was replaced."""
+        with self._changed:
+            replaced = self._waiting is not None
+            wanted = not job.is_stopped and not (replaced and done.error is not None)
+            if wanted:
+                self._done.append(done)
+                self._since = time.monotonic()
+            if replaced:
+                job.is_stopped = True
+        if wanted:
+            self._wake()
+        if job.is_stopped and done.error is None:
+            raise _StoppedError("a newer request or a visitor stopped the work")

@@ -1,0 +1,144 @@
+"""Judges a scenario step by step: the shown path or all candidates, then its other policies."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from rover_physics.errors import RoverError
+from rover_physics.names import TORQUE_POLICIES
+from rover_physics.numerics.arrays import Floats
+from rover_planner.planning.path_query import Candidate, check_path, choose, generate_paths
+from rover_planner.viewer.state.background_work import Report
+from rover_planner.viewer.state.comparison import PolicyVerdict
+from rover_planner.viewer.state.scenario import Judgement, Scenario, ShownPath
+from rover_planner.viewer.state.trajectory import Trajectory
+
+PATH, POLICY = "judging path", "judging policy"
+"""What is reported to be worked on."""
+
+
+@dataclass(frozen=True, eq=False)
+class JudgeRequest:
+    """What to judge."""
+
+    scenario: Scenario
+    """Rover, ground, ends and options."""
+    before: Judgement | None = None
+    """The judgement whose candidate is judged again; None: all candidates are judged."""
+    index: int = 0
+    """Index of that candidate."""
+
+
+def judge_request(request: JudgeRequest, report: Report) -> Iterator[Judgement]:
+    """Yield the judgement with the verdict, then the same with those of all policies.
+
+    Args:
+        request: What to judge.
+        report: Called before each path and each policy.
+
+    Raises:
+        RoverError, PlanningError: The rover, the poses or the options are invalid.
+    """
+    first = _judge_one(request, report) if request.before else _judge_all(request, report)
+    yield first
+    if first.scenario.recorded is None:
+        yield _add_policies(first, report)
+
+
+def _judge_all(request: JudgeRequest, report: Report) -> Judgement:
+    """Judge all candidate paths, or the recorded path, and show the one that is chosen."""
+    began, scenario = time.perf_counter(), request.scenario
+    recorded = scenario.recorded is not None
+    if scenario.recorded is not None:
+        paths = [scenario.recorded]
+    else:
+        ends = scenario.start, scenario.goal
+        paths = generate_paths(scenario.rover, *ends, scenario.options)
+    candidates = []
+    for k, path in enumerate(paths):
+        report(PATH, k + 1, len(paths))
+        whole = len(paths) == 1 and not recorded
+        candidates.append(_check(scenario, path, stop_at_failure=not whole))
+    answer = choose(tuple(candidates))
+    passable = sum(candidate.verdict.traversable for candidate in candidates)
+    words = f"{passable} of {len(paths)} candidate paths passable, judged in"
+    if recorded:
+        words = "recorded path judged again in"
+    shown = _show(scenario, answer.nearest, answer.chosen, f"{words} {_milliseconds(began)}", ())
+    return Judgement(scenario, answer, scenario, shown)
+
+
+def _judge_one(request: JudgeRequest, report: Report) -> Judgement:
+    """Show a candidate of the judgement before, judged again unless its verdict still holds."""
+    began, scenario = time.perf_counter(), request.scenario
+    before, index = request.before, request.index
+    assert before is not None
+    candidate, summary = before.answer.candidates[index], before.shown.summary
+    if before.answered is not scenario:
+        report(PATH, 1, 1)
+        candidate = _check(scenario, candidate.poses)
+        summary = f"path of {candidate.length:.1f} m judged again in {_milliseconds(began)}"
+    old = before.shown.by_policy if index == before.shown.index else ()
+    shown = _show(scenario, index, candidate, summary, old)
+    return replace(before, scenario=scenario, shown=shown)
+
+
+def _show(
+    scenario: Scenario,
+    index: int,
+    candidate: Candidate,
+    summary: str,
+    old: tuple[PolicyVerdict, ...],
+) -> ShownPath:
+    """Return a path with its verdict; those of other policies are old ones, or not known yet."""
+    trajectory = Trajectory(scenario.rover, candidate.prediction, candidate.verdict)
+    by_policy: tuple[PolicyVerdict, ...] = ()
+    if scenario.recorded is None:
+        known = {policy: PolicyVerdict(policy, None, "") for policy in TORQUE_POLICIES}
+        known |= {one.policy: one for one in old}
+        known = {policy: replace(one, is_old=True) for policy, one in known.items()}
+        by_policy = tuple((known | {candidate.verdict.policy: _own_verdict(candidate)}).values())
+    return ShownPath(index, candidate, trajectory, summary, by_policy)
+
+
+def _own_verdict(candidate: Candidate) -> PolicyVerdict:
+    verdict = candidate.verdict
+    return PolicyVerdict(verdict.policy, verdict.traversable, verdict.reason)
+
+
+def _add_policies(judgement: Judgement, report: Report) -> Judgement:
+    """Return a judgement with the shown path's verdicts under all policies."""
+    found = []
+    for k, policy in enumerate(TORQUE_POLICIES):
+        report(POLICY, k + 1, len(TORQUE_POLICIES))
+        found.append(_judge_under(policy, judgement.scenario, judgement.shown.candidate))
+    return replace(judgement, shown=replace(judgement.shown, by_policy=tuple(found)))
+
+
+def _judge_under(policy: str, scenario: Scenario, candidate: Candidate) -> PolicyVerdict:
+    """Return the verdict on a judged path under a policy, up to the first failure."""
+    if candidate.verdict.policy == policy:
+        return _own_verdict(candidate)
+    try:
+        options = replace(scenario.options, policy=policy)
+        other = _check(replace(scenario, options=options), candidate.poses)
+    except RoverError as error:
+        return PolicyVerdict(policy, None, str(error))
+    return _own_verdict(other)
+
+
+def _check(scenario: Scenario, poses: Floats, *, stop_at_failure: bool = True) -> Candidate:
+    """Judge a path, by default up to its first failure, where its playback ends."""
+    return check_path(
+        scenario.rover,
+        scenario.terrain,
+        poses,
+        scenario.options,
+        scenario.arm_angles,
+        stop_at_failure=stop_at_failure,
+    )
+
+
+def _milliseconds(began: float) -> str:
+    """Return the time since `began` as text."""
+    return f"{1e3 * (time.perf_counter() - began):.0f} ms"

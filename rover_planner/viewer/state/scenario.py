@@ -1,0 +1,88 @@
+"""What is judged, and what came out: frozen values that threads may share."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.verdict import Verdict
+from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
+from rover_planner.viewer.state.comparison import PolicyVerdict
+from rover_planner.viewer.state.trajectory import Trajectory
+
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Everything that a verdict depends on."""
+
+    loaded: Rover
+    """The rover as it was loaded."""
+    rover: Rover
+    """The same with its numbers as they were changed since."""
+    terrain: Terrain
+    """The ground."""
+    start: Pose
+    """x, y [m] and yaw [rad], map frame."""
+    goal: Pose
+    """The same."""
+    options: PathQueryOptions
+    """How candidates are made and judged."""
+    arm_angles: Mapping[str, float]
+    """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
+    recorded: Floats | None = None
+    """Poses (n, 3) of a recorded path that takes the place of candidates."""
+
+    def has_paths_of(self, other: "Scenario") -> bool:
+        """Return whether the candidate paths are the same but for changed numbers of the rover."""
+        return (
+            self.loaded is other.loaded
+            and self.terrain is other.terrain
+            and (self.start, self.goal) == (other.start, other.goal)
+            and self.options == other.options
+            and self.recorded is other.recorded
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ShownPath:
+    """The path that is shown, and its verdict."""
+
+    index: int
+    """Its index among the candidates of the last answer."""
+    candidate: Candidate
+    """The path as it was judged last."""
+    trajectory: Trajectory
+    """The drive along it."""
+    summary: str
+    """What was judged and how long that took; empty for a recorded path."""
+    by_policy: tuple[PolicyVerdict, ...] = ()
+    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the rover can drive it, and why not."""
+        return self.candidate.verdict
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The verdict on the shown path, and those on all candidates, which may be older."""
+
+    scenario: Scenario
+    """What the shown path was judged for."""
+    answer: PathAnswer
+    """All candidates."""
+    answered: Scenario
+    """What they were judged for."""
+    shown: ShownPath
+    """The shown path."""
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The candidates, with the shown one as it was judged last."""
+        candidates = list(self.answer.candidates)
+        candidates[self.shown.index] = self.shown.candidate
+        return tuple(candidates)

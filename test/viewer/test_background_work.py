@@ -1,0 +1,312 @@
+"""Work in the background with a real rover on a real map: newest wins, cancel, error, progress."""
+
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.errors import RoverError
+from rover_physics.names import TORQUE_POLICIES
+from rover_physics.terrain.grid import load_terrain
+from rover_physics.traversability.judge_path import judge_path
+from rover_planner.command.view import choose_ends
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.viewer.state.background_work import PATIENCE, BackgroundWork
+from rover_planner.viewer.state.judging import PATH, POLICY, JudgeRequest, judge_request
+from rover_planner.viewer.state.scenario import Scenario
+from rover_planner.viewer.state.session import ViewSession
+from support.grounds import waves
+from support.ros_fixtures import wait_until
+from support.viewer_sessions import LSR1, ramp, session_on, slow_scenario
+
+STOP_TIME = 2.0
+"""Longest time until work stops [s]; most steps take 0.05 s, few 0.4 s."""
+
+
+@pytest.fixture(scope="module")
+def spirit() -> Scenario:
+    """The LSR-1 on real ground of Mars."""
+    ground = load_terrain("spirit").fill_gaps(0.2)
+    start, goal = choose_ends(LSR1, ground)
+    options = PathQueryOptions(count=5, spacing=0.5)
+    return Scenario(LSR1, LSR1, ground, start, goal, options, {})
+
+
+@pytest.fixture
+def woken() -> list[bool]:
+    return []
+
+
+@pytest.fixture
+def judge(woken):
+    """A thread that judges; it must end."""
+    work = BackgroundWork(judge_request, lambda: woken.append(True), "judge of this test")
+    yield work
+    assert work.close()
+    assert "judge of this test" not in {thread.name for thread in threading.enumerate()}
+
+
+def with_friction(scenario: Scenario, friction: float) -> JudgeRequest:
+    return JudgeRequest(replace(scenario, rover=replace(scenario.rover, friction=friction)))
+
+
+def wait_for_idle(work) -> None:
+    wait_until(lambda: work.progress is None, "the end of the work", 60.0)
+
+
+def test_what_is_judged_in_the_background_is_what_the_library_says(judge, spirit):
+    judge.ask(JudgeRequest(spirit))
+    wait_for_idle(judge)
+    first, last = judge.take()
+    answer = answer_path_query(LSR1, spirit.terrain, spirit.start, spirit.goal, spirit.options)
+    for found in (first.result, last.result):
+        assert [c.verdict for c in found.answer.candidates] == [
+            c.verdict for c in answer.candidates
+        ]
+        assert found.answer.best == answer.best and found.shown.index == answer.nearest
+    assert all(one.is_old for one in first.result.shown.by_policy[1:])
+    assert [one.policy for one in last.result.shown.by_policy] == list(TORQUE_POLICIES)
+    assert not any(one.is_old for one in last.result.shown.by_policy)
+
+
+def test_of_fifty_requests_of_a_dragged_slider_the_newest_wins(judge, spirit):
+    frictions = [0.3 + 0.01 * k for k in range(50)]
+    delivered = []
+    for friction in frictions:
+        judge.ask(with_friction(spirit, friction))
+        time.sleep(0.01)
+        delivered += judge.take()
+    wait_for_idle(judge)
+    delivered += judge.take()
+    order = [frictions.index(one.request.scenario.rover.friction) for one in delivered]
+    assert order == sorted(order) and order[-1] == 49
+    assert len(set(order)) < 50
+    last = delivered[-1]
+    assert last.error is None and last.result.scenario.rover.friction == frictions[-1]
+
+
+def test_each_result_is_handed_over_once_and_announced(judge, spirit, woken):
+    judge.ask(JudgeRequest(spirit))
+    wait_for_idle(judge)
+    assert judge.has_news
+    assert len(judge.take()) == len(woken) == 2
+    assert judge.take() == [] and not judge.has_news
+
+
+def test_slow_work_gives_way_to_a_newer_request_and_delivers_nothing(judge, spirit):
+    judge.ask(JudgeRequest(slow_scenario()))
+    wait_until(lambda: judge.progress.what == PATH, "the slow work to begin")
+    time.sleep(PATIENCE)
+    judge.ask(JudgeRequest(spirit))
+    wait_for_idle(judge)
+    assert {one.request.scenario for one in judge.take()} == {spirit}
+
+
+def test_cancelled_work_stops_soon_and_is_never_delivered(judge, spirit):
+    judge.ask(JudgeRequest(slow_scenario()))
+    wait_until(lambda: judge.progress.step == 2, "the second path")
+    assert judge.cancel()
+    assert judge.progress is None and not judge.cancel()
+    began = time.monotonic()
+    judge.ask(JudgeRequest(spirit))
+    wait_until(lambda: judge.progress is None or judge.progress.what, "the next work")
+    assert time.monotonic() - began < STOP_TIME
+    wait_for_idle(judge)
+    assert {one.request.scenario for one in judge.take()} == {spirit}
+
+
+def test_a_request_that_the_model_refuses_is_delivered_as_an_error(judge, spirit):
+    options = replace(spirit.options, policy="best")
+    judge.ask(JudgeRequest(replace(spirit, options=options)))
+    wait_for_idle(judge)
+    (done,) = judge.take()
+    assert done.result is None and isinstance(done.error, RoverError)
+    judge.ask(JudgeRequest(spirit))
+    wait_for_idle(judge)
+    assert [one.error for one in judge.take()] == [None, None]
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("x"), MemoryError(), SystemExit(3)])
+def test_no_error_ends_the_thread(error):
+    def fail_or_answer(request, report):
+        if request:
+            raise error
+        yield "answer"
+
+    work = BackgroundWork(fail_or_answer, lambda: None)
+    work.ask(True)
+    wait_for_idle(work)
+    assert [one.error for one in work.take()] == [error]
+    work.ask(False)
+    wait_for_idle(work)
+    assert [one.result for one in work.take()] == ["answer"]
+    assert work.close()
+
+
+def test_progress_names_paths_and_then_policies_in_their_order(spirit):
+    steps = []
+    for _ in judge_request(JudgeRequest(spirit), lambda *step: steps.append(step)):
+        steps.append("result")
+    paths = [(PATH, k, 5) for k in range(1, 6)]
+    policies = [(POLICY, k, 3) for k in range(1, 4)]
+    assert steps == [*paths, "result", *policies, "result"]
+
+
+def test_progress_is_seen_from_outside_while_the_work_runs(judge):
+    judge.ask(JudgeRequest(slow_scenario()))
+    seen = []
+
+    def watch():
+        progress = judge.progress
+        if progress is not None and (not seen or seen[-1] != progress.describe()):
+            seen.append(progress.describe())
+        return progress is None
+
+    wait_until(watch, "the end", 60.0)
+    named = [text for text in seen if text != "waiting"]
+    expected = [f"{PATH} {k} of 3" for k in (1, 2, 3)] + [f"{POLICY} {k} of 3" for k in (1, 2, 3)]
+    assert named == [text for text in expected if text in named]
+    assert set(expected[:3]) <= set(named)
+
+
+def test_work_that_runs_is_closed_soon():
+    work = BackgroundWork(judge_request, lambda: None, "closed while it runs")
+    work.ask(JudgeRequest(slow_scenario()))
+    wait_until(lambda: work.progress.what, "the work to begin")
+    began = time.monotonic()
+    assert work.close()
+    assert time.monotonic() - began < STOP_TIME
+    assert "closed while it runs" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_a_process_ends_although_work_runs_in_it():
+    code = (
+        "import time\n"
+        "from rover_planner.viewer.state.background_work import BackgroundWork\n"
+        "from rover_planner.viewer.state.judging import JudgeRequest, judge_request\n"
+        "from support.viewer_sessions import slow_scenario\n"
+        "work = BackgroundWork(judge_request, lambda: None)\n"
+        "work.ask(JudgeRequest(slow_scenario()))\n"
+        "while not work.progress.what: time.sleep(0.01)\n"
+        "time.sleep(0.3)\n"
+        "print('end', flush=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "end\n", "")
+
+
+# The session in the background.
+
+
+@pytest.fixture
+def session():
+    """A session on a ramp that judges in the background."""
+    made = session_on(ramp)
+    made.judge_in_background(lambda: None)
+    yield made
+    assert made.close()
+
+
+def finish(session: ViewSession) -> None:
+    wait_for_idle(session)
+    session.take_finished()
+
+
+def test_a_session_wants_at_once_and_shows_what_is_finished(session):
+    shown = session.shown
+    assert session.change_rover([("friction",)], 0.4)
+    assert session.wanted.rover.friction == 0.4 and session.is_outdated
+    assert session.rover == LSR1 and session.shown is shown
+    finish(session)
+    assert not session.is_outdated and session.rover.friction == 0.4
+    _, verdict = judge_path(session.rover, session.terrain, shown.candidate.poses)
+    assert session.shown.verdict.reason == verdict.reason != ""
+
+
+def test_changes_add_up_although_the_judgements_between_are_dropped(session):
+    session.plan_to(np.array([1.5, 0.5]))
+    session.change_rover([("friction",)], 0.5)
+    session.change_arm("arm_yaw", 0.3)
+    session.change_options(soil="dry_sand")
+    finish(session)
+    assert session.finished.scenario is session.finished.answered is session.wanted
+    assert session.goal[:2] == (1.5, 0.5) and session.rover.friction == 0.5
+    assert session.arm_angles == {"arm_yaw": 0.3} and session.options.soil == "dry_sand"
+    ends = session.start, session.goal
+    answer = answer_path_query(
+        session.rover, session.terrain, *ends, session.options, session.arm_angles
+    )
+    assert [c.verdict for c in session.candidates] == [c.verdict for c in answer.candidates]
+
+
+def test_a_cancelled_session_keeps_its_verdict_marked_old_and_judges_again(session):
+    shown = session.shown
+    session.change_rover([("friction",)], 0.4)
+    session.cancel()
+    session.take_finished()
+    assert session.shown is shown and session.is_outdated and session.is_stopped
+    assert session.plan_again() and not session.is_stopped
+    finish(session)
+    assert session.rover.friction == 0.4 and not session.is_outdated
+    assert not session.shown.verdict.traversable
+
+
+def test_a_value_that_is_refused_when_it_is_judged_is_not_wanted_any_more(session):
+    shown = session.shown
+    assert session.change_options(policy="best")
+    finish(session)
+    assert "policy" in session.refusal
+    assert session.shown is shown and not session.is_outdated
+
+
+def test_an_error_that_is_no_refusal_is_raised_where_it_is_taken(session):
+    session.change_options(map_sigmas="many")  # type: ignore[arg-type]
+    wait_for_idle(session)
+    with pytest.raises(ValueError, match="many"):
+        session.take_finished()
+    assert session.is_outdated and session.is_stopped
+
+
+def test_one_path_that_is_judged_again_does_not_bring_old_candidates_back(session):
+    session.change_rover([("friction",)], 0.5)
+    finish(session)
+    between = session.wanted
+    session.plan_again()
+    wait_for_idle(session)  # finished, and not taken when the next change is asked for
+    session.change_rover([("friction",)], 0.4)
+    finish(session)
+    assert session.finished.answered is between
+    assert session.finished.scenario is session.wanted
+
+
+def test_a_path_of_an_old_list_is_not_chosen_while_others_are_planned(session):
+    session.plan_to(np.array([1.5, 0.5]))
+    with pytest.raises(Exception, match="the listed paths are old"):
+        session.show_candidate(1)
+    finish(session)
+    assert session.show_candidate(1)
+    finish(session)
+    assert session.shown.index == 1
+
+
+def test_a_session_on_waves_is_right_after_a_storm_of_changes():
+    session = session_on(waves)
+    session.judge_in_background(lambda: None)
+    try:
+        for k in range(200):
+            session.change_rover([("friction",)], 0.3 + 0.001 * k)
+            if k % 7 == 0:
+                session.plan_again()
+            if k % 11 == 0:
+                session.take_finished()
+            time.sleep(0.002)
+        finish(session)
+        assert session.rover.friction == pytest.approx(0.499)
+        _, verdict = judge_path(session.rover, session.terrain, session.shown.candidate.poses)
+        assert session.shown.verdict.max_friction_utilisation == verdict.max_friction_utilisation
+    finally:
+        assert session.close()

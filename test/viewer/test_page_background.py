@@ -1,0 +1,187 @@
+"""The page in a real browser: alive while it judges, right after sliders are dragged."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from rover_physics.terrain.grid import load_terrain
+from rover_physics.traversability.judge_path import judge_path
+from rover_planner.command.view import choose_ends
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.state.session import ViewSession
+from support.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
+from support.grounds import make_terrain
+from support.viewer_sessions import (
+    GOAL,
+    LSR1,
+    START,
+    lowered_reef,
+    ramp,
+    slow_options,
+    tolerant_rover,
+)
+
+pytestmark = [needs_browser, pytest.mark.slow]
+
+FRICTION = "friction [-]"
+MAX_PAUSE = 1.0
+"""Longest pause of the playback [s]; without the judgement in its way it is 0.1 s."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def slow_page() -> Iterator[Page]:
+    """A page on a reef that needs seconds for each change."""
+    session = ViewSession(tolerant_rover(), lowered_reef(), START, GOAL, slow_options(2, 1e-4))
+    page = Page(session, port=0)
+    yield page
+    page.close()
+
+
+@pytest.fixture(scope="module")
+def opened(slow_page, browser) -> Visitor:
+    return Visitor(browser, slow_page.url)
+
+
+@pytest.fixture
+def visitor(opened, slow_page) -> Visitor:
+    """A visitor of a page that is up to date, with the tab of the rover."""
+    slow_page.requests.add(slow_page._judge_again)
+    wait_for_rest(slow_page)
+    opened.open_tab("Rover")
+    return opened
+
+
+def wait_for_rest(page: Page) -> None:
+    """Wait until everything that is wanted is judged and shown."""
+    session = page.session
+
+    def at_rest() -> bool:
+        done = session.finished.answered is session.finished.scenario is session.wanted
+        return done and not page.is_busy and page._changed_at is None
+
+    wait_until(lambda: at_rest() or session.refusal, "all judgements")
+
+
+def longest_pause(page: Page, until) -> float:
+    """Return the longest time for which the playback stood still before a condition held [s]."""
+    longest, last, moved_at = 0.0, page.playback.time, time.monotonic()
+
+    def watch() -> bool:
+        nonlocal longest, last, moved_at
+        now = time.monotonic()
+        if page.playback.time != last:
+            last, moved_at = page.playback.time, now
+        longest = max(longest, now - moved_at)
+        return until()
+
+    wait_until(watch, "the condition")
+    return longest
+
+
+def test_while_a_change_is_judged_the_page_says_so_and_the_rover_drives_on(visitor, slow_page):
+    session = slow_page.session
+    before, shown = session.wanted, session.shown
+    slow_page.playback.speed = 1.0
+    slow_page.requests.add(slow_page.playback.play)
+    visitor.set_slider(FRICTION, "1.9")
+    visitor.tab.wait_for_selector("#judging")
+    assert "judging" in visitor.text("#judging")
+    assert session.wanted is not before and session.progress is not None
+    pause = longest_pause(slow_page, lambda: session.progress is None)
+    assert session.rover.friction == 1.9 and session.shown is not shown
+    assert pause < MAX_PAUSE
+    slow_page.requests.add(slow_page.playback.pause)
+    visitor.tab.wait_for_selector("#judging", state="hidden")
+
+
+def test_the_old_verdict_is_greyed_until_the_new_one_is_there(visitor, slow_page):
+    visitor.set_slider(FRICTION, "1.8")
+    visitor.tab.locator("#old:visible").wait_for()
+    assert "old values: judging" in visitor.text("#verdict:visible")
+    assert slow_page.scene.paths._old == set(range(len(slow_page.session.candidates)))
+    wait_for_rest(slow_page)
+    visitor.tab.locator("#old").first.wait_for(state="detached")
+    assert slow_page.scene.paths._old == set()
+
+
+def test_camera_and_second_visitor_are_served_while_a_change_is_judged(
+    visitor, slow_page, browser
+):
+    second = Visitor(browser, slow_page.url)
+    visitor.set_slider(FRICTION, "1.7")
+    second.wait_for("judging")
+    visitor.wait_for("judging")
+    picture = visitor.picture()
+    visitor.tab.mouse.move(600, 420)
+    visitor.tab.mouse.down()
+    visitor.tab.mouse.move(700, 420, steps=4)
+    visitor.tab.mouse.up()
+    wait_until(lambda: visitor.picture() != picture, "the camera to turn")
+    wait_for_rest(slow_page)
+    second.tab.wait_for_selector("#judging", state="hidden")
+    assert second.page_errors == visitor.page_errors == []
+    second.tab.close()
+
+
+def test_a_cancelled_judgement_leaves_the_old_verdict_and_can_be_begun_again(visitor, slow_page):
+    session = slow_page.session
+    friction, shown = session.rover.friction, session.shown
+    visitor.set_slider(FRICTION, "1.6")
+    visitor.press("Cancel")
+    wait_until(lambda: session.is_stopped, "the end of the work")
+    visitor.wait_for("Judge again")
+    if session.is_outdated:  # else it was so late that the path itself had been judged
+        assert session.rover.friction == friction and session.shown is shown
+        visitor.wait_for("old values: the judgement was stopped")
+    assert visitor.slider_value(FRICTION) == session.wanted.rover.friction == 1.6
+    visitor.press("Judge again")
+    wait_for_rest(slow_page)
+    assert session.rover.friction == 1.6
+    visitor.tab.locator("#old").first.wait_for(state="detached")
+
+
+def reef_page() -> ViewSession:
+    return ViewSession(LSR1, lowered_reef(), START, GOAL)
+
+
+def spirit_page() -> ViewSession:
+    ground = load_terrain("spirit").fill_gaps(0.2)
+    return ViewSession(LSR1, ground, *choose_ends(LSR1, ground))
+
+
+def ramp_page() -> ViewSession:
+    return ViewSession(LSR1, make_terrain(ramp), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("make_session", [ramp_page, spirit_page, reef_page])
+def test_sliders_dragged_to_both_ends_leave_the_page_alive_and_right(make_session, browser):
+    session = make_session()
+    page = Page(session, port=0)
+    try:
+        visitor = Visitor(browser, page.url)
+        visitor.open_tab("Rover")
+        for label in (FRICTION, "front wheel x [m]"):
+            for end in (0.0, 1.0, 0.0):
+                visitor.drag_slider(label, end)
+                wait_for_rest(page)
+                poses, options = session.shown.candidate.poses, session.sweep_options()
+                _, verdict = judge_path(session.rover, session.terrain, poses, options)
+                assert session.shown.verdict.traversable == verdict.traversable
+                assert session.shown.verdict.reason == verdict.reason
+                word = "not traversable" if verdict.reason else "traversable"
+                wait_until(lambda word=word: visitor.text("#verdict:visible").startswith(word),
+                           "the verdict")  # fmt: skip
+            if label == FRICTION:
+                assert visitor.slider_value(label) == session.rover.friction == 0.16
+        assert not page.errors.messages and visitor.page_errors == []
+    finally:
+        page.close()
