@@ -6,6 +6,7 @@ import typer
 
 from rover_planner.command.demo import demo
 from rover_planner.command.figure4 import figure4
+from rover_planner.command.plan import plan, replay_plan
 from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
 from rover_planner.command.study import study
@@ -26,6 +27,8 @@ NEGATIVE_ARGUMENTS = {"ignore_unknown_options": True}
 """Makes typer accept negative numbers as arguments; options accept them anyway."""
 
 app.command()(predict)
+app.command()(plan)
+app.command()(replay_plan)
 app.command(context_settings=NEGATIVE_ARGUMENTS)(reach)
 app.command()(study)
 app.command()(view)

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -19,9 +18,9 @@ class WayQuestion:
     """The rover."""
     terrain: Terrain
     """The ground, map frame."""
-    start: NDArray[np.float64]
+    start: ArrayLike
     """(3,) x, y [m] and yaw [rad] of the body origin, map frame."""
-    goal: NDArray[np.float64]
+    goal: ArrayLike
     """(3,) as `start`."""
     options: PathQueryOptions
     """How paths are judged."""

@@ -46,7 +46,7 @@ def smooth(
 def _replace(judge: Judge, old: list[Stretch], radius: float) -> Stretch | None:
     """Return one curve driven forwards that costs less than some stretches; None if none does."""
     start, end = old[0].poses[0], old[-1].poses[-1]
-    spacing = max(float(np.hypot(*np.diff(one.poses[:, :2], axis=0).T).max()) for one in old)
+    spacing = judge.options.waypoint_spacing
     cost = sum(one.cost for one in old) * (1.0 - GAIN)
     for scale in RADII:
         poses = np.column_stack(dubins_paths(start, end, scale * radius, spacing, 1)[0])

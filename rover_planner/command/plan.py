@@ -1,0 +1,152 @@
+"""The commands `rover_planner plan` and `replay-plan`: search a way between two poses."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rover_planner.command.options import (
+    MAX_CELLS,
+    Friction,
+    MaxCells,
+    MaxTorque,
+    Payload,
+    Policy,
+    RoverName,
+    SoilName,
+    TerrainName,
+)
+from rover_planner.errors import PlanningError
+
+if TYPE_CHECKING:
+    from rover_planner.planning.ways.question import WayQuestion
+    from rover_planner.planning.ways.way_search import LatticeSettings
+
+Out = Annotated[
+    Path,
+    typer.Argument(metavar="OUT", help="The way with its predictions, .npz; written if found."),
+]
+Picture = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Draw the answer on the map (.png, .svg).")
+]
+
+
+def plan(
+    rover: RoverName,
+    terrain: TerrainName,
+    out: Out,
+    start: Annotated[
+        str, typer.Option(metavar="X,Y,YAW", help="Start of the body in m and rad, map frame.")
+    ],
+    goal: Annotated[
+        str, typer.Option(metavar="X,Y,YAW", help="Goal of the body in m and rad, map frame.")
+    ],
+    policy: Policy = "equal",
+    friction: Friction = None,
+    max_torque: MaxTorque = None,
+    soil: SoilName = None,
+    payload: Payload = None,
+    budget: Annotated[float, typer.Option(metavar="S", help="Time for the search in s.")] = 2.0,
+    cell: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", help="Distance of the lattice's nodes in m; a quarter of the wheelbase."
+        ),
+    ] = None,
+    sigmas: Annotated[
+        float,
+        typer.Option(
+            metavar="K",
+            help="Standard deviations to allow for where the map has elevation_std; 0: none.",
+        ),
+    ] = 3.0,
+    picture: Picture = None,
+    dump: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the question for replay-plan, .npz."),
+    ] = None,
+    max_cells: MaxCells = MAX_CELLS,
+) -> None:
+    """Search a way around obstacles; write it with its predictions, and print a report as JSON.
+
+    Exit code 0: it ran, with any answer. 2: bad input.
+    """
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.terrain.grid import load_terrain
+    from rover_planner.planning.path_query import PathQueryOptions
+    from rover_planner.planning.ways.question import WayQuestion
+    from rover_planner.planning.ways.question_file import write_question
+    from rover_planner.planning.ways.way_search import LatticeSettings
+
+    settings = LatticeSettings(budget=budget, cell=cell)
+    question = WayQuestion(
+        load_rover(rover),
+        load_terrain(terrain, max_cells),
+        _read_pose("start", start),
+        _read_pose("goal", goal),
+        PathQueryOptions(
+            policy=policy,
+            control_margin=0.0,
+            friction=friction,
+            max_torque=max_torque,
+            soil=soil,
+            payload=payload,
+            map_sigmas=sigmas,
+        ),
+    )
+    if dump is not None:
+        write_question(dump, question, settings)
+    _ask(question, settings, out, picture)
+
+
+def replay_plan(
+    question: Annotated[
+        Path, typer.Argument(metavar="QUESTION", help="Question that plan --dump has written.")
+    ],
+    out: Out,
+    picture: Picture = None,
+    max_cells: MaxCells = MAX_CELLS,
+) -> None:
+    """Search the way of a question again that `plan --dump` or the server has written."""
+    from rover_planner.planning.ways.question_file import read_question
+
+    asked, settings = read_question(question, max_cells)
+    _ask(asked, settings, out, picture)
+
+
+def _ask(
+    question: "WayQuestion", settings: "LatticeSettings", out: Path, picture: Path | None
+) -> None:
+    """Search the way, write it and print the report."""
+    from rover_planner.command.prediction_files import write_prediction
+    from rover_planner.planning.ways.way_report import report_way
+    from rover_planner.planning.ways.way_search import find_way
+    from rover_planner.progress import show_progress
+
+    with show_progress() as progress:
+        progress(f"search a way for {question.rover.name} (the first run compiles the model)")
+        answer = find_way(question, settings)
+    if answer.path is not None:
+        on_soil = question.options.soil is not None or bool(question.terrain.soil_names)
+        write_prediction(out, answer.path.prediction, answer.path.verdict, on_soil=on_soil)
+    if picture is not None:
+        from rover_planner.figures.way_picture import draw_way
+
+        draw_way(picture, question, answer)
+    typer.echo(json.dumps(report_way(question.rover, answer), allow_nan=False))
+
+
+def _read_pose(name: str, text: str) -> tuple[float, float, float]:
+    """Return the pose of an option.
+
+    Raises:
+        PlanningError: It is not three numbers.
+    """
+    try:
+        x, y, yaw = map(float, text.split(","))
+    except ValueError:
+        raise PlanningError(
+            f"--{name} is {text!r}; it must be three numbers with commas: x,y,yaw"
+        ) from None
+    return x, y, yaw

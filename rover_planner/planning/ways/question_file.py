@@ -1,0 +1,88 @@
+"""Files that hold a question for a way with its map, so that it can be asked again elsewhere."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rover_physics.errors import RoverFileError
+from rover_physics.files.npz_file import open_npz
+from rover_physics.files.validation import errors_of, read_as
+from rover_physics.rover.rover_file import rover_from_dict
+from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
+from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.ways.question import WayQuestion
+from rover_planner.planning.ways.way_search import LatticeSettings
+
+_ENTRY, _MOST = "way_question", 1_000_000
+
+
+def write_question(path: Path, question: WayQuestion, settings: LatticeSettings) -> None:
+    """Write a question to a terrain file (.npz) with one more entry; an old file is replaced.
+
+    Raises:
+        TerrainError: The file cannot be written.
+    """
+    text = json.dumps(
+        {
+            "rover": asdict(question.rover),
+            "start": np.asarray(question.start).tolist(),
+            "goal": np.asarray(question.goal).tolist(),
+            "options": asdict(question.options),
+            "joint_angles": None if question.joint_angles is None else dict(question.joint_angles),
+            "settings": asdict(settings),
+        }
+    )
+    save_terrain(path, question.terrain, **{_ENTRY: text})
+
+
+def read_question(path: Path, max_cells: int = MAX_CELLS) -> tuple[WayQuestion, LatticeSettings]:
+    """Read a question that `write_question` has written.
+
+    Args:
+        path: The file.
+        max_cells: Largest terrain [cells].
+
+    Raises:
+        TerrainError: The terrain in the file is none, or too large.
+        PlanningError: The file holds no question.
+        RoverError: Something in the question is not what it should be.
+    """
+    terrain = load_terrain(path, max_cells)
+    try:
+        with errors_of(path), open_npz(path) as file:
+            content = json.loads(str(file.read(_ENTRY, most=_MOST)))
+    except (RoverFileError, json.JSONDecodeError) as error:
+        raise PlanningError(f"{path} holds no question for a way: {error}") from None
+    with errors_of(path):
+        asked = _Content(content)
+        question = WayQuestion(
+            rover=rover_from_dict(asked.take("rover"), str(path)),
+            terrain=terrain,
+            start=np.array(asked.take("start"), float),
+            goal=np.array(asked.take("goal"), float),
+            options=read_as(PathQueryOptions, asked.take("options"), "the options of a question"),
+            joint_angles=asked.take("joint_angles"),
+        )
+        return question, read_as(LatticeSettings, asked.take("settings"), "the settings")
+
+
+class _Content:
+    """The entries of a question by name."""
+
+    def __init__(self, content: Any):
+        self._content = content
+
+    def take(self, name: str) -> Any:
+        """Return an entry.
+
+        Raises:
+            PlanningError: It is missing.
+        """
+        if not isinstance(self._content, dict) or name not in self._content:
+            raise PlanningError(f"the question has no entry {name}")
+        return self._content[name]
