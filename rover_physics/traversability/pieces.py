@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
+from rover_physics.names import EQUAL, SERVO
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
@@ -34,7 +35,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.turning import wheelbase
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.extremes import Extremes, extremes_of
 from rover_physics.traversability.first_failure import (
     SuspectLimits,
     find_suspects,
@@ -42,10 +42,16 @@ from rover_physics.traversability.first_failure import (
 )
 from rover_physics.traversability.judge_path import judge_paths
 from rover_physics.traversability.judge_poses import judge_results
+from rover_physics.traversability.risk import (
+    RiskLimits,
+    add_exposure,
+    find_exposure,
+    risk_limits_of,
+)
 from rover_physics.traversability.servo_checks import MAX_SLIDE, MAX_TURN_OFF
 
-NUMBERS = 7
-"""Numbers of a piece that passes: time, energy and the extremes."""
+NUMBERS = 3
+"""Numbers of a piece that passes: time, energy and exposure."""
 STRIDE = 8
 """Every so many waypoints of a piece are evaluated first, then the others."""
 
@@ -60,11 +66,8 @@ class PieceVerdict:
     """Time that it takes [s], NaN if it fails."""
     energy: float
     """Energy that it takes [J], NaN if it fails."""
-    extremes: Extremes
-    """How near it comes to the limits, NaN if it fails."""
-
-
-_NOTHING = Extremes(*[float("nan")] * 5)
+    exposure: float
+    """Exposure to the safety limits [s], see `find_exposure`; NaN if it fails."""
 
 
 @quiet
@@ -95,7 +98,7 @@ def judge_pieces(
     sweep = _Sweep(rover, terrain, pieces, options)
     verdicts: list[PieceVerdict | None] = [None] * len(pieces)
     for k, code in sweep.find_failures().items():
-        verdicts[k] = PieceVerdict(code, np.nan, np.nan, _NOTHING)
+        verdicts[k] = PieceVerdict(code, np.nan, np.nan, np.nan)
     if terrain.elevation_std is None or not sigmas:
         for k, passed in sweep.find_passes().items():
             verdicts[k] = passed
@@ -112,9 +115,9 @@ def judge_pieces(
     for k, (prediction, verdict) in zip(rest, judged, strict=True):
         if verdict.traversable:
             time, energy = float(prediction.time[-1]), float(prediction.energy[-1])
-            verdicts[k] = PieceVerdict("", time, energy, extremes_of(verdict))
+            verdicts[k] = PieceVerdict("", time, energy, find_exposure(rover, prediction))
         else:
-            verdicts[k] = PieceVerdict(verdict.code, np.nan, np.nan, _NOTHING)
+            verdicts[k] = PieceVerdict(verdict.code, np.nan, np.nan, np.nan)
     return [verdict for verdict in verdicts if verdict is not None]
 
 
@@ -129,6 +132,8 @@ class _Ease(NamedTuple):
     """Largest turn off the path [rad]."""
     most_slide: float
     """Largest way off the path [m]."""
+    risk: RiskLimits
+    """Limits that count as risk."""
 
 
 class _Sweep:
@@ -199,10 +204,8 @@ class _Sweep:
         size = wheels.reach, linkage.steering_rate
         sum_up_pieces(path, turns, ease, size, numbers)
         numbers[np.searchsorted(ends, jumps[:, 0], side="right"), 0] = np.nan
-        if self._model.settings.policy == TorquePolicy.SERVO:
-            numbers[:, 2:4] = 0.0  # as `extremes_of`
         return {
-            k: PieceVerdict("", row[0], row[1], Extremes(*row[2:]))
+            k: PieceVerdict("", *row)
             for k, row in zip(indices.tolist(), numbers.tolist(), strict=True)
             if row[0] == row[0]
         }
@@ -215,6 +218,7 @@ class _Sweep:
             -MIN_ANGLE if on_servos else -FACE,
             MAX_TURN_OFF if on_servos else np.inf,
             MAX_SLIDE * wheelbase(self._rover) if on_servos else np.inf,
+            risk_limits_of(self._rover, SERVO if on_servos else EQUAL),
         )
 
 
@@ -237,7 +241,7 @@ def sum_up_pieces(path, turns, ease, size, numbers):
         ease: _Ease.
         size: Distance of the outermost wheel from the body origin [m], and the largest speed of
             the steering [rad/s].
-        numbers: (k, NUMBERS) time [s], energy [J] and Extremes, written for pieces that pass.
+        numbers: (k, NUMBERS) time [s], energy [J] and exposure [s], written for pieces that pass.
     """
     (poses, results, ends, sums), (turned, turned_ends) = path, turns
     reach, rate = size
@@ -249,12 +253,9 @@ def sum_up_pieces(path, turns, ease, size, numbers):
             continue
         if not _keeps_to_path(poses[piece], results[piece], ease, reach):
             continue
-        numbers[k, 2:] = 0.0
-        numbers[k, 5], numbers[k, 6] = np.inf, np.nan
-        _find_extremes(results[piece], numbers[k, 2:])
-        _find_extremes(turned[its_turns], numbers[k, 2:])
         last = add_up(poses[piece], results[piece], rate, (0.0, 0.0, 0.0), sums[:, piece])
         numbers[k, 0], numbers[k, 1] = last[1], last[2]
+        numbers[k, 2] = add_exposure(results[piece], sums[1, piece], ease.risk)
 
 
 @exact_kernel
@@ -286,18 +287,3 @@ def _keeps_to_path(poses, results, ease, reach):
                 turn += share * abs(rate)
                 slide += share * np.hypot(x, y)
     return turn <= ease.most_turn and slide <= ease.most_slide
-
-
-@exact_kernel
-def _find_extremes(results, extremes):
-    """Widen Extremes (5,) by those of RESULTs."""
-    for row in range(results.size):
-        result = results[row]
-        for wheel in range(6):
-            extremes[0] = max(extremes[0], result.friction_utilisation[wheel])
-            extremes[1] = max(extremes[1], result.torque_saturation[wheel])
-        upright = np.cos(result.q[1]) * np.cos(result.q[2])
-        extremes[2] = max(extremes[2], np.arccos(min(max(upright, -1.0), 1.0)))
-        extremes[3] = min(extremes[3], result.tip_over_ratio)
-        if result.belly_clearance < extremes[4] or extremes[4] != extremes[4]:
-            extremes[4] = result.belly_clearance

@@ -14,8 +14,8 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.extremes import extremes_of, used_share
 from rover_physics.traversability.judge_path import judge_path, judge_paths
+from rover_physics.traversability.risk import used_share
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.planning.candidates import generate_candidates, path_length
@@ -257,4 +257,4 @@ def path_cost(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> tup
 
 def path_risk(rover: Rover, verdict: Verdict) -> float:
     """Return the used share of the tightest safety limit of a judged path; 1 is at the limit."""
-    return used_share(rover, extremes_of(verdict))
+    return used_share(rover, verdict)

@@ -2,16 +2,16 @@
 
     cost = gear price x time x nominal speed
          + CLIMB x energy / weight
-         + RISK x length x ((risk - SAFE) / (1 - SAFE))^2 where risk > SAFE
+         + RISK x exposure x nominal speed
 
-Energy over weight is the height [m] to which the energy would lift the rover. Risk is the used
-share of the tightest safety limit on the piece, 1 at the limit.
+Energy over weight is the height [m] to which the energy would lift the rover. The exposure [s] is
+the time at the limits: each moment counts by the square of ((used share of the tightest safety
+limit) - 1/2) x 2, which is 0 up to half of a limit and 1 at it.
 """
 
 import math
 
 from rover_physics.rover.model import Rover
-from rover_physics.traversability.extremes import used_share
 from rover_physics.traversability.pieces import PieceVerdict
 from rover_planner.planning.lattice.primitives import Gear, Primitive
 
@@ -21,8 +21,6 @@ CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""
 RISK = 2.0
 """Further cost of a metre at the limit, in metres of level ground."""
-SAFE = 0.5
-"""Used share of a limit up to which there is no risk."""
 
 
 def least_cost(primitive: Primitive) -> float:
@@ -34,7 +32,5 @@ def true_cost(rover: Rover, gear: Gear, piece: PieceVerdict) -> float:
     """Return the cost [m] of a piece of path, infinite if it fails."""
     if piece.code:
         return math.inf
-    driven = piece.time * rover.nominal_speed
-    excess = max(0.0, used_share(rover, piece.extremes) - SAFE) / (1.0 - SAFE)
-    cost = PRICES[gear] * driven + CLIMB * max(0.0, piece.energy) / rover.weight
-    return cost + RISK * driven * min(excess, 1.0) ** 2
+    speed, climb = rover.nominal_speed, max(0.0, piece.energy) / rover.weight
+    return PRICES[gear] * piece.time * speed + CLIMB * climb + RISK * piece.exposure * speed
