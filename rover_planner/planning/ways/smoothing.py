@@ -8,8 +8,8 @@ from rover_planner.planning.lattice.judge import Judge
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.lattice.search import Stretch
 
-LONGEST = 64
-"""Largest number of pieces that one curve replaces."""
+SPANS = (4, 8, 16, 8, 4, 3, 2)
+"""Numbers of pieces that one curve replaces, one pass over the way after the other."""
 RADII = (2.0, 1.0)
 """Radii of the curves that are tried [tightest radii of the rover]."""
 GAIN = 1e-3
@@ -28,8 +28,7 @@ def smooth(
         most_poses: Number of poses that the model may be asked about.
     """
     allowed = judge.poses + most_poses
-    span = min(LONGEST, len(stretches))
-    while span > 1:
+    for span in SPANS:
         first = 0
         while first + span <= len(stretches) and judge.poses < allowed:
             check_interruption()
@@ -39,7 +38,6 @@ def smooth(
                 first += 1
             else:
                 first += max(1, span // 2)
-        span = (span + 1) // 2 if span > 2 else 1
     return stretches
 
 

@@ -68,8 +68,8 @@ class WayAnswer:
     cost: float
     """Its cost [m of level ground]; infinite without a way."""
     bound: float
-    """How much more it costs, at most, than the best path of the lattice, as a factor; infinite
-    if that is not known."""
+    """How much more it cost before smoothing, at most, than the best path of the lattice, as a
+    factor; infinite if that is not known."""
     expanded: int
     """Number of expanded nodes."""
     edges_judged: int
@@ -143,7 +143,7 @@ class _WaySearch:
         self._try_directly(search)
         progress = search.run(self._allowed)
         if progress.best is not None:
-            return self._answer(FOUND, "", search, best=self._smooth(search))
+            return self._answer(FOUND, "", search, way=self._smooth(search))
         if not progress.exhausted:
             budget = self._settings.budget
             reason = f"no way was found within the budget of {budget:g} s; there may be one"
@@ -193,8 +193,8 @@ class _WaySearch:
         self._repeatable &= in_time
         return in_time
 
-    def _smooth(self, search: LatticeSearch) -> Candidate:
-        """Return the smoothed path, or the path itself where the smoothed one does not pass."""
+    def _smooth(self, search: LatticeSearch) -> tuple[Candidate, float]:
+        """Return the smoothed path, or the path itself where that does not pass, and its cost."""
         best, budget = search.progress.best, self._settings.budget
         assert best is not None
         spent = time.perf_counter() - self._began
@@ -202,28 +202,29 @@ class _WaySearch:
         most = round(share * budget * POSES_PER_SECOND)
         radius = tightest_radius(self._question.rover)
         stretches = smooth(self._judge, search.progress.stretches, radius, most)
-        if len(stretches) == len(search.progress.stretches):
-            return best
         poses, _ = join_pieces([one.poses for one in stretches])
         smoothed = self._judge.check(poses)
-        return smoothed if smoothed.verdict.traversable else best
+        if not smoothed.verdict.traversable:
+            return best, search.progress.cost
+        return smoothed, sum(one.cost for one in stretches)
 
     def _answer(
         self,
         outcome: str,
         reason: str,
         search: LatticeSearch | None = None,
-        best: Candidate | None = None,
+        way: tuple[Candidate | None, float] = (None, math.inf),
         closed: ClosedArea | None = None,
     ) -> WayAnswer:
         progress = Progress() if search is None else search.progress
-        bound = progress.cost / progress.bound if progress.bound > 0.0 else math.inf
+        known = progress.best is not None and progress.bound > 0.0
+        bound = progress.cost / progress.bound if known else math.inf
         return WayAnswer(
             outcome=outcome,
             reason=reason,
-            path=best,
-            cost=progress.cost,
-            bound=bound if best is not None else math.inf,
+            path=way[0],
+            cost=way[1],
+            bound=bound,
             expanded=0 if search is None else search.shortest.expanded,
             edges_judged=0 if search is None else search.judged,
             edges=0 if search is None else search.known.edges.count,
