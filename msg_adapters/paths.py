@@ -114,18 +114,28 @@ def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
     )
 
 
+STANDING = 1e-6
+"""Step [m] below which a path stands still, such as in a turn on the spot."""
+TURN_SPACING = 0.3
+"""Turn [rad] between chosen poses of a turn on the spot."""
+
+
 def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArray[np.intp]:
     """Choose poses about `spacing` [m] apart along a path, including the first and the last.
 
+    Poses where the rover changes between forwards and backwards, or begins or ends a turn on the
+    spot, are chosen too, and some in the turn: between chosen poses the heading is interpolated.
+
     Args:
-        poses: (n, 2) or wider; columns 0 and 1 are x and y [m].
+        poses: (n, 3) or wider; x, y [m] and yaw [rad].
         spacing: Distance between chosen poses [m]; 0 keeps all.
         always: Indices of other poses that are chosen in any case.
 
     Returns:
         (m,) ascending indices of the chosen poses.
     """
-    xy = np.asarray(poses, dtype=np.float64)[:, :2]
+    values = np.asarray(poses, dtype=np.float64)
+    xy = values[:, :2]
     if len(xy) <= 2 or spacing <= 0.0:
         return np.arange(len(xy))
     steps = np.hypot(*np.diff(xy, axis=0).T)
@@ -134,7 +144,21 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     marks = np.arange(0.0, travelled[-1], spacing)
     chosen = np.searchsorted(travelled, marks - 1e-9 * spacing)
     ends = [0, len(xy) - 1]
-    return np.unique(np.concatenate([ends, chosen, np.asarray(always, np.intp)])).astype(np.intp)
+    others = np.concatenate([_find_corners(values), np.asarray(always, np.intp)])
+    return np.unique(np.concatenate([ends, chosen, others])).astype(np.intp)
+
+
+def _find_corners(poses: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the indices of poses (n, 3) between which the heading may not be interpolated."""
+    steps = np.diff(poses[:, :3], axis=0)
+    yaw = poses[:-1, 2]
+    ahead = np.sign(steps[:, 0] * np.cos(yaw) + steps[:, 1] * np.sin(yaw))
+    stands = np.hypot(steps[:, 0], steps[:, 1]) < STANDING
+    gear = np.where(stands, 0.0, ahead)
+    turn = np.where(stands, np.abs(np.arctan2(np.sin(steps[:, 2]), np.cos(steps[:, 2]))), 0.0)
+    marks = np.floor(np.cumsum(turn) / TURN_SPACING)
+    changes = (np.diff(gear) != 0.0) | (np.diff(marks) != 0.0)
+    return np.flatnonzero(changes) + 1
 
 
 class PoseStock:

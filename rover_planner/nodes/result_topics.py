@@ -7,7 +7,7 @@ from functools import cached_property, partial
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import Path
+from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -17,6 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
+from msg_adapters.results.closed_areas import area_to_grid, empty_area
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import (
     MEASURES,
@@ -55,6 +56,7 @@ _KINDS = {
     "predicted_joints": JointTrajectory,
     "verdict": DiagnosticArray,
     "markers": MarkerArray,
+    "closed_area": OccupancyGrid,
 }
 """Topics in the order of publication, and their message types."""
 
@@ -177,6 +179,8 @@ class _Results:
             return self.plan()
         if topic == "verdict":
             return self._verdict()
+        if topic == "closed_area":
+            return self._closed_area()
         if self.judgement.candidate is None:
             return self._nothing(topic)
         return self._prediction(topic)
@@ -192,6 +196,15 @@ class _Results:
 
     def _verdict(self) -> DiagnosticArray:
         return verdict_to_diagnostics(self.report, self.rover.name, self.frame, self.stamp)
+
+    def _closed_area(self) -> OccupancyGrid:
+        """Return the area that start or goal are closed in; without places if they are not."""
+        way = self.judgement.way
+        if way is None or way.closed is None:
+            return empty_area(self.frame, self.stamp)
+        cell, (column, row) = way.nodes.cell, way.nodes.first
+        first = cell * column, cell * row
+        return area_to_grid(way.closed.places, cell, first, self.frame, self.stamp)
 
     def _nothing(self, topic: str) -> object:
         """Return the empty message that is published if no path was judged."""

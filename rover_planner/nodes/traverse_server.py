@@ -36,6 +36,7 @@ from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
+from rover_planner.nodes.warm_up import WAYS
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
@@ -73,7 +74,7 @@ class TraverseServer(Node):
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
-        self._behind = load_kernels(EXACT, UNCERTAIN, self.get_logger().info)
+        self._behind = load_kernels(EXACT, (*WAYS, *UNCERTAIN), self.get_logger().info)
         warn_of_disk(self.get_logger())
         self._values = declare_parameters(self, TraverseServerParameters)
         self._service = TraverseService(load_service_settings(self._values))

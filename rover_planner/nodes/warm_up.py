@@ -4,18 +4,24 @@ import numpy as np
 
 from rover_physics.compilation import Step
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.warm_up import EXACT, SCORES, UNCERTAIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.ways.question import WayQuestion
+from rover_planner.planning.ways.way_search import LatticeSettings, find_way
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
 CANDIDATES = (Step("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
 """All that candidates of a question need."""
+WAYS = (Step("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
+"""All that searches around obstacles need."""
 TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
 """All that updates of the traction controller need."""
-GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES))
+GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES), WAYS)
 """All kernels; groups have hardly any in common."""
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
@@ -24,6 +30,16 @@ JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 def plan_candidates() -> None:
     """Generate the candidates of a question."""
     generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+
+
+def search_ways() -> None:
+    """Search a way where a wall leaves none."""
+    elevation = np.zeros((60, 60))
+    elevation[:, 30] = 1.0
+    ground = Terrain(elevation, 0.05, (0.0, 0.0))
+    ends = (0.7, 1.5, 0.0), (2.3, 1.5, 0.0)
+    question = WayQuestion(load_rover("lsr1"), ground, *ends, PathQueryOptions())
+    find_way(question, LatticeSettings(budget=60.0))
 
 
 def control_traction() -> None:

@@ -22,6 +22,8 @@ MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
 """Values of the parameter unknown_cells."""
+FAN, LATTICE, AUTO = "fan", "lattice", "auto"
+"""Values of the parameter planner."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,21 @@ class TraverseServerParameters(ParameterTable):
     )
     waypoint_spacing: float = parameter(
         0.02, "Largest distance between judged waypoints.", unit="m", bounds=(0.001, 1.0)
+    )
+    planner: str = parameter(
+        AUTO,
+        "How ~/can_traverse finds a path: candidate curves (fan), a search around obstacles "
+        "(lattice), or the search where all candidates are refused (auto).",
+        choices=(FAN, LATTICE, AUTO),
+    )
+    search_budget: float = parameter(
+        2.0, "Time for a search around obstacles.", unit="s", bounds=(0.05, 600.0)
+    )
+    lattice_cell: float = parameter(
+        0.0,
+        "Distance of the places that the search connects; 0 is a quarter of the wheelbase.",
+        unit="m",
+        bounds=(0.0, 10.0),
     )
     plan_spacing: float = parameter(
         0.1,

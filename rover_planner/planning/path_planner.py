@@ -46,6 +46,14 @@ class PathSearch:
         return float(np.hypot(*(self.goal - self.asked_goal)[:2]))
 
 
+def add_way(search: PathSearch | None, way: Candidate, goal: Pose) -> PathSearch:
+    """Return the search with a traversable way as the chosen one, after its own candidates."""
+    candidates = (way,) if search is None else (*search.answer.candidates, way)
+    last = len(candidates) - 1
+    tried = 0 if search is None else search.alternatives_tried
+    return PathSearch(PathAnswer(candidates, last, last), goal, goal, tried)
+
+
 @dataclass(frozen=True, eq=False)
 class PathPlanner:
     """Finds, checks and classifies paths for one rover, map and arm configuration."""

@@ -14,6 +14,7 @@ from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.path_report import report_path
 from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
+from rover_planner.planning.ways.way_search import WayAnswer
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,8 @@ class Judgement:
     """Comparison with the measured suspension; None without measurements."""
     search: PathSearch | None = None
     """The search that found the path; None if the path was given."""
+    way: WayAnswer | None = None
+    """The search around obstacles; None if there was none."""
     judge_rest: Callable[[], "Judgement"] | None = None
     """Judges the waypoints beyond the first failure and returns the judgement with them; None if
     they are judged."""
@@ -70,10 +73,12 @@ class Judgement:
     def report(self) -> VerdictReport:
         """The full report of the request. Computed on first use, with the classes and the rest."""
         if self.judge_rest is not None:
-            return self.judge_rest().report
+            whole = self.judge_rest()
+            return replace(whole, code=self.code, reason=self.reason).report
         if self.candidate is None:
             return VerdictReport(False, self.code, self.reason)
-        return report_path(self.candidate, self.classes, self.suspension, self.search)
+        report = report_path(self.candidate, self.classes, self.suspension, self.search)
+        return replace(report, code=self.code, reason=self.reason)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

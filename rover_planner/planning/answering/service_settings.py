@@ -10,6 +10,7 @@ from rover_physics.terrain.soil_file import soil_named
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
 from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.worlds.map_file import MapLimits
 
 
@@ -25,6 +26,10 @@ class ServiceSettings:
     """Widest unknown region of a map that is interpolated [m]; 0 interpolates none."""
     suspension_tolerance: float
     """Largest allowed difference between measured and predicted suspension angles [rad]."""
+    planner: str
+    """FAN, LATTICE or AUTO."""
+    lattice: LatticeSettings
+    """How ways around obstacles are searched."""
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
 
@@ -71,5 +76,9 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
         ),
         largest_gap=parameters.max_gap if parameters.unknown_cells == INTERPOLATE else 0.0,
         suspension_tolerance=parameters.suspension_tolerance,
+        planner=parameters.planner,
+        lattice=LatticeSettings(
+            budget=parameters.search_budget, cell=parameters.lattice_cell or None
+        ),
         max_map_age=parameters.max_map_age,
     )

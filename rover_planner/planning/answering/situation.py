@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -11,14 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.suspension_check import compare_suspension
 from rover_planner.planning.path_geometry import densify
-from rover_planner.planning.path_planner import PathPlanner, PathSearch
+from rover_planner.planning.path_planner import PathPlanner, PathSearch, Pose, add_way
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.verdict_report import SuspensionReport
+from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.planning.ways.question import WayQuestion
+from rover_planner.planning.ways.way_search import GOAL_REFUSED, START_REFUSED, find_way
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 
@@ -57,6 +61,9 @@ class Situation:
     stale_map: str = ""
     """Why the map is too old to be used; empty if it is not."""
 
+    edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
+    """What earlier searches have found of the ground; grows with each search."""
+
     @property
     def terrain(self) -> Terrain | None:
         """The map to plan on; None if there is none."""
@@ -78,14 +85,43 @@ class Situation:
         if not (math.isfinite(tolerance) and tolerance >= 0.0):
             raise PlanningError(f"tolerance is {tolerance}; it must be a distance of at least 0 m")
 
-        def judge(planner: PathPlanner) -> Judgement:
-            search = planner.search(
-                np.asarray(start, np.float64), np.asarray(goal, np.float64), tolerance
-            )
-            suspension = self._compare_suspension(planner.predict_standing)
-            return _judgement(planner, search.answer.chosen, suspension, search)
+        refused = self.refuse_map()
+        if refused is not None:
+            return refused
+        ends = np.asarray(start, np.float64), np.asarray(goal, np.float64)
+        if self.settings.planner == LATTICE:
+            return self._search_way(ends, None)
+        planner = self._planner()
+        search = planner.search(*ends, tolerance)
+        suspension = self._compare_suspension(planner.predict_standing)
+        judged = _judgement(planner, search.answer.chosen, suspension, search)
+        if judged.traversable or self.settings.planner == FAN:
+            return judged
+        return self._search_way(ends, judged)
 
-        return self.refuse_map() or judge(self._planner())
+    def _search_way(self, ends: tuple[Pose, Pose], refused: Judgement | None) -> Judgement:
+        """Search a way around obstacles.
+
+        Args:
+            ends: Start and goal.
+            refused: The judgement on the candidates; None if none were tried.
+        """
+        planner = self._planner()
+        question = WayQuestion(
+            planner.rover, planner.terrain, *ends, planner.options, planner.joint_angles
+        )
+        answer = find_way(question, self.settings.lattice, self.edge_memory)
+        if answer.path is not None:
+            candidates = None if refused is None else refused.search
+            search = add_way(candidates, answer.path, ends[1])
+            suspension = self._compare_suspension(planner.predict_standing)
+            return replace(_judgement(planner, answer.path, suspension, search), way=answer)
+        if answer.outcome in (START_REFUSED, GOAL_REFUSED) and refused is not None:
+            return refused
+        if refused is None:
+            return replace(refusal(answer.outcome, answer.reason), way=answer)
+        reason = f"{answer.reason}; the best candidate: {refused.reason}"
+        return replace(refused, code=answer.outcome, reason=reason, way=answer)
 
     def check_path(self) -> Judgement:
         """Judge the last path.
@@ -160,5 +196,5 @@ def _judgement(
         partial(planner.classify, candidate),
         suspension,
         search,
-        None if candidate.is_complete else judge_rest,
+        judge_rest=None if candidate.is_complete else judge_rest,
     )

@@ -19,6 +19,7 @@ from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.situation import GivenPath, Situation
 from rover_planner.planning.candidates import generate_candidates
+from rover_planner.planning.ways.memory import EdgeMemory
 
 
 class TraverseService:
@@ -33,6 +34,7 @@ class TraverseService:
         self._map_lock = threading.Lock()
         self._path = GivenPath()
         self._measurements = Measurements()
+        self._edge_memory = EdgeMemory()
         # Compiles or loads the kernels, so that the first query is fast.
         generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
@@ -128,7 +130,11 @@ class TraverseService:
         now = time.monotonic()
         standing = self._measurements.pose_with_suspension(now)
         known = Situation(
-            self._settings, self._path, self._measurements.joints, measured_pose=standing
+            self._settings,
+            self._path,
+            self._measurements.joints,
+            measured_pose=standing,
+            edge_memory=self._edge_memory,
         )
         return self.add_map(known, ros_time)
 
