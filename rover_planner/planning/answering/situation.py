@@ -95,7 +95,8 @@ class Situation:
         search = planner.search(*ends, tolerance)
         suspension = self._compare_suspension(planner.predict_standing)
         judged = _judgement(planner, search.answer.chosen, suspension, search)
-        if judged.traversable or self.settings.planner == FAN:
+        are_on_map = all(planner.terrain.contains(*end[:2]) for end in ends)
+        if judged.traversable or self.settings.planner == FAN or not are_on_map:
             return judged
         return self._search_way(ends, judged)
 
