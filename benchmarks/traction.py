@@ -22,7 +22,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive, WheelAims
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.simulator.mujoco_rover import TIMESTEP, MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
@@ -152,14 +152,16 @@ def make_controller(
     return control
 
 
-def drive(obstacle: Obstacle, name: str, trace: list | None = None) -> Drive:
+def drive(
+    obstacle: Obstacle, name: str, trace: list | None = None, timestep: float = TIMESTEP
+) -> Drive:
     """Drive the rover lsr1 over an obstacle with a controller.
 
     If `trace` is given, each period appends a row to it: time [s], x [m], loads (6) [N],
     torques (6) [N m], peak utilisation.
     """
     rover, ground = replace(load_rover("lsr1"), nominal_speed=SPEED), make_ground(obstacle)
-    plant = MujocoRover(rover, ground, (START, 0.0, 0.0), obstacle.friction)
+    plant = MujocoRover(rover, ground, (START, 0.0, 0.0), obstacle.friction, timestep)
     control = make_controller(name, plant, obstacle, ground)
     sums, peaks = np.zeros(4), []
     while plant.time < MAX_DURATION_RATIO * (END - START) / SPEED and plant.pose[0] < END:
