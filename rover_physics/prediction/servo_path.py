@@ -73,7 +73,7 @@ def find_lift_heights(
         share = np.concatenate([results["speed_share"], crossings.results["speed_share"]])[order]
         rate = rates[order] / np.where(share > 0.0, share, 1.0)[:, None]
         way = _ways(wheels, np.concatenate([poses, crossings.poses])[order])
-        for k in range(1, len(order)):
+        for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             lifted = rate[k] > 0.0
             rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * way[k - 1]
             heights[order[k]] = np.where(lifted, heights[order[k - 1]] + rise, 0.0)

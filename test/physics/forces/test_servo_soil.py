@@ -336,3 +336,21 @@ def test_energy_and_time_on_soil_count_slip_and_droop():
     way = np.hypot(0.6, 0.6 * 0.05) / (1.0 - servo.slip_ratio[0])
     work = (servo.torque[0] / LSR1.wheel.radius * way).sum()
     assert servo.energy[-1] == pytest.approx(work, rel=0.02)
+
+
+@pytest.mark.parametrize("soil", SOFT)
+@pytest.mark.parametrize("curvature", [0.0, 0.7, np.inf])
+def test_on_rough_soil_servos_drive_wherever_equal_torques_suffice(soil, curvature):
+    found = []
+    for rover in (LSR1, M2020):
+        for ground in (fractal(3), smooth(4)):
+            poses = random_poses(3, 40, 0.8)
+            bends = np.full(40, curvature)
+            equal = sweep_poses(rover, ground, poses, bends, SweepOptions(soil=soil))
+            servo = sweep_poses(rover, ground, poses, bends, on(soil))
+            used = np.maximum(equal.friction_utilisation, equal.torque_saturation)
+            holds = equal.settled & (used <= 0.93).all(axis=1)
+            holds &= (equal.wheel_loads > 0.0).all(axis=1)
+            found.append((holds.sum(), (holds & ~(servo.speed_share > 0.0)).sum()))
+    held, refused = np.sum(found, axis=0)
+    assert held >= 20 and refused == 0
