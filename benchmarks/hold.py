@@ -2,8 +2,9 @@
 
 Run from the repository: python -m benchmarks.hold [--slope DEG] [--seconds S]
 It needs the extra `bench`. Its results are in docs/reliability.md. The rover rests, is enabled and
-climbs or descends at its nominal speed; then an input is lost or the command becomes zero. Torques
-reach the wheels two periods (40 ms) after the measurement.
+climbs or descends at its nominal speed, steered along the fall line by a path follower; then an
+input is lost or the command becomes zero, and the steering stays as it is. Torques reach the
+wheels two periods (40 ms) after the measurement.
 """
 
 import argparse
@@ -15,12 +16,14 @@ from rich.console import Console
 from rich.table import Table
 
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.parameters.traction_controller import (
     BRAKE,
     REST_POLICIES,
     TractionControllerParameters,
 )
 from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.supervisor import TractionSupervisor
 from support.rough_grounds import plane
@@ -30,6 +33,8 @@ PERIOD = 0.02
 DELAY = 2
 """Periods from a measurement to its torques at the wheels."""
 FRICTION = 0.8
+LOOK_AHEAD = 0.5
+"""Look-ahead distance of the path follower [m]."""
 SETTLING_TIME = 1.0
 """Time at rest before the rover is enabled [s]."""
 EVENT_TIME = SETTLING_TIME + 3.0
@@ -69,13 +74,18 @@ def rest_on_slope(rover_name: str, policy: str, event: str, slope: float, second
         rover=rover_name, rest_policy=policy, friction=FRICTION
     )
     supervisor = TractionSupervisor(load_traction_settings(parameters), False)
+    path = np.array([[0.0, 0.0, heading], [np.sign(slope) * ROVERS[rover_name], 0.0, heading]])
+    follower, steered = PathFollower(path, LOOK_AHEAD), SteeredDrive(rover)
     delayed = deque([supervisor.update(plant.time)] * DELAY)
     places = []
     while plant.time < EVENT_TIME + seconds:
         over = plant.time > EVENT_TIME
         if plant.time > SETTLING_TIME and not over:
             supervisor.permission.set_enabled(True)
-        _measure(supervisor, plant, event if over else "", rover.nominal_speed)
+        if not over:
+            asked = follower.steer(plant.pose[[0, 1, 3]], rover.nominal_speed)
+            plant.steer(steered.aim(*asked).angles)
+        _measure(supervisor, plant, event if over else "", asked)
         delayed.append(supervisor.update(plant.time))
         command = delayed.popleft()
         if policy == BRAKE and command.brake:
@@ -94,15 +104,17 @@ def rest_on_slope(rover_name: str, policy: str, event: str, slope: float, second
     )
 
 
-def _measure(supervisor: TractionSupervisor, plant: MujocoRover, event: str, speed: float) -> None:
-    """Give a supervisor what it measures after an event; empty: none."""
+def _measure(
+    supervisor: TractionSupervisor, plant: MujocoRover, event: str, asked: tuple[float, float]
+) -> None:
+    """Give a supervisor what it measures after an event (empty: none), and what is asked of it."""
     service, now = supervisor.service, plant.time
     if event != "wheel rates lost":
         service.take_joints(plant.joint_positions, plant.joint_velocities, now)
     if event != "imu lost":
         service.take_attitude(*plant.attitude, plant.body_rates, now)
     if event != "cmd_vel lost":
-        service.take_command(0.0 if event == "commanded to stop" else speed, 0.0, now)
+        service.take_command(*((0.0, 0.0) if event == "commanded to stop" else asked), now)
     if event == "emergency stop":
         supervisor.permission.take_emergency_stop(True)
 

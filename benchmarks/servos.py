@@ -26,13 +26,16 @@ from benchmarks.traction import (
     drive,
     make_ground,
 )
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.servo_path import add_up_rate
+from rover_physics.prediction.sweep import sweep_in_full
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from support.reference_drives import unlimited
 
 SPACING = 0.01
 """Distance of waypoints [m]."""
+TIMESTEP = 0.002
+"""Time step of MuJoCo [s]. With the usual 4 ms its wheels chatter on their contacts, and slip."""
 
 
 def predict(obstacle: Obstacle) -> dict[str, float]:
@@ -41,19 +44,20 @@ def predict(obstacle: Obstacle) -> dict[str, float]:
     x = np.linspace(START, END, round((END - START) / SPACING) + 1)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
     options = SweepOptions(policy="servo", friction=obstacle.friction)
-    found = sweep_path(rover, make_ground(obstacle), path, options)
-    duration = np.diff(found.time)
-    torque, slip = np.abs(found.torque).mean(axis=1), found.slip_speed.mean(axis=1)
+    swept = sweep_in_full(rover, make_ground(obstacle), [path], options)[0]
+    time = swept.prediction.time
+    slid = add_up_rate("slip_speed", time, swept.results, swept.crossings)[-1]
+    torque = add_up_rate("torque_saturation", time, swept.results, swept.crossings)[-1]
     return {
-        "energy": float(found.energy[-1]),
-        "slip": float((0.5 * (slip[1:] + slip[:-1]) * duration).sum()),
-        "torque": float((0.5 * (torque[1:] + torque[:-1]) * duration).sum() / duration.sum()),
+        "energy": float(swept.prediction.energy[-1]),
+        "slip": float(slid.mean()),
+        "torque": float(torque.mean() / time[-1] * rover.wheel.max_torque),
     }
 
 
 def compare(obstacle: Obstacle) -> dict:
     """Return what plant and model find on an obstacle."""
-    plant = drive(obstacle, DROOP_CONTROLLER)
+    plant = drive(obstacle, DROOP_CONTROLLER, timestep=TIMESTEP)
     return asdict(obstacle) | {"plant": asdict(plant), "model": predict(obstacle)}
 
 

@@ -18,11 +18,12 @@ from rich.progress import Progress
 from rich.table import Table
 
 from rover_physics.names import EQUAL, OPTIMAL
-from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steered_drive import SteeredDrive, WheelAims
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.simulator.mujoco_rover import TIMESTEP, MujocoRover
+from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 from support.reference_drives import drive_ground
@@ -34,6 +35,8 @@ SPEED = 0.06
 """Speed of the drives [m/s]: twice the rover's nominal speed, to halve the run time."""
 START, END = -1.2, 1.2
 """x of the body's origin at the start and at the end of a drive [m]."""
+LOOK_AHEAD = 0.5
+"""Look-ahead distance of the path follower that steers [m]."""
 MAX_DURATION_RATIO = 2.0
 """Time after which a rover counts as stuck, as a multiple of the time at SPEED."""
 MAX_TILT = 1.2
@@ -91,28 +94,56 @@ class Drive:
     """Mechanical work of the motors [J]; negative power counts as zero."""
 
 
-Controller = Callable[[MujocoRover], np.ndarray]
+class Steering:
+    """Follows the x axis: what a path follower commands, and what this asks of the wheels."""
+
+    def __init__(self, plant: MujocoRover):
+        """Prepare for a rover at the start of its path."""
+        path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
+        self._follower, self._drive = PathFollower(path, LOOK_AHEAD), SteeredDrive(plant.rover)
+        self._plant = plant
+
+    def steer(self) -> tuple[float, float]:
+        """Steer; return the speed [m/s] and the yaw rate [rad/s] that are commanded."""
+        return self._aim()[0]
+
+    def steer_and_roll(self) -> np.ndarray:
+        """Steer; return the rates (6,) of the wheels [rad/s] in the commanded motion."""
+        aims = self._aim()[1]
+        share = self._drive.share(self._plant.steering_angles, aims.angles)
+        return share * aims.speeds / self._plant.rover.wheel.radius
+
+    def _aim(self) -> tuple[tuple[float, float], WheelAims]:
+        command = self._follower.steer(self._plant.pose[[0, 1, 3]], SPEED)
+        aims = self._drive.aim(*command)
+        self._plant.steer(aims.angles)
+        return command, aims
 
 
-def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain) -> Controller:
+Controller = Callable[[], np.ndarray]
+
+
+def make_controller(
+    name: str, plant: MujocoRover, obstacle: Obstacle, ground: Terrain
+) -> Controller:
     """Return a function that advances the plant by PERIOD and returns its torques (6,) [N m]."""
+    steering = Steering(plant)
     if name == SERVO_CONTROLLER:
-        rates = np.full(6, SPEED / rover.wheel.radius)
-        return lambda plant: plant.servo(rates, PERIOD)
+        return lambda: plant.servo(steering.steer_and_roll(), PERIOD)
     if name == DROOP_CONTROLLER:
-        rates, droop = np.full(6, SPEED / rover.wheel.radius), rover.wheel.servo_droop
-        return lambda plant: plant.servo_with_droop(rates, droop, PERIOD)
+        droop = plant.rover.wheel.servo_droop
+        return lambda: plant.servo_with_droop(steering.steer_and_roll(), droop, PERIOD)
     policy = EQUAL if name == EQUAL_CONTROLLER else OPTIMAL
     parameters = TractionControllerParameters(policy=policy, friction=obstacle.friction)
     service = TractionService(load_traction_settings(parameters))
     if name == MAP_CONTROLLER:
         service.take_terrain(ground)
 
-    def control(plant: MujocoRover) -> np.ndarray:
+    def control() -> np.ndarray:
         now = plant.time
         service.take_joints(plant.joint_positions, plant.joint_velocities, now)
         service.take_attitude(*plant.attitude, plant.body_rates, now)
-        service.take_command(SPEED, 0.0, now)
+        service.take_command(*steering.steer(), now)
         service.take_odometry(plant.pose, 0.0, now)
         torques = service.update(now).torques
         plant.step(torques, PERIOD)
@@ -121,18 +152,20 @@ def make_controller(name: str, rover: Rover, obstacle: Obstacle, ground: Terrain
     return control
 
 
-def drive(obstacle: Obstacle, name: str, trace: list | None = None) -> Drive:
+def drive(
+    obstacle: Obstacle, name: str, trace: list | None = None, timestep: float = TIMESTEP
+) -> Drive:
     """Drive the rover lsr1 over an obstacle with a controller.
 
     If `trace` is given, each period appends a row to it: time [s], x [m], loads (6) [N],
     torques (6) [N m], peak utilisation.
     """
     rover, ground = replace(load_rover("lsr1"), nominal_speed=SPEED), make_ground(obstacle)
-    plant = MujocoRover(rover, ground, (START, 0.0, 0.0), obstacle.friction)
-    control = make_controller(name, rover, obstacle, ground)
+    plant = MujocoRover(rover, ground, (START, 0.0, 0.0), obstacle.friction, timestep)
+    control = make_controller(name, plant, obstacle, ground)
     sums, peaks = np.zeros(4), []
     while plant.time < MAX_DURATION_RATIO * (END - START) / SPEED and plant.pose[0] < END:
-        torques = control(plant)
+        torques = control()
         if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET:
             break
         contacts = plant.measure_contacts()

@@ -3,10 +3,10 @@
 The unknowns are the six wheel loads and the rover's motion (forward, left, turning) on its
 contacts, see servo_motion. Where no load keeps a wheel down, its speed of lifting takes the place
 of the load: the treads of the others then move so much differently that the forces balance. The
-motion gives the sliding velocity of each wheel and with it, by servo_wheel, the friction force.
-The nine equations are those of equilibrium. A wheel that has to travel farther than its neighbours
-is dragged, and others push; a wheel at its friction or torque limit leaves the rest to the others;
-wheels that cannot roll where they are moved skid.
+motion gives the sliding velocity of each wheel and with it the friction force, by servo_wheel or,
+on yielding soil, by servo_soil. The nine equations are those of equilibrium. A wheel that has to
+travel farther than its neighbours is dragged, and others push; a wheel at its friction or torque
+limit leaves the rest to the others; wheels that cannot roll where they are moved skid.
 
 Newton's method starts from the loads of equal tractions and the commanded motion. If it fails, or
 finds a rover that does not drive, the creep is raised until the problem is nearly linear and
@@ -23,6 +23,7 @@ from rover_physics.forces.servo_record import (
     WEIGHTS,
     ServoBalance,
 )
+from rover_physics.forces.servo_soil import roll_on_soil, speed_of_thrust
 from rover_physics.forces.servo_wheel import ACROSS, ALONG, GRIP, SPIN, D, S, T, roll_wheel
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
@@ -59,7 +60,8 @@ def solve_servo(linkage, work, servo):
     Args:
         linkage: LINKAGE.
         work: WORK with placement, contacts and the equations of `write_equations`.
-        servo: SERVO with nominal motion, mu, droop, full_traction and max_traction.
+        servo: SERVO with nominal motion, friction or soils, droop, full_traction and
+            max_traction.
 
     Returns:
         False if the equations are singular. `servo.balance` says whether the rover drives. If it
@@ -126,6 +128,13 @@ def _start(servo, search):
         servo.slip[i] = np.nan
     along = np.copysign(servo.X[6, WEIGHTS], servo.X[6, WEIGHTS] * servo.nominal[0])
     share = min(max(1.0 - servo.droop * along / servo.full_traction, 0.5), 1.2)
+    yielding, speed = 0, 0.0
+    for i in range(6):
+        if servo.yields[i]:
+            yielding += 1
+            speed += speed_of_thrust(servo, i, servo.z[i], along)
+    if yielding > 0:
+        share = max(speed / yielding, MIN_SPEED_SHARE)
     for k in range(MOTIONS):
         servo.z[6 + k] = share * servo.nominal[k]
 
@@ -230,9 +239,12 @@ def write_residual(servo, z):
         residual[wheel, 0] += servo.load[wheel]
         J[wheel, wheel] = servo.load_rate[wheel]
     for wheel in range(6):
-        grip = servo.mu[wheel] * servo.load[wheel]
-        roll_wheel(servo, wheel, grip, contact_velocity(servo, wheel, z))
-        if grip > 0.0:
+        velocity = contact_velocity(servo, wheel, z)
+        if servo.yields[wheel]:
+            roll_on_soil(servo, wheel, velocity)
+        else:
+            roll_wheel(servo, wheel, servo.mu[wheel] * servo.load[wheel], velocity)
+        if servo.load[wheel] > 0.0:
             _add_wheel(servo, wheel)
     total = 0.0
     for i in range(UNKNOWNS):
@@ -276,7 +288,9 @@ def contact_velocity(servo, wheel, z):
 def _add_wheel(servo, wheel):
     """Add the forces of a wheel to the residual, and their derivatives to the Jacobian."""
     X, J, force, rate = servo.X, servo.J, servo.force[wheel], servo.force_rate[wheel]
-    velocity, grip_rate = servo.velocity[wheel], servo.mu[wheel] * servo.load_rate[wheel]
+    velocity, grip_rate = servo.velocity[wheel], servo.load_rate[wheel]
+    if not servo.yields[wheel]:
+        grip_rate *= servo.mu[wheel]
     for i in range(UNKNOWNS):
         x_T, x_S, x_D = X[i, wheel], X[i, 6 + wheel], X[i, SCRUB + wheel]
         servo.residual[i, 0] += x_T * force[T] + x_S * force[S] + x_D * force[D]

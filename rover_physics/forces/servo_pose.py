@@ -5,9 +5,17 @@ import numpy as np
 from rover_physics.forces.equilibrium import write_equations
 from rover_physics.forces.servo import contact_velocity, solve_servo
 from rover_physics.forces.servo_record import MOTIONS, ServoBalance
+from rover_physics.forces.servo_soil import direction_of_travel
 from rover_physics.forces.servo_wheel import S, T
+from rover_physics.forces.soil import (
+    BEKKER_WONG,
+    SOIL_MODEL,
+    SoilWheel,
+    effective_friction,
+    solve_wheel,
+)
 from rover_physics.numerics.kernels import kernel
-from rover_physics.terrain.ground import friction_at
+from rover_physics.terrain.ground import copy_soil, friction_at, soil_row_at
 
 
 @kernel
@@ -30,8 +38,19 @@ def balance_servos(model, work):
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         mu = friction_at(model.ground, x, y, settings.friction)
+        servo.yields[wheel] = 0
+        if settings.on_soil:
+            soil = servo.soil[wheel]
+            copy_soil(model.ground, soil_row_at(model.ground, x, y), soil)
+            servo.yields[wheel] = 1 if soil[SOIL_MODEL] == BEKKER_WONG else 0
+            if not servo.yields[wheel]:
+                own = SoilWheel(linkage.radius, linkage.width, mu)
+                mu = effective_friction(soil, own, 0.0)
         work.search.mu[wheel] = mu
         servo.mu[wheel] = settings.friction_share * mu
+    servo.friction_share = settings.friction_share
+    servo.radius, servo.width = linkage.radius, linkage.width
+    servo.weight = linkage.mass * linkage.gravity
     return solve_servo(linkage, work, servo)
 
 
@@ -42,23 +61,18 @@ def write_servo_forces(model, work, result):
     weight = linkage.mass * linkage.gravity
     power = 0.0
     for wheel in range(6):
-        N, mu = weight * servo.load[wheel], work.search.mu[wheel]
+        N = weight * servo.load[wheel]
         result.lift_rate[wheel] = servo.rise[wheel] if servo.z[wheel] <= 0.0 else 0.0
         traction, lateral = weight * servo.force[wheel, T], weight * servo.force[wheel, S]
-        torque = linkage.radius * traction
-        result.wheel_loads[wheel], result.friction[wheel] = N, mu
+        result.wheel_loads[wheel] = N
         result.tangential[wheel], result.lateral[wheel] = traction, lateral
+        torque = linkage.radius * _write_ground(servo, work.search.mu[wheel], wheel, result)
         result.torque[wheel] = torque
-        result.friction_utilisation[wheel] = 0.0 if servo.speed_share > 0.0 else np.inf
-        if N > 0.0:
-            used = np.sqrt(traction * traction + lateral * lateral)
-            result.friction_utilisation[wheel] = used / (mu * N)
         across = contact_velocity(servo, wheel, servo.z)[1] if N > 0.0 else 0.0
         along = servo.slip[wheel] if N > 0.0 else 0.0
         result.slip_speed[wheel] = settings.speed * np.sqrt(along * along + across * across)
         result.slip_ratio[wheel] = _slip_ratio(servo, wheel)
         result.torque_saturation[wheel] = abs(torque) / settings.max_torque
-        result.sinkage[wheel] = result.motion_resistance[wheel] = 0.0
         power += max(torque * servo.rim_speed[wheel] * settings.speed / linkage.radius, 0.0)
     result.power = power
     result.speed_share = servo.speed_share
@@ -68,14 +82,47 @@ def write_servo_forces(model, work, result):
 
 
 @kernel
+def _write_ground(servo, mu, wheel, result):
+    """Write friction, its use, sinkage and resistance of a wheel; return its thrust [N].
+
+    The RESULT has load and forces of the wheel; `mu` is the Coulomb friction of its ground.
+    """
+    N, traction, lateral = (
+        result.wheel_loads[wheel],
+        result.tangential[wheel],
+        result.lateral[wheel],
+    )
+    result.sinkage[wheel] = result.motion_resistance[wheel] = 0.0
+    result.friction[wheel] = mu
+    result.friction_utilisation[wheel] = 0.0 if servo.speed_share > 0.0 else np.inf
+    if not servo.yields[wheel]:
+        if N > 0.0:
+            used = np.sqrt(traction * traction + lateral * lateral)
+            result.friction_utilisation[wheel] = used / (mu * N)
+        return traction
+    soil, own = servo.soil[wheel], SoilWheel(servo.radius, servo.width, mu)
+    ahead = -1.0 if servo.command[wheel] < 0.0 else 1.0
+    result.friction[wheel] = effective_friction(soil, own, N)
+    if not N > 0.0:
+        return traction
+    solved = solve_wheel(soil, own, N, ahead * traction, lateral)
+    result.friction_utilisation[wheel] = solved.utilisation
+    result.sinkage[wheel], result.motion_resistance[wheel] = solved.sinkage, solved.resistance
+    if servo.speed_share > 0.0:
+        along = contact_velocity(servo, wheel, servo.z)[0]
+        ahead = direction_of_travel(along, servo.creep)[0]
+    return traction + ahead * solved.resistance
+
+
+@kernel
 def _slip_ratio(servo, wheel):
     """Return 1 - v / (r omega) of a driving wheel, (r omega) / v - 1 of a braking one.
 
     It is within -1 and 1, and positive if the rim is faster than the wheel's way, both in the
-    commanded direction of turning.
+    commanded direction of turning. On yielding soil it is 1 - v / (r omega) when braking, too.
     """
     rim, way = servo.rim_speed[wheel], contact_velocity(servo, wheel, servo.z)[0]
-    largest = max(abs(rim), abs(way))
+    largest = abs(rim) if servo.yields[wheel] else max(abs(rim), abs(way))
     if largest == 0.0:
         return 0.0
     slip = np.copysign((rim - way) / largest, (rim - way) * servo.command[wheel])

@@ -5,6 +5,7 @@ from enum import IntEnum
 import numpy as np
 
 from rover_physics.numerics.records import record_type
+from rover_physics.terrain.ground import SOIL_NUMBERS
 
 MOTIONS = 3
 """Motions of the rover on the ground: forward, to the left, and turning left."""
@@ -33,7 +34,13 @@ SERVO = record_type(
         float,
         (6,),
     ),  # distance of the Gauss points from the middle of the contact line [m]
-    ("mu", float, (6,)),  # friction coefficients
+    ("mu", float, (6,)),  # friction coefficients within the friction share
+    ("yields", np.int64, (6,)),  # 1 where a wheel is on yielding soil, 0 on Coulomb ground
+    ("soil", float, (6, SOIL_NUMBERS)),  # this soil
+    ("friction_share", float),  # share of the friction that may be used
+    ("radius", float),  # wheel radius [m]
+    ("width", float),  # wheel width [m]
+    ("weight", float),  # weight of the rover [N]
     ("droop", float),  # share of the nominal speed that a servo loses at full torque
     ("full_traction", float),  # full torque over wheel radius and weight: where droop is `droop`
     ("max_traction", float),  # largest torque over wheel radius and weight

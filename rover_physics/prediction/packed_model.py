@@ -9,7 +9,6 @@ import numpy as np
 from rover_physics.contact.wheel_samples import sample_wheel
 from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
-from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.records import new_record, shared_array_of
 from rover_physics.prediction.evaluation import MODEL, SETTINGS, new_work
@@ -57,7 +56,7 @@ def pack_model(
 
     Raises:
         ModelError: An option that this rover or ground cannot have, such as a payload without an
-            arm or speed servos on soil, or a rover with an implausible number.
+            arm, or a rover with an implausible number.
         SoilError: A soil of the terrain, or `options.soil`, that is not a preset.
     """
     return _pack_model(_SameRover(rover), terrain, options)
@@ -66,11 +65,6 @@ def pack_model(
 @lru_cache(maxsize=8)
 def _pack_model(same: "_SameRover", terrain: Terrain, options: SweepOptions) -> PackedModel:
     on_soil = bool(terrain.soil_names or options.soil is not None)
-    if on_soil and options.policy == SERVO:
-        raise ModelError(
-            f"policy {SERVO!r} is for ground with Coulomb friction; on soil use "
-            f"{EQUAL!r} or {OPTIMAL!r}"
-        )
     linkage, samples, settings = _pack_request(same, terrain.resolution, on_soil, options)
     soils = pack_soils(terrain.soil_names, default=options.soil)
     ground = with_soils(pack_ground(terrain), soils)

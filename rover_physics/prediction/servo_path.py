@@ -11,6 +11,9 @@ path corrects slow errors. What builds up within the length of the rover, the dr
 for it.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,7 +73,7 @@ def find_lift_heights(
         share = np.concatenate([results["speed_share"], crossings.results["speed_share"]])[order]
         rate = rates[order] / np.where(share > 0.0, share, 1.0)[:, None]
         way = _ways(wheels, np.concatenate([poses, crossings.poses])[order])
-        for k in range(1, len(order)):
+        for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             lifted = rate[k] > 0.0
             rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * way[k - 1]
             heights[order[k]] = np.where(lifted, heights[order[k - 1]] + rise, 0.0)
@@ -78,11 +81,10 @@ def find_lift_heights(
 
 
 def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats:
-    """Return time [s] and energy [J] (n, 2) by which climbs of faces exceed what `add_up` counts.
+    """Return time [s] and energy [J] (n, 2) by which climbs exceed what `add_up` counts.
 
-    A wheel that climbs a face takes its time while the body hardly moves. On a stretch with a
-    climb, the way of the rover is the mean way of its wheel centres from pose to pose. Both are
-    sums since the first waypoint.
+    A wheel that climbs takes its time while the body hardly moves. Both are sums since the first
+    waypoint.
 
     Args:
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
@@ -90,30 +92,88 @@ def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats
         crossings: Poses between the waypoints.
     """
     extra = np.zeros((len(poses), 2))
-    for i in np.unique(crossings.waypoint[crossings.climbing]):
-        rows = np.flatnonzero(crossings.waypoint == i)
-        if i == 0 or (results["status"][i - 1 : i + 1] != PoseStatus.SETTLED).any():
-            continue
-        rows = rows[crossings.results["status"][rows] == PoseStatus.SETTLED]
-
-        def along(name: str, i: int = i, rows: np.ndarray = rows) -> np.ndarray:
-            ends = results[name][i - 1 : i + 1]
-            return np.concatenate([ends[:1], crossings.results[name][rows], ends[1:]])
-
-        centres, power, share = along("wheel_centres"), along("power"), along("speed_share")
-        share = np.where(share > 0.0, share, 1.0)
-        speed = np.hypot(results["motion"][i, 0], results["motion"][i, 1])
-        if speed == 0.0:
-            continue
-        way = np.linalg.norm(np.diff(centres, axis=0), axis=2).mean(axis=1)
-        duration = way / (0.5 * speed * (share[1:] + share[:-1]))
-        energy = 0.5 * (power[1:] + power[:-1]) * duration
+    for step in _steps_with_crossings(results, crossings):
+        i, power, share = step.waypoint, step.values("power"), step.speed_shares()
+        energy = 0.5 * (power[1:] + power[:-1]) * step.durations
         rise = results["q"][i, 0] - results["q"][i - 1, 0]
-        step = np.hypot(*(poses[i, :2] - poses[i - 1, :2]))
-        counted = np.hypot(step, rise) / (0.5 * speed * (share[0] + share[-1]))
-        extra[i] = max(duration.sum() - counted, 0.0), 0.0
+        way = np.hypot(*(poses[i, :2] - poses[i - 1, :2]))
+        counted = np.hypot(way, rise) / (0.5 * step.speed * (share[0] + share[-1]))
+        extra[i] = max(step.durations.sum() - counted, 0.0), 0.0
         extra[i, 1] = max(energy.sum() - 0.5 * (power[0] + power[-1]) * counted, 0.0)
     return np.asarray(np.cumsum(extra, axis=0))
+
+
+def add_up_rate(name: str, time: Floats, results: Any, crossings: Crossings) -> Floats:
+    """Return the sums (n, ...) since the first waypoint of a rate that RESULTs have.
+
+    Such as `slip_speed`, whose sum is the distance that treads slide. Where the rover climbs, the
+    poses between the waypoints count with their durations.
+
+    Args:
+        name: The field of RESULT.
+        time: (n,) time at the waypoints [s].
+        results: (n,) RESULT of each waypoint.
+        crossings: Poses between the waypoints.
+    """
+    rates = results[name]
+    duration = np.diff(time).reshape(-1, *(1,) * (rates.ndim - 1))
+    parts = 0.5 * (rates[1:] + rates[:-1]) * duration
+    for step in _steps_with_crossings(results, crossings):
+        values, i = step.values(name), step.waypoint - 1
+        among = step.durations * (duration[i].item() / step.durations.sum())
+        means = 0.5 * (values[1:] + values[:-1])
+        parts[i] = (means * among.reshape(-1, *(1,) * (rates.ndim - 1))).sum(axis=0)
+    return np.concatenate([np.zeros_like(rates[:1]), np.cumsum(parts, axis=0)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """The way to a waypoint over poses between it and the one before."""
+
+    waypoint: int
+    """Index of the waypoint at its end."""
+    rows: np.ndarray
+    """Rows of the crossings on the way."""
+    speed: float
+    """Nominal speed of the body [m/s]."""
+    results: Any
+    crossings: Crossings
+
+    def values(self, name: str) -> Floats:
+        """Return a field of RESULT at both ends and at the poses between them."""
+        ends = self.results[name][self.waypoint - 1 : self.waypoint + 1]
+        return np.concatenate([ends[:1], self.crossings.results[name][self.rows], ends[1:]])
+
+    def speed_shares(self) -> Floats:
+        """Return the shares of the speed, 1 where the rover does not drive."""
+        share = self.values("speed_share")
+        return np.where(share > 0.0, share, 1.0)
+
+    @cached_property
+    def durations(self) -> Floats:
+        """Time [s] from each of these poses to the next.
+
+        The way of the rover is the mean way of its wheel centres. A wheel that goes down more
+        steeply than 45 degrees falls, which takes no time.
+        """
+        moved, share = np.diff(self.values("wheel_centres"), axis=0), self.speed_shares()
+        level = np.hypot(moved[..., 0], moved[..., 1])
+        way = np.where(moved[..., 2] < -level, level, np.linalg.norm(moved, axis=2))
+        return np.asarray(way.mean(axis=1) / (0.5 * self.speed * (share[1:] + share[:-1])))
+
+
+def _steps_with_crossings(results: Any, crossings: Crossings) -> Iterator[_Step]:
+    """Yield the steps between settled waypoints that have poses between them."""
+    for i in np.unique(crossings.waypoint):
+        if i == 0 or (results["status"][i - 1 : i + 1] != PoseStatus.SETTLED).any():
+            continue
+        rows = np.flatnonzero(crossings.waypoint == i)
+        rows = rows[crossings.results["status"][rows] == PoseStatus.SETTLED]
+        speed = float(np.hypot(results["motion"][i, 0], results["motion"][i, 1]))
+        if speed > 0.0:
+            step = _Step(int(i), rows, speed, results, crossings)
+            if step.durations.sum() > 0.0:
+                yield step
 
 
 def find_drift(wheels: Wheels, window: float, poses: np.ndarray, results: Any) -> Floats:

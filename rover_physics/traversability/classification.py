@@ -67,8 +67,8 @@ def classify_path(
 ) -> tuple[ClassifiedWaypoint, ...]:
     """Classify each waypoint of a path from its verdicts under all torque policies.
 
-    On soil and on maps with uncertain heights no waypoint is passable with speed servos, as their
-    policy is not for these. A waypoint that needs traction control leaves the control margin of
+    On maps with uncertain heights no waypoint is passable with speed servos, as their policy has
+    no bounds. A waypoint that needs traction control leaves the control margin of
     the options.
 
     Args:
@@ -123,7 +123,7 @@ def classify_judged(
     """
     judged = {prediction.policy: (prediction, verdict)}
     decided: dict[str, list[_Decision]] = {}
-    for policy in _policies_on(terrain, options, sigmas):
+    for policy in _policies_on(terrain, sigmas):
         if policy not in judged:
             asked = replace(options, policy=policy)
             poses = prediction.poses
@@ -140,10 +140,9 @@ def classify_judged(
     return tuple(_classify(dict(zip(decided, row, strict=True))) for row in rows)
 
 
-def _policies_on(terrain: Terrain, options: SweepOptions, sigmas: float | None) -> tuple[str, ...]:
+def _policies_on(terrain: Terrain, sigmas: float | None) -> tuple[str, ...]:
     """Return the policies that can be asked for on a terrain, in the order of the classes."""
-    on_soil = bool(terrain.soil_names) or options.soil is not None
-    if on_soil or (sigmas and terrain.elevation_std is not None):
+    if sigmas and terrain.elevation_std is not None:
         return CONTROL_POLICIES
     return TORQUE_POLICIES
 

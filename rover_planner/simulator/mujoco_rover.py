@@ -134,10 +134,14 @@ class MujocoRover:
         """Turn the steered wheels to angles (6,) [rad] from now on, at their largest rate."""
         self._aims = np.asarray(angles)[self._steered]
 
-    def _advance(self, torques: Floats) -> None:
-        """Advance by a step of the simulation, with torques (6,) [N m] within the limits."""
+    def _advance(self, inputs: Floats) -> None:
+        """Advance by a step of the simulation.
+
+        `inputs` (6,) are what the wheels' actuators take: torques [N m] within the limits, or
+        rates [rad/s] of servos with droop.
+        """
         control = self._data.ctrl
-        control[:6] = torques
+        control[:6] = inputs
         if self.rover.steering is not None:
             most = self.rover.steering.rate * self._model.opt.timestep
             control[6:] += np.clip(self._aims - control[6:], -most, most)
@@ -179,19 +183,18 @@ class MujocoRover:
         Returns:
             Torques (6,) of the last step [N m].
         """
-        model, wheel = self._model, self.rover.wheel
+        model, wheel, motors = self._model, self.rover.wheel, slice(len(WHEEL_JOINTS))
         gain = wheel.max_torque * wheel.radius / (droop * self.rover.nominal_speed)
-        kinds = model.actuator_biastype.copy()
-        model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
-        model.actuator_gainprm[:, 0], model.actuator_biasprm[:, 2] = gain, -gain
-        model.actuator_forcerange[:] = -wheel.max_torque, wheel.max_torque
-        model.actuator_forcelimited[:] = 1
-        self._data.ctrl[:] = rates
+        kinds = model.actuator_biastype[motors].copy()
+        model.actuator_biastype[motors] = mujoco.mjtBias.mjBIAS_AFFINE
+        model.actuator_gainprm[motors, 0], model.actuator_biasprm[motors, 2] = gain, -gain
+        model.actuator_forcerange[motors] = -wheel.max_torque, wheel.max_torque
+        model.actuator_forcelimited[motors] = 1
         for _ in range(max(round(duration / model.opt.timestep), 1)):
-            mujoco.mj_step(model, self._data)
-        torques = self._data.actuator_force.copy()
-        model.actuator_gainprm[:, 0], model.actuator_biasprm[:, 2] = 1.0, 0.0
-        model.actuator_biastype[:], model.actuator_forcelimited[:] = kinds, 0
+            self._advance(rates)
+        torques = self._data.actuator_force[motors].copy()
+        model.actuator_gainprm[motors, 0], model.actuator_biasprm[motors, 2] = 1.0, 0.0
+        model.actuator_biastype[motors], model.actuator_forcelimited[motors] = kinds, 0
         return torques
 
     @property

@@ -1,8 +1,14 @@
 """Tests of the verdicts under all torque policies, side by side."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from rover_planner.viewer.panel.dashboard import describe_verdict
 from rover_planner.viewer.state.comparison import PolicyVerdict
-from support.viewer_sessions import ramp, session_on
+from rover_planner.viewer.state.session import ViewSession
+from support.grounds import make_terrain
+from support.viewer_sessions import LSR1, ramp, session_on
 
 
 def verdicts(session) -> dict[str, bool | None]:
@@ -17,11 +23,20 @@ def test_a_path_is_judged_under_all_policies_and_changes_with_the_rover():
     assert all(one.reason for one in session.shown.by_policy)
 
 
-def test_a_policy_that_cannot_judge_the_ground_says_so():
+def test_all_policies_judge_a_soil():
     session = session_on(ramp)
     assert session.change_options(soil="dry_sand")
     judged = {one.policy: one for one in session.shown.by_policy}
-    assert judged["servo"].traversable is None and "soil" in judged["servo"].reason
+    assert None not in {one.traversable for one in judged.values()}
+    assert "off its path" in judged["servo"].reason
+
+
+def test_a_policy_that_cannot_judge_the_ground_says_so():
+    ground = make_terrain(ramp)
+    ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
+    session = ViewSession(LSR1, ground, (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    judged = {one.policy: one for one in session.shown.by_policy}
+    assert judged["servo"].traversable is None and "no bounds" in judged["servo"].reason
     assert judged["equal"].traversable is not None
 
 

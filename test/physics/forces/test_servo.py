@@ -233,11 +233,6 @@ def test_a_droop_that_no_servo_has_is_refused(droop):
         sweep_path(with_droop(LSR1, droop), plane(0.0, 0.0), POSE, SERVO)
 
 
-def test_servos_are_not_for_soil():
-    with pytest.raises(ModelError, match="'servo' is for ground with Coulomb friction"):
-        sweep_path(LSR1, plane(0.0, 0.0), POSE, replace(SERVO, soil="dry_sand"))
-
-
 def test_m2020_drives_on_servos_too():
     found = sweep_path(M2020, plane(0.2, 0.0, half=4.0), POSE, SERVO)
     assert found.tangential.sum() == pytest.approx(M2020.weight * np.sin(np.arctan(0.2)), rel=1e-5)

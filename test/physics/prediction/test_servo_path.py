@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.parts import sweep_in_parts
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.servo_path import add_up_rate
+from rover_physics.prediction.sweep import sweep_in_full, sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge_path import judge_path
@@ -15,6 +16,7 @@ from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bouldered, plane
 
 LSR1 = load_rover("lsr1")
+ROVER = unlimited(LSR1)
 SERVO = SweepOptions(policy="servo")
 
 
@@ -110,3 +112,40 @@ def test_a_path_in_parts_is_the_whole_path(monkeypatch):
             np.testing.assert_allclose(
                 getattr(part.prediction, name)[rows], getattr(whole, name)[here], rtol=1e-9
             )
+
+
+def energies(heights, spacing=0.01) -> np.ndarray:
+    options = SweepOptions(policy="servo", friction=0.8)
+    swept = [
+        sweep_path(ROVER, drive_ground("step", height), drive_path(spacing), options)
+        for height in heights
+    ]
+    return np.array([prediction.energy[-1] for prediction in swept])
+
+
+def test_a_higher_step_costs_more_energy_also_where_a_wheel_rolls_over_its_edge():
+    """Up to a step as high as a wheel's radius, the wheel climbs no face."""
+    found = energies((0.04, 0.06, 0.08, 0.1, 0.12, 0.14))
+    assert (np.diff(found) > 1.5).all()
+
+
+def test_energy_and_time_over_steps_hardly_depend_on_the_spacing_of_waypoints():
+    heights = (0.06, 0.1, 0.14)
+    np.testing.assert_allclose(energies(heights, 0.004), energies(heights, 0.02), rtol=0.1)
+
+
+def test_the_sum_of_a_rate_counts_poses_between_waypoints_with_their_time():
+    options = SweepOptions(policy="servo", friction=0.8)
+    ground, path = drive_ground("step", 0.13), drive_path()
+    swept = sweep_in_full(ROVER, ground, [path], options)[0]
+    time = swept.prediction.time
+    ones = swept.results.copy()
+    crossings = replace(swept.crossings, results=swept.crossings.results.copy())
+    ones["power"] = crossings.results["power"] = 1.0
+    np.testing.assert_allclose(add_up_rate("power", time, ones, crossings), time - time[0])
+    slid = add_up_rate("slip_speed", time, swept.results, swept.crossings)
+    at_waypoints = swept.results["slip_speed"]
+    apart = 0.5 * (at_waypoints[1:] + at_waypoints[:-1]) * np.diff(time)[:, None]
+    # While the front wheels climb the face, the rear ones push and slide.
+    assert slid.shape == (len(path), 6)
+    assert slid[-1, 0] > 1.5 * apart.sum(axis=0)[0]

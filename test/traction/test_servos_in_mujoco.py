@@ -1,0 +1,37 @@
+"""Speed servos with droop in MuJoCo: a rover that steers keeps its steering, and speed is lost."""
+
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steered_drive import SteeredDrive
+from support.rough_grounds import plane
+
+pytest.importorskip("mujoco", reason="install the extra bench")
+from rover_planner.simulator.mujoco_rover import MujocoRover
+
+LSR1 = load_rover("lsr1")
+SPEED, CURVATURE = 0.03, 0.5
+
+
+def test_servos_with_droop_drive_a_rover_along_the_curve_of_its_wheels():
+    plant, drive = MujocoRover(LSR1, plane(0.0, 0.0)), SteeredDrive(LSR1)
+    aims = drive.aim(SPEED, CURVATURE * SPEED)
+    plant.steer(aims.angles)
+    plant.servo(np.zeros(6), 2.0)
+    for _ in range(3):
+        plant.servo_with_droop(aims.speeds / LSR1.wheel.radius, 0.3, 2.0)
+    np.testing.assert_allclose(plant.steering_angles, aims.angles, atol=0.01)
+    assert plant.body_rates[2] == pytest.approx(CURVATURE * SPEED, rel=0.1)
+    assert plant.pose[3] == pytest.approx(CURVATURE * SPEED * 6.0, rel=0.1)
+
+
+def test_servos_with_droop_lose_speed_by_their_torque():
+    slope, most = 0.2, LSR1.wheel.max_torque
+    plant = MujocoRover(LSR1, plane(slope, 0.0))
+    rate = SPEED / LSR1.wheel.radius
+    torques = plant.servo_with_droop(np.full(6, rate), 0.3, 4.0)
+    needed = LSR1.weight * np.sin(np.arctan(slope)) * LSR1.wheel.radius
+    assert torques.sum() == pytest.approx(needed, rel=0.03)
+    lost = 1.0 - plant.wheel_rates / rate
+    np.testing.assert_allclose(lost, 0.3 * torques / most, atol=5e-3)
