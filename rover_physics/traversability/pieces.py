@@ -24,10 +24,16 @@ from rover_physics.prediction.crossing import (
     select_results,
     turn_wheels,
 )
-from rover_physics.prediction.drops import FACE, MIN_ANGLE
+from rover_physics.prediction.drops import MIN_ANGLE
 from rover_physics.prediction.evaluation import unwritten_results
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.path_kernels import add_up, find_jumps, find_turns, way_between
+from rover_physics.prediction.path_kernels import (
+    FACE,
+    add_up,
+    find_jumps,
+    find_turns,
+    way_between,
+)
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, evaluator, joined_paths, wheels_of
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
