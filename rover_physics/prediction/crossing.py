@@ -34,7 +34,7 @@ PIECES = 4
 """Number of pieces into which a stretch with a jump is divided in each round."""
 MIN_SPACING = 1e-4
 """Distance between poses [m] below which a jump counts as at one place."""
-PEAK_SPACING, FALL_SPACING = 0.01, 0.06
+PEAK_SPACING, FALL_SPACING = 0.01, 0.02
 """Distances [wheel radii] below which peaks of forces, and ends of falls, are not searched."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
