@@ -1,6 +1,5 @@
 """Verdicts of random rough paths with more friction or torque, in pieces, shifted, refined."""
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated
@@ -54,11 +53,12 @@ def find_passing(
     return np.array([not reason for reason in verdict.reasons]) & ~prediction.falling.any(axis=1)
 
 
-def count_changes(rover: Rover, count: int, first_seed: int, policy: str) -> Counter[str]:
-    """Return how often each change made a verdict worse, or another one, of so many courses."""
-    found: Counter[str] = Counter()
+def find_changes(rover: Rover, count: int, first_seed: int, policy: str) -> dict[str, list[int]]:
+    """Return the seeds of the courses that did not stand each change, and of those that pass."""
+    found: dict[str, list[int]] = {}
     for seed in range(first_seed, first_seed + count):
-        found.update(changes_of(rover, seed, policy))
+        for change in changes_of(rover, seed, policy):
+            found.setdefault(change, []).append(seed)
     return found
 
 
@@ -100,7 +100,8 @@ def _agrees_in_halves(
 ) -> Iterator[bool]:
     """Yield whether the two halves agree with the whole, split at waypoints that pass.
 
-    A path is trapped because of where it ends, so this verdict is not compared.
+    "trapped" is not compared: it says that there is no way on from the end of a path, and the end
+    of a half is another place, from which the other half may be the way on.
     """
     passing = find_passing(rover, terrain, path, options)
     for row in (len(path) // 3, len(path) // 2, 2 * len(path) // 3):
@@ -117,10 +118,12 @@ def main(
     seed: Annotated[int, typer.Option(help="First seed.")] = 0,
     policy: Annotated[str, typer.Option(help="Torque policy.")] = EQUAL,
 ) -> None:
-    """Print how many courses did not stand each change."""
+    """Print how many courses did not stand each change, and which."""
     for name in ("lsr1", "m2020"):
-        found = count_changes(load_rover(name), count, seed, policy)
-        print(f"{name}, {policy}: {count} courses, {found.pop('passes', 0)} pass; {dict(found)}")
+        found = find_changes(load_rover(name), count, seed, policy)
+        print(f"{name}, {policy}: {count} courses, {len(found.pop('passes', []))} pass")
+        for change, seeds in found.items():
+            print(f"  {change}: {len(seeds)}, seeds {', '.join(map(str, seeds))}")
 
 
 if __name__ == "__main__":

@@ -127,7 +127,7 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     spot, are chosen too, and some in the turn: between chosen poses the heading is interpolated.
 
     Args:
-        poses: (n, 3) or wider; x, y [m] and yaw [rad].
+        poses: (n, 2) or wider; x, y [m] and, for corners, yaw [rad].
         spacing: Distance between chosen poses [m]; 0 keeps all.
         always: Indices of other poses that are chosen in any case.
 
@@ -144,7 +144,8 @@ def decimate(poses: ArrayLike, spacing: float, always: ArrayLike = ()) -> NDArra
     marks = np.arange(0.0, travelled[-1], spacing)
     chosen = np.searchsorted(travelled, marks - 1e-9 * spacing)
     ends = [0, len(xy) - 1]
-    others = np.concatenate([_find_corners(values), np.asarray(always, np.intp)])
+    corners = _find_corners(values) if values.shape[1] > 2 else np.empty(0, np.intp)
+    others = np.concatenate([corners, np.asarray(always, np.intp)])
     return np.unique(np.concatenate([ends, chosen, others])).astype(np.intp)
 
 

@@ -1,4 +1,4 @@
-"""Poses between waypoints, where wheels climb faces or roll off edges.
+"""Poses between waypoints, where wheels climb faces, roll off edges, or sweep round in a turn.
 
 A wheel contact can jump from one waypoint to the next. The poses in between then decide whether
 the rover gets there. The path is divided around each jump until the jump is resolved or the piece
@@ -22,6 +22,7 @@ from rover_physics.prediction.path_kernels import (
     divide_stretches,
     find_jumps,
     find_turned_wheels,
+    find_turns,
     sort_pieces,
 )
 from rover_physics.status import PoseStatus
@@ -33,6 +34,8 @@ PIECES = 4
 """Number of pieces into which a stretch with a jump is divided in each round."""
 MIN_SPACING = 1e-4
 """Distance between poses [m] below which a jump counts as at one place."""
+PEAK_SPACING, FALL_SPACING = 0.01, 0.02
+"""Distances [wheel radii] below which peaks of forces, and ends of falls, are not searched."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""
@@ -124,14 +127,9 @@ def select_results(results: Any, rows: Any) -> Any:
     return _numbers(results)[rows].view(RESULT)[:, 0]
 
 
-def place_results(results: Any, to: Any, rows: np.ndarray) -> None:
+def place_results(results: Any, to: Any, rows: Any) -> None:
     """Copy RESULTs (k,) into rows (k,) of others."""
     _numbers(to)[rows] = _numbers(results)
-
-
-def copy_results(results: Any, to: Any) -> None:
-    """Copy RESULTs (n,) into others."""
-    _numbers(to)[:] = _numbers(results)
 
 
 def join_results(parts: Sequence[Any]) -> Any:
@@ -181,8 +179,17 @@ class _Known:
 
 def limits_of(wheels: Wheels) -> JumpLimits:
     """Return the JumpLimits of a rover."""
-    radius, reach = wheels.radius, wheels.reach
-    return JumpLimits(radius, MIN_SPACING, HEIGHT_JUMP * radius, reach)
+    radius, no_peaks = wheels.radius, float("inf")
+    return JumpLimits(
+        max_spacing=radius,
+        min_spacing=MIN_SPACING,
+        height=HEIGHT_JUMP * radius,
+        reach=wheels.reach,
+        friction=no_peaks if wheels.on_servos else wheels.friction_limit,
+        torque=no_peaks if wheels.on_servos else wheels.torque_limit,
+        peak_spacing=PEAK_SPACING * radius,
+        fall_spacing=FALL_SPACING * radius,
+    )
 
 
 def find_crossings(
@@ -193,7 +200,9 @@ def find_crossings(
     evaluate: Evaluate,
     joined: np.ndarray | bool = True,
 ) -> Crossings:
-    """Evaluate the poses between waypoints where contacts jump, and waypoints where wheels turn.
+    """Evaluate the poses between waypoints that decide whether the rover gets there.
+
+    They are where contacts jump, limits may be passed, or the rover or its wheels turn far.
 
     Args:
         terrain: The ground.
@@ -207,34 +216,66 @@ def find_crossings(
 
     Returns:
         The poses between the waypoints, without those of status NOT_SETTLED; poses of climbing
-        wheels are kept in any case.
+        wheels and those that divide a long turn are kept in any case.
     """
-    jumps = np.empty((len(poses), 2), np.int64)
     joined = np.broadcast_to(joined, len(poses) - 1)
     at_rest = turn_wheels(poses, results, joined, evaluate)
-    jumps = jumps[: find_jumps(results, poses, joined, limits_of(wheels), jumps)]
-    if not len(jumps):
+    limits = limits_of(wheels)
+    jumps = _find_jumps(poses, results, joined, limits)
+    turns, inside, jumps_in_turns = _divide_turns(poses, results, joined, limits, evaluate)
+    if not len(jumps) and not len(inside):
         return at_rest
     rows = jumps.ravel()
     no_climb, at_jumps = np.zeros(len(rows), bool), select_results(results, rows)
-    known = _Known(
-        Crossings(rows.astype(float), jumps[:, 1].repeat(2), no_climb, poses[rows], at_jumps)
-    )
-    ends = np.arange(len(rows)).reshape(-1, 2)
+    path = Crossings(rows.astype(float), jumps[:, 1].repeat(2), no_climb, poses[rows], at_jumps)
+    known = _Known(join_crossings([path, turns]))
+    ends = np.vstack([np.arange(len(rows)).reshape(-1, 2), len(rows) + jumps_in_turns])
     while len(ends):
         known.add(_divide(known.rows, ends, evaluate))
-        ends, closed = _sort_pieces(known.rows, ends, wheels)
+        ends, closed = _sort_pieces(known.rows, ends, limits)
         if len(closed):
             known.add(climb_faces(terrain, wheels.radius, known.rows, closed, evaluate))
     found = known.rows
     kept = (found.results["status"] != PoseStatus.NOT_SETTLED) | found.climbing
-    kept[: len(rows)] = False
+    kept[: len(rows) + len(inside)] = np.append(no_climb, inside)
     return join_crossings([found.select(np.flatnonzero(kept)), at_rest]).in_order()
 
 
 _NOTHING = Crossings(
     np.empty(0), np.empty(0, np.int64), np.empty(0, bool), np.empty((0, 3)), new_results(0)
 )
+
+
+def _find_jumps(
+    poses: np.ndarray, results: Any, joined: np.ndarray, limits: JumpLimits
+) -> np.ndarray:
+    """Return the neighbours between which to search, as rows (k, 2)."""
+    jumps = np.empty((len(poses), 2), np.int64)
+    return jumps[: find_jumps(results, poses, joined, limits, jumps)]
+
+
+def _divide_turns(
+    poses: np.ndarray, results: Any, joined: np.ndarray, limits: JumpLimits, evaluate: Evaluate
+) -> tuple[Crossings, np.ndarray, np.ndarray]:
+    """Return the poses of long turns, evenly from waypoint to waypoint.
+
+    Also return a mask of those between waypoints, and the neighbours between which to search.
+    """
+    turns = np.empty((len(poses), 2), np.int64)
+    turns = turns[: find_turns(results, poses, joined, limits, turns)]
+    if not len(turns):
+        return _NOTHING, np.empty(0, bool), np.empty((0, 2), np.int64)
+    first, pieces = np.repeat(turns, turns[:, 1] + 1, axis=0).T
+    within = np.concatenate([np.arange(count + 1) for count in turns[:, 1]])
+    inside, share = (within > 0) & (within < pieces), within / pieces
+    steps = poses[first + 1] - poses[first]
+    steps[:, 2] = (steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    at = poses[first] + share[:, None] * steps
+    found = select_results(results, np.where(within > 0, first + 1, first))
+    place_results(evaluate(at[inside], NONE_HELD, found["motion"][inside]), found, inside)
+    in_turns = Crossings(first + share, first + 1, np.zeros(len(at), bool), at, found)
+    neighbours = _find_jumps(at, found, np.diff(within) > 0, limits)
+    return in_turns, inside, neighbours
 
 
 def turn_wheels(
@@ -261,7 +302,7 @@ def _divide(known: Crossings, ends: np.ndarray, evaluate: Evaluate) -> Crossings
 
 
 def _sort_pieces(
-    known: Crossings, ends: np.ndarray, wheels: Wheels
+    known: Crossings, ends: np.ndarray, limits: JumpLimits
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the pieces in which a contact still jumps, as rows (j, 2): open ones, closed ones.
 
@@ -269,7 +310,7 @@ def _sort_pieces(
     and closed.
     """
     pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
-    n_open, n_closed = sort_pieces(ends, PIECES, known.points, limits_of(wheels), pieces)
+    n_open, n_closed = sort_pieces(ends, PIECES, known.points, limits, pieces)
     return pieces[0, :n_open], pieces[1, :n_closed]
 
 

@@ -17,12 +17,10 @@ import numpy as np
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossings
-from rover_physics.prediction.path_kernels import Wheels, way_between
+from rover_physics.prediction.path_kernels import FACE, Wheels, way_between
 
 MIN_ANGLE = np.radians(15.0)
 """Least steepness [rad] of a contact behind a wheel from which it falls."""
-FACE = np.radians(45.0)
-"""Steepness [rad] of a contact behind a wheel from which a wheel falls anyway."""
 WALL = np.radians(60.0)
 """Steepness [rad] of such a contact from which the ground is no slope."""
 MAX_FALLING = 2
@@ -95,7 +93,7 @@ def _find_falls(wheels, poses, results, between):
     _clear_open_runs(falling)
     _clear_slides(height, at_wall, wheels.drop_limit, falling)
     fallen, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
-    _measure_drops(wheels.radius, height, steps, falling, fallen)
+    _measure_drops(wheels.radius, (height, angle, steps), falling, fallen)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
     decided, restart = 0, 0
     for k in range(n + m):
@@ -232,16 +230,41 @@ def _clear_slides(height, at_wall, limit, falling):
 
 
 @exact_kernel
-def _measure_drops(radius, height, steps, falling, fallen):
+def _measure_drops(radius, course, falling, fallen):
     """Add up the descent [m] of each falling wheel; a sudden descent at one place also counts.
 
-    What a wheel rises meanwhile, such as when the one beside it falls, is subtracted.
+    What a wheel rises meanwhile, such as when the one beside it falls, is subtracted. Where a fall
+    begins or ends between two poses, the share of the step in which the wheel falls counts.
+    `course` is heights (k, 6) [m], contact angles (k, 6) [rad] and steps (k,) [m].
     """
+    height, angle, steps = course
     for wheel in range(6):
+        so_far = 0.0
         for k in range(1, steps.size):
             descent = height[k - 1, wheel] - height[k, wheel]
             if not abs(descent) >= ROUNDING:
                 descent = 0.0
             sudden = descent > HEIGHT_JUMP * radius and steps[k] <= 2.0 * MIN_SPACING
-            if falling[k - 1, wheel] or falling[k, wheel] or sudden:
-                fallen[k, wheel] = max(fallen[k - 1, wheel] + descent, 0.0)
+            before, here = falling[k - 1, wheel], falling[k, wheel]
+            if not (before or here or sudden):
+                so_far = 0.0
+                continue
+            share = 1.0
+            if here != before and not sudden:
+                share = _share_of_fall(angle[k - 1, wheel], angle[k, wheel])
+            so_far = max(so_far + share * descent, 0.0)
+            fallen[k, wheel] = so_far
+            if before and not here:
+                so_far = 0.0
+
+
+@exact_kernel
+def _share_of_fall(angle, other):
+    """Return the share of a step in which a wheel falls that falls at one of its ends only.
+
+    It does from where its contact angle passes FACE, else for half the step.
+    """
+    steep, flat = min(angle, other), max(angle, other)
+    if flat >= -FACE > steep:
+        return (steep + FACE) / (steep - flat)
+    return 0.5

@@ -12,8 +12,19 @@ ANGLE_JUMP = np.radians(12.0)
 TURNED = 0.1
 """Change of a steering angle [rad] from a waypoint to the next above which the rover is also
 evaluated with the wheels turned where it still stands. Smaller changes count as gradual."""
+TURN_SPACING = 0.25
+"""Largest way of the outermost wheel [wheel radii] between poses of a turn."""
 STEEP_CONTACT = np.radians(25.0)
 """Size of a contact angle [rad] above which the contact is steep."""
+FACE = np.radians(45.0)
+"""Steepness [rad] of a contact behind a wheel from which a wheel falls anyway."""
+PEAK, LEAST_USE = 2.5, 0.55
+"""Rise of friction utilisation and torque saturation between two poses, over their value there and
+per rad by which a contact turns, that is looked for, from this share of a limit on."""
+NEAR_LIMIT, LEAST_TURN = 0.9, 0.02
+"""Share of a limit from which any peak is looked for if a contact turns by that [rad]."""
+AT_LIMIT = 0.95
+"""Share of a limit from which a peak is looked for at the smallest spacing."""
 
 
 class Wheels(NamedTuple):
@@ -29,10 +40,12 @@ class Wheels(NamedTuple):
     """Largest torque saturation with which the forces balance, at most 1."""
     drop_limit: float
     """Largest drop of a wheel [m]."""
+    on_servos: bool
+    """Whether wheels may be at their limits, as under policy "servo"."""
 
 
 class JumpLimits(NamedTuple):
-    """Limits that define a contact jump."""
+    """Limits that define a contact jump, and where forces may peak beyond their limits."""
 
     max_spacing: float
     """Largest way between waypoints between which jumps are searched [m], see `way_between`."""
@@ -42,6 +55,14 @@ class JumpLimits(NamedTuple):
     """Change of a wheel's height above which it is a jump [m]."""
     reach: float
     """As in `Wheels`."""
+    friction: float
+    """Friction utilisation whose peaks are searched, infinite for none."""
+    torque: float
+    """Torque saturation whose peaks are searched, infinite for none."""
+    peak_spacing: float
+    """Way below which no peaks are searched [m]."""
+    fall_spacing: float
+    """Way below which no begin or end of a fall is searched [m]."""
 
 
 class PathPoints(NamedTuple):
@@ -59,7 +80,9 @@ class PathPoints(NamedTuple):
 
 @exact_kernel
 def find_jumps(results, poses, joined, limits, ends):
-    """Find the pairs of waypoints between which a contact jumps; return their number.
+    """Find the pairs of waypoints between which a contact jumps or a limit may be passed.
+
+    Returns their number.
 
     Args:
         results: (n,) RESULT of each waypoint.
@@ -70,7 +93,11 @@ def find_jumps(results, poses, joined, limits, ends):
     """
     count = 0
     for row in range(results.size - 1):
-        if not (joined[row] and _jumps(results[row], results[row + 1], limits.height)):
+        here, there = results[row], results[row + 1]
+        if not (
+            joined[row]
+            and (_jumps(here, there, limits.height) or _finest(here, there, limits) < np.inf)
+        ):
             continue
         if 0.0 < way_between(poses[row], poses[row + 1], limits.reach) <= limits.max_spacing:
             ends[count, 0], ends[count, 1] = row, row + 1
@@ -92,6 +119,34 @@ def find_turned_wheels(results, joined, rows):
         if joined[row] and _largest_change(results[row], results[row + 1]) > TURNED:
             rows[count] = row
             count += 1
+    return count
+
+
+@exact_kernel
+def find_turns(results, poses, joined, limits, turns):
+    """Find the steps that turn so far that the wheels sweep ground away from both waypoints.
+
+    Returns their number. On such a step the outermost wheel goes farther by turning than
+    `limits.max_spacing`, and than the body goes.
+
+    Args:
+        results: (n,) RESULT of each waypoint.
+        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints.
+        joined: (n - 1,) True where a waypoint and the next one belong to the same path.
+        limits: JumpLimits.
+        turns: (>= n, 2) first waypoints of these steps and numbers of pieces TURN_SPACING apart,
+            written.
+    """
+    count = 0
+    for row in range(results.size - 1):
+        if joined[row] and results[row + 1].motion[2] != 0.0:
+            here, there = poses[row], poses[row + 1]
+            swing = limits.reach * abs(turn_between(here, there))
+            length = np.hypot(there[0] - here[0], there[1] - here[1])
+            if swing > max(limits.max_spacing, length):
+                turns[count, 0] = row
+                turns[count, 1] = np.ceil(swing / (TURN_SPACING * limits.max_spacing))
+                count += 1
     return count
 
 
@@ -127,10 +182,11 @@ def divide_stretches(ends, pieces, known, new):
 
 @exact_kernel
 def sort_pieces(ends, pieces, known, limits, sorted_ends):
-    """Find the pieces of stretches in which a contact still jumps; return how many open, closed.
+    """Find the pieces of stretches to divide or to close; return how many of each.
 
-    A piece is closed if it is shorter than `limits.min_spacing`, or if the rover does not settle
-    at a pose within it. The other pieces are open.
+    A piece in which a contact still jumps is closed if it is shorter than `limits.min_spacing`, or
+    if the rover does not settle at a pose within it; else it is open. Other pieces are open if
+    `_finest` asks for shorter ones.
 
     Args:
         ends: (k, 2) rows of `known` at the start and end of each stretch.
@@ -156,6 +212,11 @@ def sort_pieces(ends, pieces, known, limits, sorted_ends):
                     sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
                     n_closed += 1
                 else:
+                    sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
+                    n_open += 1
+            else:
+                finest = _finest(results[before], results[after], limits)
+                if finest < way_between(poses[before], poses[after], limits.reach):
                     sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
                     n_open += 1
             before, skipped = after, False
@@ -192,6 +253,41 @@ def _jumps(here, there, height_jump):
         if abs(there.wheel_centres[wheel, 2] - here.wheel_centres[wheel, 2]) > height_jump:
             return True
     return False
+
+
+@exact_kernel
+def _finest(here, there, limits):
+    """Return the way [m] to which to divide a stretch in which a limit may be passed, else inf.
+
+    Forces change as contacts turn, and may peak while they do. Where they are beyond at one of the
+    poses, a wheel may fall there; until it does, they count. Where a fall begins or ends between
+    the poses, its place counts.
+    """
+    if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
+        return np.inf
+    turn, falls = 0.0, False
+    for wheel in range(6):
+        angle, other = here.contact_angle[wheel], there.contact_angle[wheel]
+        turn = max(turn, abs(other - angle))
+        ahead = -1.0 if there.wheel_speed[wheel] < 0.0 else 1.0
+        falls = falls or (ahead * angle < -FACE) != (ahead * other < -FACE)
+    use, other_use = _largest_use(here, limits), _largest_use(there, limits)
+    largest = max(use, other_use)
+    rises = largest > LEAST_USE and largest * (1.0 + PEAK * turn) > 1.0
+    if min(use, other_use) <= 1.0 and (rises or (largest > NEAR_LIMIT and turn > LEAST_TURN)):
+        return limits.peak_spacing if largest > AT_LIMIT else limits.fall_spacing
+    return limits.fall_spacing if falls else np.inf
+
+
+@exact_kernel
+def _largest_use(result, limits):
+    """Return the largest share of their limits that friction and torque of a wheel use."""
+    use = 0.0
+    for wheel in range(6):
+        friction = result.friction_utilisation[wheel] / limits.friction
+        torque = result.torque_saturation[wheel] / limits.torque
+        use = max(use, friction, torque)
+    return use
 
 
 @exact_kernel

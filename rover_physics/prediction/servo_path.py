@@ -176,7 +176,9 @@ def _steps_with_crossings(results: Any, crossings: Crossings) -> Iterator[_Step]
                 yield step
 
 
-def find_drift(wheels: Wheels, window: float, poses: np.ndarray, results: Any) -> Floats:
+def find_drift(
+    wheels: Wheels, window: float, poses: np.ndarray, results: Any, crossings: Crossings
+) -> Floats:
     """Return the drift (n, 2) at waypoints: turn [rad] and way aside [m] that built up.
 
     Args:
@@ -185,21 +187,36 @@ def find_drift(wheels: Wheels, window: float, poses: np.ndarray, results: Any) -
             turns, of its outermost wheel.
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
         results: (n,) RESULT of each waypoint.
+        crossings: Poses between the waypoints. In long turns, the largest drift of a waypoint and
+            of the poses on the way to it counts; elsewhere waypoints are enough.
     """
-    drives = (results["status"] == PoseStatus.SETTLED) & (results["speed_share"] > 0.0)
-    rate = np.where(drives[:, None], results["deviation"], 0.0)
-    rate /= np.where(drives, results["speed_share"], 1.0)[:, None]
-    if not rate.any():
-        return np.zeros((len(poses), 2))
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    n = len(poses)
+    if not (results["deviation"].any() or crossings.results["deviation"].any()):
+        return np.zeros((n, 2))
+    long_steps = np.append(False, _ways(wheels, poses) > wheels.radius)
+    turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
+    order = _in_order(n, turns.place)
+    at = np.concatenate([poses, turns.poses])[order]
+    share, deviation, status = (
+        np.concatenate([results[name], turns.results[name]])[order]
+        for name in ("speed_share", "deviation", "status")
+    )
+    drives = (status == PoseStatus.SETTLED) & (share > 0.0)
+    rate = np.where(drives[:, None], deviation, 0.0)
+    rate /= np.where(drives, share, 1.0)[:, None]
+    c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
     x, y = c * rate[:, 0] - s * rate[:, 1], s * rate[:, 0] + c * rate[:, 1]
     rate = np.column_stack([x, y, rate[:, 2]])
-    way = _ways(wheels, poses)
+    way = _ways(wheels, at)
     sums = np.zeros(rate.shape)
     sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * way[:, None], axis=0)
     place = np.append(0.0, np.cumsum(way))
     built_up = sums - sums[np.searchsorted(place, place - window)]
-    return np.column_stack([np.abs(built_up[:, 2]), np.hypot(built_up[:, 0], built_up[:, 1])])
+    drift = np.zeros((n, 2))
+    owner = np.append(np.arange(n), turns.waypoint)[order]
+    found = np.column_stack([np.abs(built_up[:, 2]), np.hypot(built_up[:, 0], built_up[:, 1])])
+    np.maximum.at(drift, owner, found)
+    return drift
 
 
 def _in_order(n: int, place: np.ndarray) -> np.ndarray:

@@ -212,6 +212,7 @@ def wheels_of(model: PackedModel) -> Wheels:
         min(float(settings.allowed_friction), 1.0) + ROUNDING,
         min(float(torque), 1.0) + ROUNDING,
         float(settings.allowed_drop) + ROUNDING,
+        bool(settings.policy == TorquePolicy.SERVO),
     )
 
 
@@ -250,7 +251,7 @@ def make_prediction(
         model,
         wheel_drop=falls.drops,
         lift_height=lift,
-        drift=find_drift(wheels, float(model.record.linkage.length), poses, results),
+        drift=find_drift(wheels, float(model.record.linkage.length), poses, results, crossings),
         falling=falls.at_waypoints,
         start=start,
         between=between,

@@ -1,9 +1,10 @@
 """Entrapment: a path is refused if the rover can drive in, but neither on nor back out.
 
-Driving back differs from driving in for two reasons. A wheel that dropped off an edge has to climb
-it on the way back. Soil resists motion in either direction, so it helps the rover to brake
-downhill and hinders it uphill. On Coulomb ground without drops, the forces at rest are the same
-both ways, so a path that is passable on the way in is passable on the way back.
+Driving back differs from driving in for three reasons. A wheel that dropped off an edge has to
+climb it on the way back. Soil resists motion in either direction, so it helps the rover to brake
+downhill and hinders it uphill. Speed servos pull by their slip, which depends on the direction. On
+Coulomb ground without drops and servos, the forces at rest are the same both ways, so a path that
+is passable on the way in is passable on the way back.
 
 The way back is therefore predicted only if the forces of the way in are not enough for it. It
 leads backwards from the end of the path, or from where the path fails, to a point before all such
@@ -17,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rover_physics.forces.soil import use_of_shear
-from rover_physics.names import EQUAL, SERVO
+from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import SweptPath
@@ -35,12 +36,15 @@ MAX_LOOK_AHEAD = 6.0
 """Largest length of a way on [wheelbases]."""
 CURVES = (0.0, 1.0, -1.0)
 """Curvatures of the ways on [rad per wheelbase]; they hold for LOOK_AHEAD wheelbases."""
+SERVO_USE = 0.8
+"""Share of the tractions that friction and motors can give, used by a rover with speed servos on
+the way in, above which the way back is checked."""
 DROP = 0.1
 """Drop of a wheel [wheel radii] above which the way back is checked."""
 RUN_UP = 1.0
 """Distance [wheelbases] before the first place that needs a check where the way back ends."""
 MAX_WAY_POSES = 5000
-"""Largest number of poses of a way on; poses of a path may be arbitrarily close together."""
+"""Largest number of steps of a way on; poses of a path may be arbitrarily close together."""
 UNKNOWN_CODES = ("off_map", "unknown_ground")
 """Codes that close a way on only within LOOK_AHEAD wheelbases; farther ground may be open."""
 
@@ -119,7 +123,13 @@ def find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOptions
 def _resists_way_back(
     rover: Rover, prediction: PathPrediction, options: SweepOptions
 ) -> np.ndarray:
-    """Return (n,) True where driving back with the same forces breaks a limit on yielding soil."""
+    """Return (n,) True where driving back needs more than it did to drive in.
+
+    On yielding soil, this is where the same forces, reversed, break a limit. Speed servos pull
+    with other forces on the way back, so that it is where they used much on the way in.
+    """
+    if prediction.policy == SERVO:
+        return _uses_much(rover, prediction, options)
     resistance = prediction.motion_resistance
     if not largest_of(resistance) > 0.0:
         return np.zeros(len(resistance), dtype=bool)
@@ -138,6 +148,14 @@ def _resists_way_back(
         & (saturation <= limits.torque_saturation + TOLERANCE)
     )
     return np.asarray(broken.any(axis=1))
+
+
+def _uses_much(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
+    """Return (n,) True where the wheels pull with more than SERVO_USE of what they can give."""
+    most = (options.max_torque or rover.wheel.max_torque) / rover.wheel.radius
+    grip = prediction.friction * np.maximum(prediction.wheel_loads, 0.0)
+    used = np.abs(prediction.tangential).sum(axis=1)
+    return np.asarray(used > SERVO_USE * np.minimum(grip, most).sum(axis=1))
 
 
 def _judge_way_back(
@@ -162,12 +180,22 @@ def _judge_way_back(
 def _judge_way(
     rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
 ) -> Verdict:
-    """Judge a way; equal torques are tried first under any policy, which is faster."""
-    equal = replace(options, policy=EQUAL)
-    verdict = sweep_until_failure(rover, terrain, [poses], equal)[0][1]
-    if verdict.traversable or options.policy == EQUAL:
-        return verdict
-    return sweep_until_failure(rover, terrain, [poses], options)[0][1]
+    """Judge a way under the first of `policies_of_ways` that passes it, else under the last."""
+    for policy in policies_of_ways(options):
+        asked = replace(options, policy=policy)
+        verdict = sweep_until_failure(rover, terrain, [poses], asked)[0][1]
+        if verdict.traversable:
+            break
+    return verdict
+
+
+def policies_of_ways(options: SweepOptions) -> tuple[str, ...]:
+    """Return the policies under which ways on and back are judged, in this order.
+
+    What equal torques pass, optimal ones pass too, and equal ones are faster. Speed servos have
+    tractions of their own, which may fail where equal ones hold.
+    """
+    return (EQUAL, OPTIMAL) if options.policy == OPTIMAL else (options.policy,)
 
 
 def _wheelbase(rover: Rover) -> float:
@@ -190,10 +218,11 @@ def _find_way_on(
     if room > wheelbase:
         behind = distance[inside.start] + 0.5 * wheelbase
         starts.append(int(np.searchsorted(distance, behind)))
-    spacing = max(_spacing(course.path), length / MAX_WAY_POSES)
+    steps = count_steps(course.path, length)
+    spacing = length / steps
     closed = ""
     for start in starts:
-        for way in _ways_ahead(course.path[start], wheelbase, length, spacing, options):
+        for way in _ways_ahead(course.path[start], wheelbase, length, steps, options):
             # From the pose before it, so that the wheels of a curve are turned on the ground.
             poses = np.vstack([course.path[max(start - 1, 0)], way])
             verdict = _judge_way(rover, terrain, poses, options)
@@ -207,11 +236,11 @@ def _find_way_on(
 
 
 def _ways_ahead(
-    pose: np.ndarray, wheelbase: float, length: float, spacing: float, options: SweepOptions
+    pose: np.ndarray, wheelbase: float, length: float, steps: int, options: SweepOptions
 ) -> Iterator[np.ndarray]:
-    """Yield ways on (m, 3) from a pose (3,): straight, then curves that end straight."""
-    direction = options.direction
-    ahead = np.arange(0.0, length + spacing, spacing)
+    """Yield ways on (steps + 1, 3) from a pose (3,): straight, then curves that end straight."""
+    direction, spacing = options.direction, length / steps
+    ahead = np.linspace(0.0, length, steps + 1)
     turning = np.minimum(ahead, LOOK_AHEAD * wheelbase) / wheelbase
     for curve in CURVES:
         yaw = pose[2] + curve * turning
@@ -221,11 +250,15 @@ def _ways_ahead(
         yield np.column_stack([places, yaw])
 
 
-def _spacing(poses: np.ndarray) -> float:
-    """Return the median distance [m] of neighbouring poses that are apart."""
-    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+def count_steps(path: np.ndarray, length: float) -> int:
+    """Return the number of steps of a way of `length` [m], about as long as those of a path.
+
+    Their median counts, of poses that are apart.
+    """
+    steps = np.hypot(*np.diff(path[:, :2], axis=0).T)
     steps = steps[steps > 0.0]
-    return float(np.median(steps)) if steps.size else 0.02
+    spacing = float(np.median(steps)) if steps.size else 0.02
+    return min(int(np.ceil(length / spacing - 1e-6)), MAX_WAY_POSES)
 
 
 def _refuse(rover: Rover, verdict: Verdict, stop: int, drop: float, ways: str) -> Verdict:

@@ -20,10 +20,10 @@ from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import (
     Crossings,
-    copy_results,
     find_crossings,
     join_crossings,
     join_results,
+    place_results,
 )
 from rover_physics.prediction.drops import MIN_ANGLE, find_falls
 from rover_physics.prediction.evaluation import effort, unwritten_results
@@ -209,7 +209,7 @@ def _evaluate_block(model: PackedModel, paths: Sequence[_StartedPath], size: int
     results, first = evaluator(model)(at, motions=motions), 0
     for path, block in pairs:
         end = first + block.stop - block.start
-        copy_results(results[first:end], path.results[block])
+        place_results(results[first:end], path.results, block)
         path.evaluated, first = block.stop, end
 
 

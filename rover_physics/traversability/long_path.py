@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
-from rover_physics.names import EQUAL
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.parts import Part, sweep_in_parts
 from rover_physics.prediction.path_prediction import PathPrediction
@@ -16,7 +15,12 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import judge_bounds
-from rover_physics.traversability.entrapment import Course, ask_for_ways_out, find_one_way
+from rover_physics.traversability.entrapment import (
+    Course,
+    ask_for_ways_out,
+    find_one_way,
+    policies_of_ways,
+)
 from rover_physics.traversability.judge_path import weigh_margin
 from rover_physics.traversability.verdict import (
     Verdict,
@@ -155,12 +159,13 @@ def _check_ways_out(
 def _judge_back(
     rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
 ) -> Verdict:
-    """Judge the way back over poses up to its first failure; equal torques are tried first."""
-    reverse = replace(options, backward=not options.backward)
-    verdict = _judge_to_failure(rover, terrain, poses, replace(reverse, policy=EQUAL))
-    if verdict.traversable or reverse.policy == EQUAL:
-        return verdict
-    return _judge_to_failure(rover, terrain, poses, reverse)
+    """Judge the way back over poses up to its first failure, as `judge_path` does."""
+    for policy in policies_of_ways(options):
+        reverse = replace(options, policy=policy, backward=not options.backward)
+        verdict = _judge_to_failure(rover, terrain, poses, reverse)
+        if verdict.traversable:
+            break
+    return verdict
 
 
 def _judge_to_failure(

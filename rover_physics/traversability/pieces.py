@@ -24,10 +24,16 @@ from rover_physics.prediction.crossing import (
     select_results,
     turn_wheels,
 )
-from rover_physics.prediction.drops import FACE, MIN_ANGLE
+from rover_physics.prediction.drops import MIN_ANGLE
 from rover_physics.prediction.evaluation import unwritten_results
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.path_kernels import add_up, find_jumps, way_between
+from rover_physics.prediction.path_kernels import (
+    FACE,
+    add_up,
+    find_jumps,
+    find_turns,
+    way_between,
+)
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, evaluator, joined_paths, wheels_of
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -195,7 +201,9 @@ class _Sweep:
         joined = joined_paths(ends)
         turned = turn_wheels(poses, results, joined, evaluator(self._model))
         jumps, wheels = np.empty((len(poses), 2), np.int64), wheels_of(self._model)
-        jumps = jumps[: find_jumps(results, poses, joined, jump_limits_of(wheels), jumps)]
+        limits, far = jump_limits_of(wheels), np.empty_like(jumps)
+        jumps = jumps[: find_jumps(results, poses, joined, limits, jumps)]
+        far = far[: find_turns(results, poses, joined, limits, far)]
         numbers, ease = np.full((len(indices), NUMBERS), np.nan), self._ease()
         sums = np.empty((3, len(poses)))
         path = view_read_only(poses), view_read_only(results), ends, sums
@@ -203,7 +211,8 @@ class _Sweep:
         linkage = self._model.record.linkage
         size = wheels.reach, linkage.steering_rate
         sum_up_pieces(path, turns, ease, size, numbers)
-        numbers[np.searchsorted(ends, jumps[:, 0], side="right"), 0] = np.nan
+        closer = np.append(jumps[:, 0], far[:, 0])
+        numbers[np.searchsorted(ends, closer, side="right"), 0] = np.nan
         return {
             k: PieceVerdict("", *row)
             for k, row in zip(indices.tolist(), numbers.tolist(), strict=True)

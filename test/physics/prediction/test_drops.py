@@ -59,6 +59,26 @@ def test_with_more_friction_a_wheel_never_drops_deeper(height):
     assert (np.diff(drops, axis=0) <= 1e-9).all()
 
 
+@pytest.mark.parametrize("friction", [0.2, 0.4, 0.8, 1.5])
+@pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
+def test_no_friction_hides_a_fall_from_a_wall_that_is_too_high(friction, policy):
+    """Too high is the limit and what a wheel rolls over the edge before it falls."""
+    rolled = RADIUS * (1.0 - np.cos(FACE))
+    down = edge_down(LSR1.limits.wheel_drop + rolled + 5e-3)
+    _, verdict = drive(down, LSR1, friction=friction, policy=policy)
+    assert not verdict.traversable
+    assert "wheel_drop" in verdict.codes
+
+
+def test_a_drop_does_not_depend_on_where_waypoints_are():
+    moved = [drive_path(0.02) + np.array([x, 0.0, 0.0]) for x in (0.0, 0.004, 0.009, 0.015)]
+    drops = [
+        sweep_path(FREE, edge_down(0.15), path, SweepOptions(friction=0.8)).wheel_drop.max(axis=0)
+        for path in moved
+    ]
+    assert np.ptp(drops, axis=0).max() < 1e-3
+
+
 @pytest.mark.parametrize("friction", [0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8])
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_a_wheel_rolls_down_a_smooth_bump_however_slippery_if_the_others_hold_it(friction, policy):

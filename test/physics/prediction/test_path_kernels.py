@@ -14,7 +14,16 @@ from rover_physics.prediction.path_kernels import (
 )
 from rover_physics.status import PoseStatus
 
-LIMITS = JumpLimits(max_spacing=0.1, min_spacing=1e-4, height=0.025, reach=0.5)
+LIMITS = JumpLimits(
+    max_spacing=0.1,
+    min_spacing=1e-4,
+    height=0.025,
+    reach=0.5,
+    friction=1.0,
+    torque=1.0,
+    peak_spacing=0.004,
+    fall_spacing=0.004,
+)
 
 
 def results_with(contact_angles, statuses=PoseStatus.SETTLED, heights=0.0):
@@ -56,6 +65,29 @@ def test_a_jump_is_a_steep_contact_that_turns_or_a_wheel_that_rises():
     assert jumps_of(results_with([0.0, 0.5, 0.6, 0.0])) == [[0, 1], [2, 3]]
     assert jumps_of(results_with([0.0, 0.3, 0.0])) == []
     assert jumps_of(results_with([0.0] * 3, heights=[0.0, 0.02, 0.05])) == [[1, 2]]
+
+
+def searched(angles, friction):
+    """Return whether a step is searched whose ends have these contact angles and frictions."""
+    results = results_with(angles)
+    results["friction_utilisation"] = np.array(friction)[:, None]
+    results["torque_saturation"] = 0.0
+    return bool(jumps_of(results))
+
+
+def test_peaks_of_forces_are_looked_for_where_contacts_turn_near_a_limit():
+    assert searched([0.0, 0.2], [0.7, 0.8])
+    assert searched([0.0, 0.03], [0.92, 0.9])
+    assert searched([0.0, 0.2], [0.8, 1.2])
+    assert not searched([0.0, 0.01], [0.7, 0.97])
+    assert not searched([0.0, 0.2], [0.5, 0.5])
+    assert not searched([0.0, 0.2], [1.2, 1.3])
+
+
+def test_the_place_where_a_wheel_begins_to_fall_is_looked_for():
+    assert searched([-0.76, -0.82], [0.2, 0.2])
+    assert not searched([-0.72, -0.76], [0.2, 0.2])
+    assert not searched([0.76, 0.82], [0.2, 0.2])
 
 
 def test_no_jump_is_looked_for_where_the_path_is_not_one_way():

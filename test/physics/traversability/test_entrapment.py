@@ -222,3 +222,34 @@ def test_poses_close_together_before_an_edge_do_not_take_the_time_and_the_memory
     assert verdict.code == "trapped"
     assert time.perf_counter() - began < 60.0
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
+
+
+# Speed servos
+
+
+def test_ways_of_speed_servos_are_judged_by_their_own_tractions():
+    """On fixed wheels, servos turn less than the way asks; equal tractions balance there."""
+    fixed = replace(LSR1, steering=None)
+    _, curve, _ = trap._ways_ahead(np.zeros(3), 0.8, 1.2, 60, SweepOptions())
+    on_servos, level = SweepOptions(policy="servo"), edge(0.0)
+    assert judge_path(fixed, level, curve)[1].traversable
+    assert not judge_path(fixed, level, curve, on_servos)[1].traversable
+    assert not trap._judge_way(fixed, level, curve, on_servos).traversable
+
+
+@pytest.mark.parametrize("slope, checked", [(0.0, False), (-0.3, False), (-0.55, True)])
+def test_the_way_back_of_speed_servos_is_checked_where_they_pull_hard(slope, checked):
+    ground = Terrain(slope * X, RESOLUTION, (-3.0, -3.0))
+    options = SweepOptions(policy="servo", friction=0.6)
+    prediction = sweep_path(LSR1, ground, way(-0.3, 0.3), options)
+    assert trap.find_one_way(LSR1, prediction, options).any() == checked
+
+
+@pytest.mark.parametrize("spacing", [0.01, 0.02, 0.03, 0.01 + 1e-12, 0.01 - 1e-12])
+def test_ways_on_end_at_the_same_place_whatever_the_spacing(spacing):
+    path = np.zeros((40, 3))
+    path[:, 0] = spacing * np.arange(40)
+    steps = trap.count_steps(path, 1.2)
+    ends = [way[-1] for way in trap._ways_ahead(path[0], 0.8, 1.2, steps, SweepOptions())]
+    assert ends[0] == pytest.approx([1.2, 0.0, 0.0], abs=1e-12)
+    assert 1.2 / steps <= spacing * (1.0 + 1e-6)

@@ -147,7 +147,7 @@ def test_crossings_end_where_a_stretch_ends():
     rows = np.array([2, 1])
     rest = crossing.find_crossings(
         bouldered(3),
-        Wheels(0.1, 0.5, 1.0, 1.0, 0.1),
+        Wheels(0.1, 0.5, 1.0, 1.0, 0.1, False),
         np.zeros((1, 3)),
         crossing.new_results(1),
         lambda at: None,
