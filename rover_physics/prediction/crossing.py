@@ -34,8 +34,9 @@ PIECES = 4
 """Number of pieces into which a stretch with a jump is divided in each round."""
 MIN_SPACING = 1e-4
 """Distance between poses [m] below which a jump counts as at one place."""
-PEAK_SPACING, FALL_SPACING = 0.01, 0.02
-"""Distances [wheel radii] below which peaks of forces, and ends of falls, are not searched."""
+PEAK_SPACING, NEAR_SPACING, FALL_SPACING = 0.01, 0.06, 0.02
+"""Distances [wheel radii] below which peaks of forces at a limit, peaks of smaller forces, and ends
+of falls are not searched."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""
@@ -188,6 +189,7 @@ def limits_of(wheels: Wheels) -> JumpLimits:
         friction=no_peaks if wheels.on_servos else wheels.friction_limit,
         torque=no_peaks if wheels.on_servos else wheels.torque_limit,
         peak_spacing=PEAK_SPACING * radius,
+        near_spacing=NEAR_SPACING * radius,
         fall_spacing=FALL_SPACING * radius,
     )
 
@@ -200,9 +202,7 @@ def find_crossings(
     evaluate: Evaluate,
     joined: np.ndarray | bool = True,
 ) -> Crossings:
-    """Evaluate the poses between waypoints that decide whether the rover gets there.
-
-    They are where contacts jump, limits may be passed, or the rover or its wheels turn far.
+    """Evaluate the poses between waypoints: at jumps, near limits, and where something turns far.
 
     Args:
         terrain: The ground.

@@ -61,6 +61,8 @@ class JumpLimits(NamedTuple):
     """Torque saturation whose peaks are searched, infinite for none."""
     peak_spacing: float
     """Way below which no peaks are searched [m]."""
+    near_spacing: float
+    """The same where the forces are not close to a limit."""
     fall_spacing: float
     """Way below which no begin or end of a fall is searched [m]."""
 
@@ -80,9 +82,7 @@ class PathPoints(NamedTuple):
 
 @exact_kernel
 def find_jumps(results, poses, joined, limits, ends):
-    """Find the pairs of waypoints between which a contact jumps or a limit may be passed.
-
-    Returns their number.
+    """Find the neighbours between which a contact jumps or a limit may be passed; return how many.
 
     Args:
         results: (n,) RESULT of each waypoint.
@@ -186,7 +186,7 @@ def sort_pieces(ends, pieces, known, limits, sorted_ends):
 
     A piece in which a contact still jumps is closed if it is shorter than `limits.min_spacing`, or
     if the rover does not settle at a pose within it; else it is open. Other pieces are open if
-    `_finest` asks for shorter ones.
+    `_finest` asks for shorter ones and the rover settles at all poses within them.
 
     Args:
         ends: (k, 2) rows of `known` at the start and end of each stretch.
@@ -214,7 +214,7 @@ def sort_pieces(ends, pieces, known, limits, sorted_ends):
                 else:
                     sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
                     n_open += 1
-            else:
+            elif not skipped:
                 finest = _finest(results[before], results[after], limits)
                 if finest < way_between(poses[before], poses[after], limits.reach):
                     sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
@@ -275,7 +275,7 @@ def _finest(here, there, limits):
     largest = max(use, other_use)
     rises = largest > LEAST_USE and largest * (1.0 + PEAK * turn) > 1.0
     if min(use, other_use) <= 1.0 and (rises or (largest > NEAR_LIMIT and turn > LEAST_TURN)):
-        return limits.peak_spacing if largest > AT_LIMIT else limits.fall_spacing
+        return limits.peak_spacing if largest > AT_LIMIT else limits.near_spacing
     return limits.fall_spacing if falls else np.inf
 
 

@@ -163,11 +163,15 @@ class _Step:
 
 
 def _steps_with_crossings(results: Any, crossings: Crossings) -> Iterator[_Step]:
-    """Yield the steps between settled waypoints that have poses between them."""
-    for i in np.unique(crossings.waypoint):
+    """Yield the steps between settled waypoints that have poses between them.
+
+    Poses at a waypoint itself, where the wheels turn, are not between.
+    """
+    between = crossings.place > crossings.waypoint - 1
+    for i in np.unique(crossings.waypoint[between]):
         if i == 0 or (results["status"][i - 1 : i + 1] != PoseStatus.SETTLED).any():
             continue
-        rows = np.flatnonzero(crossings.waypoint == i)
+        rows = np.flatnonzero((crossings.waypoint == i) & between)
         rows = rows[crossings.results["status"][rows] == PoseStatus.SETTLED]
         speed = float(np.hypot(results["motion"][i, 0], results["motion"][i, 1]))
         if speed > 0.0:
