@@ -35,8 +35,8 @@ PIECES = 4
 MIN_SPACING = 1e-4
 """Distance between poses [m] below which a jump counts as at one place."""
 PEAK_SPACING, NEAR_SPACING, FALL_SPACING = 0.01, 0.06, 0.02
-"""Distances [wheel radii] below which peaks of forces at a limit, peaks of smaller forces, and ends
-of falls are not searched."""
+"""Distances [wheel radii] below which peaks of forces at a limit, smaller peaks, and ends of falls
+are not searched."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""

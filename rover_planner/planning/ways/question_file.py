@@ -1,7 +1,7 @@
 """Files that hold a question for a way with its map, so that it can be asked again elsewhere."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,18 @@ from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import LatticeSettings
 
 _ENTRY, _MOST = "way_question", 1_000_000
+
+
+@dataclass(frozen=True)
+class _Content:
+    """What the entry holds."""
+
+    rover: dict[str, Any]
+    start: tuple[float, float, float]
+    goal: tuple[float, float, float]
+    options: PathQueryOptions
+    joint_angles: dict[str, float] | None
+    settings: LatticeSettings
 
 
 def write_question(path: Path, question: WayQuestion, settings: LatticeSettings) -> None:
@@ -59,30 +71,13 @@ def read_question(path: Path, max_cells: int = MAX_CELLS) -> tuple[WayQuestion, 
     except (RoverFileError, json.JSONDecodeError) as error:
         raise PlanningError(f"{path} holds no question for a way: {error}") from None
     with errors_of(path):
-        asked = _Content(content)
-        question = WayQuestion(
-            rover=rover_from_dict(asked.take("rover"), str(path)),
-            terrain=terrain,
-            start=np.array(asked.take("start"), float),
-            goal=np.array(asked.take("goal"), float),
-            options=read_as(PathQueryOptions, asked.take("options"), "the options of a question"),
-            joint_angles=asked.take("joint_angles"),
-        )
-        return question, read_as(LatticeSettings, asked.take("settings"), "the settings")
-
-
-class _Content:
-    """The entries of a question by name."""
-
-    def __init__(self, content: Any):
-        self._content = content
-
-    def take(self, name: str) -> Any:
-        """Return an entry.
-
-        Raises:
-            PlanningError: It is missing.
-        """
-        if not isinstance(self._content, dict) or name not in self._content:
-            raise PlanningError(f"the question has no entry {name}")
-        return self._content[name]
+        asked: _Content = read_as(_Content, content, "a question for a way")
+    question = WayQuestion(
+        rover=rover_from_dict(asked.rover, str(path)),
+        terrain=terrain,
+        start=asked.start,
+        goal=asked.goal,
+        options=asked.options,
+        joint_angles=asked.joint_angles,
+    )
+    return question, asked.settings

@@ -245,7 +245,7 @@ def choose_window(question: WayQuestion, cell: float) -> tuple[Nodes, bool]:
     nodes = nodes_within(cell, (xmin, ymin), (xmax, ymax))
     if nodes.count <= MAX_NODES:
         return nodes, False
-    half = 0.5 * cell * math.sqrt(MAX_NODES / HEADINGS)
+    half = 0.5 * cell * (math.isqrt(MAX_NODES // HEADINGS) - 1)
     centre = 0.5 * (np.asarray(question.start)[:2] + np.asarray(question.goal)[:2])
     low = np.maximum(centre - half, (xmin, ymin))
     high = np.minimum(centre + half, (xmax, ymax))

@@ -133,6 +133,7 @@ def test_small_gaps_are_interpolated_on_demand(server, client):
     )
     goal = (2.0, 0.0, 0.0)
     assert client.set_parameter("candidate_count", 1) == (True, "")
+    assert client.set_parameter("planner", "fan") == (True, "")
     _, verdict, _ = ask(client, start=(-2.0, 0.31, 0.0), goal=(2.0, 0.31, 0.0))
     assert verdict["code"] == "unknown_ground"
     assert client.set_parameter("max_gap", 0.3) == (True, "")

@@ -303,7 +303,7 @@ def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
     goal,
     codes,
 ):
-    service = make_service(real_map("erc_marsyard2021_9cm"))
+    service = make_service(real_map("erc_marsyard2021_9cm"), planner="fan")
     judgement = service.answer(start, goal)
     assert judgement.code in codes, judgement.reason
     assert judgement.traversable == (not judgement.reason) == (codes == {""})

@@ -40,7 +40,8 @@ KEYS = keys_of(VerdictReport)
 @pytest.fixture(scope="module")
 def full():
     """Return the judgement of a refused request about which all there is can be said."""
-    service = TraverseService(load_service_settings(TraverseServerParameters(candidate_count=2)))
+    parameters = TraverseServerParameters(candidate_count=2, planner="fan")
+    service = TraverseService(load_service_settings(parameters))
     service.take_terrain(make_terrain(wall_at(0.5)))
     service.take_joints(dict.fromkeys(SUSPENSION_JOINTS, 0.0))
     service.take_pose(np.array([-2.0, 0.0, 0.0]))

@@ -1,0 +1,109 @@
+"""Tests of the shortest paths on a lattice against scipy's Dijkstra."""
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.planning.lattice.edges import FAILS, PASSES, Edges, JudgedEdges
+from rover_planner.planning.lattice.graph import Seeds, ToGoal, edge_cost, measure_to_goal
+from rover_planner.planning.lattice.graph import _bound_to_goal as bound_to_goal
+from rover_planner.planning.lattice.nodes import nodes_within
+from rover_planner.planning.lattice.primitives import make_primitives
+from rover_planner.planning.lattice.shortest import ShortestPaths
+
+EDGES = Edges(
+    nodes_within(0.2, (0.0, 0.0), (2.4, 2.0)), make_primitives(load_rover("lsr1"), 0.2, 0.1)
+)
+
+
+def random_knowledge(seed):
+    """Return edges of which half is judged, some refused, and nodes with doubts."""
+    rng = np.random.default_rng(seed)
+    known = JudgedEdges(EDGES)
+    judged = rng.random(known.state.shape) < 0.5
+    known.state[judged] = rng.choice([PASSES, PASSES, FAILS], judged.sum())
+    least = np.tile(EDGES.table.least_cost, (EDGES.nodes.count // 16, 1))
+    known.cost[:] = np.where(np.isfinite(least), least, 0.0) * (1.0 + rng.random(least.shape))
+    known.standing[rng.random(EDGES.nodes.count) < 0.3] = FAILS
+    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32)
+
+
+def explicit_costs(known, graph):
+    """Return the matrix of the costs of all edges that are not refused."""
+    rows, columns, costs = [], [], []
+    shape, table = EDGES.nodes.shape, EDGES.table
+    for node in range(EDGES.nodes.count):
+        place, heading = divmod(node, 16)
+        row, column = divmod(place, shape[1])
+        for k, end_heading in enumerate(table.end_heading[heading]):
+            x, y = column + table.step[heading, k, 0], row + table.step[heading, k, 1]
+            if end_heading < 0 or not (0 <= x < shape[1] and 0 <= y < shape[0]):
+                continue
+            end = (y * shape[1] + x) * 16 + end_heading
+            cost = edge_cost(graph, node, k, end)
+            if np.isfinite(cost):
+                rows.append(node), columns.append(end), costs.append(cost)
+    count = EDGES.nodes.count
+    best = {}
+    for row, column, cost in zip(rows, columns, costs, strict=True):
+        best[row, column] = min(cost, best.get((row, column), np.inf))
+    ends = np.array(list(best), int).reshape(-1, 2)
+    return csr_array((list(best.values()), (ends[:, 0], ends[:, 1])), shape=(count, count))
+
+
+def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
+    found = 0
+    for seed in range(12):
+        known, doubt = random_knowledge(seed)
+        rng = np.random.default_rng(seed + 100)
+        free = np.flatnonzero(known.standing == 0)
+        starts = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
+        goals = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
+        for caution in (1.0, 0.0):
+            search = ShortestPaths(known, doubt, starts)
+            route = search.find(starts, goals, caution)
+            costs = dijkstra(explicit_costs(known, search.graph(caution)), indices=starts.nodes)
+            totals = starts.costs[:, None] + costs[:, goals.nodes] + goals.costs
+            if route is None:
+                assert np.isinf(totals.min())
+                continue
+            found += 1
+            assert abs(route.cost - totals.min()) < 1e-5
+            ends = EDGES.ends(route.edges)
+            firsts = route.edges // EDGES.width
+            np.testing.assert_array_equal(ends[:-1], firsts[1:])
+            assert firsts[0] == starts.nodes[route.start] and ends[-1] == goals.nodes[route.goal]
+    assert found > 10
+
+
+def test_bounds_to_the_goal_are_never_above_the_costs():
+    known, doubt = random_knowledge(3)
+    free = np.flatnonzero(known.standing == 0)
+    starts, goals = Seeds(free[[5]], np.zeros(1)), Seeds(free[[-7]], np.zeros(1))
+    graph = ShortestPaths(known, doubt, starts).graph(1.0)
+    focus, reach = EDGES.nodes.surround(starts.nodes)
+    to_goal = ToGoal(np.empty(EDGES.nodes.count), focus, reach, EDGES.nodes.cell)
+    limit, _ = measure_to_goal(graph, goals, starts, 1.1, to_goal)
+    costs = dijkstra(explicit_costs(known, graph).T.tocsr(), indices=goals.nodes)[0]
+    for node in free:
+        bound = bound_to_goal(to_goal, limit, EDGES.nodes.shape[1], node)
+        assert bound <= costs[node] + 1e-5
+
+
+def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
+    known, doubt = random_knowledge(7)
+    known.standing[:], known.state[:] = 0, 0
+    starts, goals = (
+        Seeds(np.array([16 * 14]), np.zeros(1)),
+        Seeds(np.array([16 * 100]), np.zeros(1)),
+    )
+    search, before = ShortestPaths(known, doubt, starts), 0.0
+    for _ in range(60):
+        route = search.find(starts, goals, 0.0)
+        assert route is not None and route.cost >= before - 1e-9
+        before = route.cost
+        known.state.flat[route.edges[len(route.edges) // 2]] = FAILS
+    costs = dijkstra(explicit_costs(known, search.graph(0.0)), indices=starts.nodes)
+    route = search.find(starts, goals, 0.0)
+    assert abs(route.cost - costs[0, goals.nodes[0]]) < 1e-5
