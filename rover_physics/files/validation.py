@@ -128,8 +128,11 @@ def _say(kind: Any, fault: Any, what: str, at: Key) -> str:
     if fault["type"] == RULE_BROKEN:
         return str(refuse(key, fault["input"], fault["msg"] + _hint(fault)))
     if fault["type"] not in (*UNKNOWN_KEY, MISSING_KEY):
-        names = ", ".join(_names(_part(kind, found)))
-        return str(refuse(key or "the file", fault["input"], f"a mapping with {names}"))
+        part = _part(kind, found)
+        must = fault["msg"].removeprefix("Input should be ")
+        if "properties" in part:
+            must = f"a mapping with {', '.join(_names(part))}"
+        return str(refuse(key or "the file", fault["input"], must))
     where, part = show_key((*at, *place)) or what, _part(kind, place)
     if fault["type"] == MISSING_KEY:
         return f"missing key {key}; {where} needs {', '.join(_names(part))}"

@@ -48,9 +48,9 @@ def test_a_terrain_file_is_no_question(tmp_path):
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        ("goal", None, "goal is missing"),
+        ("goal", None, "missing key goal"),
         ("options", {"count": 9, "colour": 1}, "colour"),
-        ("rover", {"name": "x"}, "is missing"),
+        ("rover", {"name": "x"}, "missing key gravity"),
         ("settings", {"budget": "soon"}, "budget"),
     ],
 )
