@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from nav_msgs.srv import GetPlan, LoadMap
 from rcl_interfaces.msg import Log, Parameter
 from rcl_interfaces.srv import SetParameters
@@ -33,6 +33,7 @@ RESULTS = {
     "torque_saturation": Float64MultiArray,
     "tip_over_margin": Float64MultiArray,
     "verdict": DiagnosticArray,
+    "closed_area": OccupancyGrid,
     "markers": MarkerArray,
 }
 """Topics of the server's results and their types."""

@@ -61,7 +61,7 @@ PROGRAMS = {
         "~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, ~/load_map, ~/cancel; "
         "publishes ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
-        "~/torque_saturation, ~/tip_over_margin, ~/markers, ~/closed_area",
+        "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/markers",
         read_nothing,
         specs_of(TraverseServerParameters),
     ),

@@ -55,8 +55,8 @@ _KINDS = {
     **dict.fromkeys([*WHEEL_TOPICS, "tip_over_margin"], Float64MultiArray),
     "predicted_joints": JointTrajectory,
     "verdict": DiagnosticArray,
-    "markers": MarkerArray,
     "closed_area": OccupancyGrid,
+    "markers": MarkerArray,
 }
 """Topics in the order of publication, and their message types."""
 

@@ -1,4 +1,4 @@
-"""Path following: pure pursuit along the path, and turns on the spot where the path has them."""
+"""Path following: pure pursuit forwards and backwards, and turns on the spot between."""
 
 import math
 from itertools import pairwise
@@ -22,7 +22,7 @@ MIN_TURN_SHARE = 0.2
 
 
 class PathFollower:
-    """Follows a path: stretches by pure pursuit, turns on the spot between them.
+    """Follows a path: stretches by pure pursuit, forwards or backwards, and turns on the spot.
 
     Source: Coulter, "Implementation of the pure pursuit path tracking algorithm", 1992.
     """
@@ -75,11 +75,12 @@ class PathFollower:
         if self._leg.is_turn:
             return 0.0, self._turn(pose, speed)
         target = self._leg.at(self._leg.done + self._look_ahead)
-        way = target - pose[:2]
-        across = -np.sin(pose[2]) * way[0] + np.cos(pose[2]) * way[1]
+        way, gear = target - pose[:2], self._leg.gear
+        # Backwards, the rover is steered as one that heads the other way.
+        across = gear * (-np.sin(pose[2]) * way[0] + np.cos(pose[2]) * way[1])
         curvature = 2.0 * across / max(float(way @ way), 1e-6)
         most = 1.0 / self._look_ahead
-        return speed, speed * float(np.clip(curvature, -most, most))
+        return gear * speed, speed * float(np.clip(curvature, -most, most))
 
     def _is_done(self, pose: Floats) -> bool:
         """Return whether a pose is at the end of the current leg."""
@@ -101,6 +102,7 @@ class _Leg:
 
     def __init__(self, poses: Floats):
         self.is_turn = len(poses) > 1 and bool((_steps(poses) <= SAME_PLACE).all())
+        self.gear = -1.0 if _gears(poses).min(initial=0.0) < 0.0 else 1.0
         self._places = poses[:, :2]
         self._yaw = np.unwrap(poses[:, 2])
         self._along = np.concatenate([[0.0], np.cumsum(_steps(poses))])
@@ -139,12 +141,20 @@ class _Leg:
 
 
 def _find_legs(poses: Floats) -> list[_Leg]:
-    """Return the legs of a path (n, 3): stretches, and turns on the spot between them."""
-    turns = np.abs([_wrap(turn) for turn in np.diff(poses[:, 2])])
-    on_the_spot = (_steps(poses) <= SAME_PLACE) & (turns > MIN_TURN)
-    changes = np.flatnonzero(np.diff(on_the_spot.astype(int))) + 1
+    """Return the legs of a path (n, 3): stretches in one gear, and turns on the spot."""
+    changes = np.flatnonzero(np.diff(_gears(poses))) + 1
     bounds = [0, *changes.tolist(), len(poses) - 1]
     return [_Leg(poses[first : last + 1]) for first, last in pairwise(bounds)]
+
+
+def _gears(poses: Floats) -> Floats:
+    """Return 1 for steps (n - 1,) forwards, -1 for those backwards, 0 for turns on the spot."""
+    steps = np.diff(poses, axis=0)
+    turns = np.array([_wrap(turn) for turn in steps[:, 2]])
+    yaw = poses[:-1, 2] + 0.5 * turns
+    ahead = steps[:, 0] * np.cos(yaw) + steps[:, 1] * np.sin(yaw)
+    on_the_spot = (_steps(poses) <= SAME_PLACE) & (np.abs(turns) > MIN_TURN)
+    return np.where(on_the_spot, 0.0, np.where(ahead < 0.0, -1.0, 1.0))
 
 
 def _steps(poses: Floats) -> Floats:

@@ -57,11 +57,17 @@ class Judgement:
         """
         whole = self
         try:
-            whole = self if self.judge_rest is None else self.judge_rest()
+            whole = self._with_rest()
             _ = whole.changes() if whole._is_equal_and_traversable else whole.classes
         except QuestionStoppedError:
             return replace(whole, classify=tuple, judge_rest=None)
         return whole
+
+    def _with_rest(self) -> "Judgement":
+        """Return the judgement with the waypoints beyond the first failure."""
+        if self.judge_rest is None:
+            return self
+        return replace(self.judge_rest(), code=self.code, reason=self.reason, way=self.way)
 
     @property
     def _is_equal_and_traversable(self) -> bool:
@@ -73,8 +79,7 @@ class Judgement:
     def report(self) -> VerdictReport:
         """The full report of the request. Computed on first use, with the classes and the rest."""
         if self.judge_rest is not None:
-            whole = self.judge_rest()
-            return replace(whole, code=self.code, reason=self.reason).report
+            return self._with_rest().report
         if self.candidate is None:
             return VerdictReport(False, self.code, self.reason)
         report = report_path(self.candidate, self.classes, self.suspension, self.search)
