@@ -120,12 +120,15 @@ def _ask(
 ) -> None:
     """Search the way, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
+    from rover_planner.nodes.warm_up import search_ways
     from rover_planner.planning.ways.way_report import report_way
     from rover_planner.planning.ways.way_search import find_way
     from rover_planner.progress import show_progress
 
     with show_progress() as progress:
-        progress(f"search a way for {question.rover.name} (the first run compiles the model)")
+        progress("load the model (the first run compiles it)")
+        search_ways()  # so that the budget is not spent on it
+        progress(f"search a way for {question.rover.name}")
         answer = find_way(question, settings)
     if answer.path is not None:
         on_soil = question.options.soil is not None or bool(question.terrain.soil_names)
