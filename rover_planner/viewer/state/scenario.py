@@ -1,7 +1,7 @@
 """What is judged, and what came out: frozen values that threads may share."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
@@ -35,7 +35,7 @@ class Scenario:
     """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
     recorded: Floats | None = None
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
-    search: LatticeSettings = LatticeSettings()
+    search: LatticeSettings = field(default_factory=LatticeSettings)
     """How a way around obstacles is searched."""
 
     def has_paths_of(self, other: "Scenario") -> bool:
