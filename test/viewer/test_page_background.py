@@ -36,7 +36,7 @@ def browser() -> Iterator[object]:
 @pytest.fixture(scope="module")
 def slow_page() -> Iterator[Page]:
     """A page on a reef that needs seconds for each change; a search for a way ends soon."""
-    ground, options = lowered_reef(), slow_options(2, 2e-4)
+    ground, options = lowered_reef(), slow_options(2, 1e-4)
     hurried = LatticeSettings(budget=0.1)
     session = ViewSession(tolerant_rover(), ground, START, GOAL, options, hurried)
     page = Page(session, port=0)
