@@ -160,7 +160,11 @@ def test_sliders_dragged_to_both_ends_leave_the_page_alive_and_right(visitor, sl
         poses, options = session.shown.candidate.poses, session.sweep_options()
         _, verdict = judge_path(session.rover, session.terrain, poses, options)
         assert session.shown.verdict.traversable == verdict.traversable
-        word = "traversable" if verdict.traversable else f"not traversable: {verdict.reason}"
-        wait_until(lambda word=word: word in visitor.text("#verdict:visible"), "the verdict")
-    assert visitor.slider_value(FRICTION) == session.rover.friction == 0.4
+        assert session.shown.verdict.reason == verdict.reason
+        word = "traversable" if verdict.traversable else "not traversable"
+        wait_until(
+            lambda word=word: visitor.text("#verdict:visible").startswith(word), "the verdict"
+        )
+        assert verdict.reason in visitor.text("#verdict:visible")
+    assert visitor.slider_value(FRICTION) == session.rover.friction
     assert not slow_page.errors.messages and visitor.page_errors == []
