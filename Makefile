@@ -12,7 +12,7 @@ READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.bench_ready
 PACKAGES := rover_physics msg_adapters rover_planner
 MAP ?=
-BROWSER_TESTS := test/viewer/test_page.py test/viewer/test_live_page.py
+BROWSER_TESTS := $(addprefix test/viewer/test_,page.py page_background.py page_ways.py live_page.py)
 # Tests, demo and nodes talk to this machine only.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1

@@ -31,3 +31,13 @@ def wall_at(place):
 def gap(x, y):
     """Return waves with a band of unknown ground along y."""
     return np.where((x > 0.5) & (x < 1.0), np.nan, waves(x, y))
+
+
+def wall_with_gap(x, y, height=0.5):
+    """Return waves with a wall along y at x = 0, of a height [m], which ends at y = 1 m."""
+    return waves(x, y) + height * ((np.abs(x) < 0.2) & (y < 1.0))
+
+
+def whole_wall(x, y):
+    """Return waves with a wall of 0.5 m along y at x = 0."""
+    return waves(x, y) + 0.5 * (np.abs(x) < 0.2)

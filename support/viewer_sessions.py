@@ -8,6 +8,7 @@ from benchmarks.grounds import made_reef
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
@@ -62,3 +63,9 @@ def slow_scenario(friction: float = 2.0) -> Scenario:
     """Return a scenario that takes seconds, with a friction coefficient."""
     rover = replace(tolerant_rover(), friction=friction)
     return Scenario(rover, rover, lowered_reef(), START, GOAL, slow_options(), {})
+
+
+def walled_session(height, goal=(-1.1, 0.0, 0.0), rover=LSR1) -> ViewSession:
+    """Return a session on 5 m x 5 m with a wall at x = 0; searches may take long."""
+    patient, ground = LatticeSettings(budget=60.0), make_terrain(height, half=2.5)
+    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=patient)

@@ -97,9 +97,11 @@ def _compile() -> None:
     """Compile the kernels or load them from the cache before the page is served."""
     from rover_physics.compilation import Compilation
     from rover_physics.warm_up import EXACT, UNCERTAIN
+    from rover_planner.nodes.warm_up import WAYS
     from rover_planner.progress import show_progress
 
-    with show_progress() as progress, Compilation((*EXACT, *UNCERTAIN)) as compilation:
+    steps = (*EXACT, *UNCERTAIN, *WAYS)
+    with show_progress() as progress, Compilation(steps) as compilation:
         progress("load the model")
         compilation.run(lambda name: progress(f"compile {name} (only the first time)"))
 

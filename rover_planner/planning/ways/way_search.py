@@ -13,6 +13,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.lattice.connections import connect_goal, connect_start
+from rover_planner.planning.lattice.edges import UNJUDGED
 from rover_planner.planning.lattice.ground_estimate import estimate_ground
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.judge import Judge
@@ -86,6 +87,9 @@ class WayAnswer:
     """The nodes of the lattice."""
     closed: ClosedArea | None
     """What is closed in where no way exists; else None."""
+    asked: NDArray[np.bool_]
+    """(rows, columns) True for the places where the model was asked whether the rover can stand,
+    in this search or in an earlier one that the memory holds; row 0 at the smallest y."""
 
 
 def find_way(
@@ -161,6 +165,7 @@ class _WaySearch:
         friction = question.options.friction or question.rover.friction
         ground = estimate_ground(question.rover, question.terrain, nodes, friction)
         known.standing[ground.groundless] = known.state_of("unknown_ground")
+        self._groundless = ground.groundless
         return LatticeSearch(
             self._judge,
             known,
@@ -217,6 +222,7 @@ class _WaySearch:
         closed: ClosedArea | None = None,
     ) -> WayAnswer:
         progress = Progress() if search is None else search.progress
+        asked = np.zeros(self._nodes.shape, bool) if search is None else self._asked(search)
         known = progress.best is not None and progress.bound > 0.0
         bound = progress.cost / progress.bound if known else math.inf
         return WayAnswer(
@@ -233,7 +239,13 @@ class _WaySearch:
             repeatable=self._repeatable,
             nodes=self._nodes,
             closed=closed,
+            asked=asked,
         )
+
+    def _asked(self, search: LatticeSearch) -> NDArray[np.bool_]:
+        """Return the places (rows, columns) where the model was asked about a node."""
+        was_asked = (search.known.standing != UNJUDGED) & ~self._groundless
+        return np.asarray(was_asked.reshape(*self._nodes.shape, HEADINGS).any(axis=2))
 
 
 def choose_window(question: WayQuestion, cell: float) -> tuple[Nodes, bool]:

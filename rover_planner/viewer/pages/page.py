@@ -25,6 +25,7 @@ REPLAN_DELAY = 0.5
 NOTICE_DELAY = 0.2
 """Time without a result after which the page tells what it judges, and greys what is old [s]."""
 NO_ROVER, NO_GROUND = "the rover is not drawn", "the ground is not drawn"
+NO_PATHS = "the paths are not drawn"
 
 
 class Page(PageBase):
@@ -103,6 +104,7 @@ class Page(PageBase):
             recolour=lambda: add(self._draw_ground, "colours"),
             show_forces=lambda visible: add(lambda: self.scene.show_forces(visible)),
             follow=lambda follows: add(lambda: setattr(self.scene, "follows", follows)),
+            show_asked=lambda visible: add(lambda: self.scene.search.show_asked(visible)),
         )
 
     # Requests of visitors.
@@ -181,11 +183,16 @@ class Page(PageBase):
             self._show_verdict()
             if now.scenario is not before.scenario:
                 self._show_scenario(before.scenario, now.scenario)
+            if now.answer is not before.answer:
+                self.ground_tab.list_paths(now.answer, now.shown.index)
             if now.answered is not before.answered:
-                self.ground_tab.list_paths(now.answer.candidates)
                 self._draw_predicted_ground()
+            if now.way is not before.way:
+                self._draw_search()
             if now.shown.candidate is not before.shown.candidate:
                 self._show_path()
+            elif now.answer is not before.answer:
+                self.errors.run(NO_PATHS, self._draw_paths)
 
     def _show_scenario(self, before: Scenario, now: Scenario) -> None:
         """Show the rover for which was judged, and begin another path at its start."""
@@ -217,7 +224,7 @@ class Page(PageBase):
 
     def _show_answer(self) -> None:
         """Show another answer: the list of its paths and the path that is shown."""
-        self.ground_tab.list_paths(self.session.answer.candidates)
+        self.ground_tab.list_paths(self.session.answer, self.session.shown.index)
         self._show_path()
 
     def _show_path(self) -> None:
@@ -225,7 +232,10 @@ class Page(PageBase):
         self._show_verdict()
         self._display.play_shown_path()
         self.errors.run("the plots are not drawn", self._display.draw_plots)
-        self.errors.run("the paths are not drawn", self._draw_paths)
+        self.errors.run(NO_PATHS, self._draw_paths)
+
+    def _draw_search(self) -> None:
+        self.errors.run("the searched ground is not drawn", self._display.draw_search)
 
     def _draw_paths(self) -> None:
         self._display.draw_paths()

@@ -41,7 +41,7 @@ class PathDisplay:
         verdict = shown.verdict
         text = describe_verdict(
             verdict.traversable,
-            verdict.reason,
+            session.finished.reason,
             session.refusal,
             shown.summary,
             shown.by_policy,
@@ -70,13 +70,23 @@ class PathDisplay:
             session.rover, session.terrain, session.candidates, session.shown.index
         )
 
+    def draw_search(self) -> None:
+        """Draw the area that is closed in, if no way was found, and what was searched."""
+        self._scene.search.show(
+            self._session.rover, self._session.terrain, self._session.finished.way
+        )
+
     def mark_old(self, path_is_old: bool) -> None:
-        """Grey the lines of other paths with old verdicts, and of the shown path if it has one."""
+        """Grey the lines of other paths with old verdicts, and of the shown path if it has one.
+
+        A search for old values is grey, too.
+        """
         session = self._session
         index = session.shown.index
         others = session.has_old_candidates
         old = {k for k in range(len(session.candidates)) if others and k != index}
         self._scene.paths.mark_old(old | {index} if path_is_old else old)
+        self._scene.search.mark_old(others)
 
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s], and draw what has changed."""

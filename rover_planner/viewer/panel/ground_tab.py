@@ -1,11 +1,11 @@
 """The tab of ground and path: what a click sets, the path that is shown, the ground's colours."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from rover_physics.terrain.soil_file import load_soils
-from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.path_query import PathAnswer
 from rover_planner.viewer.state.colours import ColourScale
 from rover_planner.viewer.state.layers import HEIGHT, LAYERS
 from rover_planner.viewer.state.visitor_requests import Action
@@ -33,6 +33,8 @@ class GroundActions:
     """Shows a candidate by its index; for None the best."""
     set_options: Callable[..., None] = lambda **_changes: None
     """Changes fields of PathQueryOptions."""
+    show_asked: Callable[[bool], None] = lambda _visible: None
+    """Shows or hides where a search for a way has asked the model."""
 
 
 class GroundTab:
@@ -74,6 +76,8 @@ class GroundTab:
                 soil=None if event.target.value == NO_SOIL else event.target.value
             )
         )
+        asked = gui.add_checkbox("What was searched", False)
+        asked.on_update(lambda event: actions.show_asked(event.target.value))
 
     def _choose(self, event: Any, actions: GroundActions) -> None:
         word = event.target.value.split(":")[0]
@@ -99,14 +103,14 @@ class GroundTab:
         """Heading of the rover for predicted layers [deg]."""
         return float(self._heading.value)
 
-    def list_paths(self, candidates: Sequence[Candidate]) -> None:
-        """List the paths to choose from, and choose the best."""
+    def list_paths(self, answer: PathAnswer, shown: int) -> None:
+        """List the paths to choose from, and choose the shown one by its index."""
         names = [BEST]
-        for k, candidate in enumerate(candidates):
+        for k, candidate in enumerate(answer.candidates):
             word = "passable" if candidate.verdict.traversable else "refused"
             names.append(f"{k + 1}: {word}, {candidate.length:.2f} m")
         self._choice.options = tuple(names)
-        self._choice.value = BEST
+        self._choice.value = BEST if shown == answer.nearest else names[shown + 1]
 
     def show_scale(self, scale: ColourScale) -> None:
         """Show what the colours of the ground mean."""

@@ -67,9 +67,9 @@ def build_ground_mesh(
         RoverError: The model refuses an option.
     """
     layer = LAYERS[layer_name]
-    x, y, heights = _subsample(terrain, MAX_CELLS)
+    x, y, heights = subsample(terrain)
     if layer.score is not None:
-        coarse_x, coarse_y, _ = _subsample(terrain, MAX_PREDICTED)
+        coarse_x, coarse_y, _ = subsample(terrain, MAX_PREDICTED)
         at = (coarse_x, coarse_y)
         values = predict_layer(layer, rover, terrain, heading, at, options)
         low, high = colour_span(layer, rover, values)
@@ -82,7 +82,7 @@ def build_ground_mesh(
     return GroundMesh(_mesh(x, y, heights, texture), ColourScale(low, high, layer.unit))
 
 
-def _subsample(terrain: Terrain, max_cells: int) -> tuple[Floats, Floats, Floats]:
+def subsample(terrain: Terrain, max_cells: int = MAX_CELLS) -> tuple[Floats, Floats, Floats]:
     """Return x (nx,), y (ny,) and heights (ny, nx) [m] of at most `max_cells` cells a side."""
     stride = -(-max(terrain.elevation.shape) // max_cells)
     heights = terrain.elevation[::stride, ::stride]
@@ -147,11 +147,13 @@ def _mesh(x: Floats, y: Floats, heights: Floats, texture: NDArray[np.uint8]) -> 
     visual = trimesh.visual.TextureVisuals(
         uv=np.column_stack([u.ravel(), v.ravel()]), material=material
     )
-    return trimesh.Trimesh(vertices, _faces(np.isfinite(heights)), visual=visual, process=False)
+    return trimesh.Trimesh(
+        vertices, join_cells(np.isfinite(heights)), visual=visual, process=False
+    )
 
 
-def _faces(known: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return the triangles (m, 3) between cells that are known (ny, nx)."""
+def join_cells(known: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the triangles (m, 3) between the centres of cells that are known (ny, nx)."""
     index = np.arange(known.size).reshape(known.shape)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, 1:] & known[1:, :-1]

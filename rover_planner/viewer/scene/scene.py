@@ -12,6 +12,7 @@ from rover_planner.viewer.scene.force_arrows import ForceArrows
 from rover_planner.viewer.scene.ground_mesh import as_unlit_glb
 from rover_planner.viewer.scene.overlays import PathOverlay
 from rover_planner.viewer.scene.rover_visual import RoverVisual
+from rover_planner.viewer.scene.search_overlay import SearchOverlay
 from rover_planner.viewer.scene.turning_centre import TurningCentre
 from rover_planner.viewer.state.trajectory import RoverState
 
@@ -26,6 +27,7 @@ class Scene:
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.configure_environment_map(environment_intensity=0.25)
         self.paths = PathOverlay(self._scene)
+        self.search = SearchOverlay(self._scene)
         self.follows = False
         """Whether the cameras move with the rover."""
         self._forces_shown = True

@@ -18,6 +18,8 @@ TRACTION = (230, 159, 0)
 """Orange: tangential forces, slip."""
 NOTICE = (204, 121, 167)
 """Reddish purple: a change that was refused."""
+SEARCHED = (0, 158, 115)
+"""Bluish green: places that a search has asked the model about."""
 MIDDLE = (240, 228, 66)
 """Yellow: half-way from blue to vermillion."""
 METAL, DARK, BODY = (150, 155, 160), (50, 52, 56), (225, 220, 205)

@@ -1,4 +1,4 @@
-"""Judges a scenario step by step: the shown path or all candidates, then its other policies."""
+"""Judges a scenario step by step: the shown path or all candidates, policies, a way around."""
 
 import time
 from collections.abc import Iterator
@@ -7,13 +7,22 @@ from dataclasses import dataclass, replace
 from rover_physics.errors import RoverError
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.numerics.arrays import Floats
-from rover_planner.planning.path_query import Candidate, check_path, choose, generate_paths
+from rover_planner.planning.path_query import (
+    Candidate,
+    PathAnswer,
+    check_path,
+    choose,
+    generate_paths,
+)
+from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.planning.ways.question import WayQuestion
+from rover_planner.planning.ways.way_search import find_way
 from rover_planner.viewer.state.background_work import Report
 from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.scenario import Judgement, Scenario, ShownPath
 from rover_planner.viewer.state.trajectory import Trajectory
 
-PATH, POLICY = "judging path", "judging policy"
+PATH, POLICY, WAY = "judging path", "judging policy", "searching a way"
 """What is reported to be worked on."""
 
 
@@ -27,22 +36,38 @@ class JudgeRequest:
     """The judgement whose candidate is judged again; None: all candidates are judged."""
     index: int = 0
     """Index of that candidate."""
+    searches: bool = True
+    """Whether a way around obstacles is searched if all candidates are refused."""
 
 
-def judge_request(request: JudgeRequest, report: Report) -> Iterator[Judgement]:
+def judge_request(
+    request: JudgeRequest, report: Report, memory: EdgeMemory | None = None
+) -> Iterator[Judgement]:
     """Yield the judgement with the verdict, then the same with those of all policies.
+
+    If all candidates are refused, it follows with a way around obstacles, or with why there is
+    none.
 
     Args:
         request: What to judge.
-        report: Called before each path and each policy.
+        report: Called before each path, each policy and the search of a way.
+        memory: What earlier searches have found; None begins anew.
 
     Raises:
         RoverError, PlanningError: The rover, the poses or the options are invalid.
     """
-    first = _judge_one(request, report) if request.before else _judge_all(request, report)
-    yield first
-    if first.scenario.recorded is None:
-        yield _add_policies(first, report)
+    judged = _judge_one(request, report) if request.before else _judge_all(request, report)
+    yield judged
+    if judged.scenario.recorded is not None:
+        return
+    judged = _add_policies(judged, report)
+    yield judged
+    if request.searches and judged.needs_way:
+        refused = judged.shown
+        judged = _search_way(judged, report, memory)
+        yield judged
+        if judged.shown is not refused:
+            yield _add_policies(judged, report)
 
 
 def _judge_all(request: JudgeRequest, report: Report) -> Judgement:
@@ -113,6 +138,27 @@ def _add_policies(judgement: Judgement, report: Report) -> Judgement:
         report(POLICY, k + 1, len(TORQUE_POLICIES))
         found.append(_judge_under(policy, judgement.scenario, judgement.shown.candidate))
     return replace(judgement, shown=replace(judgement.shown, by_policy=tuple(found)))
+
+
+def _search_way(judgement: Judgement, report: Report, memory: EdgeMemory | None) -> Judgement:
+    """Return a judgement with a way around obstacles as one more candidate, or why there is none.
+
+    The way is shown unless a visitor has chosen another path than the best.
+    """
+    report(WAY, 1, 1)
+    asked, answer, shown = judgement.scenario, judgement.answer, judgement.shown
+    ends = asked.start, asked.goal
+    question = WayQuestion(asked.rover, asked.terrain, *ends, asked.options, asked.arm_angles)
+    way = find_way(question, asked.search, memory)
+    if way.path is None:
+        return replace(judgement, way=way)
+    candidates = (*answer.candidates, way.path)
+    last = len(candidates) - 1
+    if shown.index == answer.nearest:
+        words = f"way of {way.path.length:.1f} m around, found in {way.seconds:.1f} s"
+        summary = f"none of {last} candidate paths passable; {words}"
+        shown = _show(asked, last, way.path, summary, ())
+    return replace(judgement, answer=PathAnswer(candidates, last, last), shown=shown, way=way)
 
 
 def _judge_under(policy: str, scenario: Scenario, candidate: Candidate) -> PolicyVerdict:

@@ -1,13 +1,14 @@
 """What is judged, and what came out: frozen values that threads may share."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
+from rover_planner.planning.ways.way_search import LatticeSettings, WayAnswer
 from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.trajectory import Trajectory
 
@@ -34,6 +35,8 @@ class Scenario:
     """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
     recorded: Floats | None = None
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
+    search: LatticeSettings = field(default_factory=LatticeSettings)
+    """How a way around obstacles is searched."""
 
     def has_paths_of(self, other: "Scenario") -> bool:
         """Return whether the candidate paths are the same but for changed numbers of the rover."""
@@ -79,6 +82,29 @@ class Judgement:
     """What they were judged for."""
     shown: ShownPath
     """The shown path."""
+    way: WayAnswer | None = None
+    """What a search around obstacles has found for `answered`; None if none was made."""
+
+    @property
+    def reason(self) -> str:
+        """Why the shown path is refused, and before it why there is no way; empty if it passes."""
+        reason = self.shown.verdict.reason
+        is_old = self.answered is not self.scenario
+        if not reason or is_old or self.way is None or self.way.path is not None:
+            return reason
+        return f"{self.way.reason}; the shown path: {reason}"
+
+    @property
+    def needs_way(self) -> bool:
+        """Whether all candidates are refused, and no way around obstacles was searched yet."""
+        asked = self.scenario
+        return (
+            asked.recorded is None
+            and self.answered is asked
+            and self.way is None
+            and not self.answer.traversable
+            and all(asked.terrain.contains(*end[:2]) for end in (asked.start, asked.goal))
+        )
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:

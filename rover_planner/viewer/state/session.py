@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import judge
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
+from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.studies.rover_values import with_value
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.judging import JudgeRequest, judge_request
@@ -40,8 +43,9 @@ class ViewSession:
         start: Pose,
         goal: Pose,
         options: PathQueryOptions | None = None,
+        search: LatticeSettings | None = None,
     ):
-        """Plan from start to goal.
+        """Plan from start to goal; no way around obstacles is searched yet.
 
         Args:
             rover: The rover.
@@ -49,21 +53,25 @@ class ViewSession:
             start: x, y [m] and yaw [rad], map frame.
             goal: The same.
             options: How candidates are made and judged (default: 5 candidates, 0.5 m apart).
+            search: How ways around obstacles are searched (default: for 2 s).
 
         Raises:
             RoverError, PlanningError: The rover, the poses or the options are invalid.
         """
         options = options or PathQueryOptions(count=5, spacing=0.5)
-        self.wanted = Scenario(rover, rover, terrain, start, goal, options, {})
+        self.wanted = Scenario(
+            rover, rover, terrain, start, goal, options, {}, search=search or LatticeSettings()
+        )
         """What visitors want judged."""
         self.refusal = ""
         """Why the last change was refused, empty if it was not."""
         self.is_stopped = False
         """Whether the judgement of `wanted` was cancelled or failed."""
         self._background: BackgroundWork[JudgeRequest, Judgement] | None = None
-        self._asked = JudgeRequest(self.wanted)
+        self._judge = partial(judge_request, memory=EdgeMemory())
+        self._asked = JudgeRequest(self.wanted, searches=False)
         """The newest request."""
-        *_, self.finished = judge_request(self._asked, _ignore)
+        *_, self.finished = self._judge(self._asked, _ignore)
         """The last judgement."""
         self._index = self.finished.shown.index
         """Index of the candidate that is wanted."""
@@ -203,7 +211,8 @@ class ViewSession:
         """Judge the shown path again with other values; all, if others are wanted meanwhile."""
         wanted = dataclasses.replace(self.wanted, **changes)
         same = wanted.has_paths_of(self.finished.answered)
-        return self._ask(wanted, self._index if same else None)
+        is_listed = self._index < len(self.answer.candidates)
+        return self._ask(wanted, self._index if same and is_listed else None)
 
     def _ask(self, wanted: Scenario, index: int | None = None) -> bool:
         """Judge a candidate by its index, or all; without background do it at once."""
@@ -216,7 +225,7 @@ class ViewSession:
             self._background.ask(request)
             return True
         try:
-            for judgement in judge_request(request, _ignore):
+            for judgement in self._judge(request, _ignore):
                 self._finish(request, judgement)
         except REFUSALS as error:
             self._refuse(error)
@@ -225,9 +234,17 @@ class ViewSession:
 
     def _finish(self, request: JudgeRequest, judgement: Judgement) -> None:
         """Take a judgement; one of a single path leaves the others as they were judged last."""
-        now = self.finished
-        if request.before is not None and request.scenario.has_paths_of(now.answered):
-            judgement = dataclasses.replace(judgement, answer=now.answer, answered=now.answered)
+        now, before = self.finished, request.before
+        is_listed = judgement.shown.index < len(now.answer.candidates)
+        if (
+            before is not None
+            and judgement.way is before.way
+            and request.scenario.has_paths_of(now.answered)
+            and is_listed
+        ):
+            judgement = dataclasses.replace(
+                judgement, answer=now.answer, answered=now.answered, way=now.way
+            )
         self.finished = judgement
         if request is self._asked:
             self._index = judgement.shown.index
@@ -240,12 +257,14 @@ class ViewSession:
     # In the background.
 
     def judge_in_background(self, wake: Callable[[], object]) -> None:
-        """Judge in a thread from now on, until `close`.
+        """Judge in a thread from now on, until `close`; begin with the way that is not searched.
 
         Args:
             wake: Called in that thread when there is something to take with `take_finished`.
         """
-        self._background = BackgroundWork(judge_request, wake, "judge")
+        self._background = BackgroundWork(self._judge, wake, "judge")
+        if self.finished.needs_way:
+            self._ask(self.wanted, self._index)
 
     @property
     def progress(self) -> Progress | None:

@@ -1,0 +1,99 @@
+"""The layers of a search on the ground of a real page, without a browser."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from support.grounds import gap, make_terrain, wall_with_gap, whole_wall
+from support.ros_fixtures import wait_until
+from support.viewer_sessions import LSR1, walled_session
+
+pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
+
+import viser
+
+from rover_planner.planning.lattice.nodes import nodes_within
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.scene.search_overlay import ASKED, CLOSED, SearchOverlay, cover_places
+from rover_planner.viewer.state.colours import PASSABLE, REFUSED, SEARCHED, UNKNOWN
+
+BEYOND = np.array([1.6, 0.0])
+"""A place on the other side of the wall [m]."""
+PATIENCE = 60.0
+"""Longest wait for a search [s]."""
+
+
+def test_a_layer_covers_the_known_ground_of_its_places_and_nothing_else():
+    ground = make_terrain(gap)
+    nodes = nodes_within(0.2, (-4.0, -4.0), (4.0, 4.0))
+    places = np.zeros(nodes.shape, bool)
+    places[10:21, 20:31] = True  # x 0 to 2 m, y -2 to 0 m, and half a cell around
+    vertices, faces = cover_places(ground, nodes, places)
+    x, y, z = vertices.T
+    assert len(faces) and set(np.unique(faces)) == set(range(len(vertices)))
+    np.testing.assert_allclose([x.min(), x.max()], [-0.1, 2.1], atol=0.051)
+    np.testing.assert_allclose([y.min(), y.max()], [-2.1, 0.1], atol=0.051)
+    assert not np.any((x > 0.51) & (x < 0.99))  # unknown ground
+    column, row = np.rint((vertices[:, :2] - ground.origin) / ground.resolution).astype(int).T
+    np.testing.assert_array_equal(z, ground.elevation[row, column])
+
+
+def test_no_places_and_no_ground_at_places_give_no_layer():
+    nodes = nodes_within(0.2, (-4.0, -4.0), (4.0, 4.0))
+    none, unknown = np.zeros((2, *nodes.shape), bool)
+    unknown[:, 24] = True  # x = 0.8 m
+    for places in (none, unknown):
+        assert not len(cover_places(make_terrain(gap), nodes, places)[1])
+
+
+def test_what_was_searched_is_hidden_until_it_is_wanted_and_a_new_search_replaces_an_old_one():
+    session = walled_session(whole_wall)
+    session.plan_to(BEYOND)
+    way, ground = session.finished.way, session.terrain
+    server = viser.ViserServer(port=0, verbose=False)
+    try:
+        overlay = SearchOverlay(server.scene)
+        overlay.show(LSR1, ground, way)
+        closed, asked = (overlay._layers[name][0] for name in (CLOSED, ASKED))
+        assert closed.visible and not asked.visible
+        assert tuple(closed.color) == (REFUSED if way.closed.around_goal else PASSABLE)
+        overlay.show_asked(True)
+        assert asked.visible and tuple(asked.color) == SEARCHED
+        overlay.mark_old(True)
+        assert tuple(closed.color) == tuple(asked.color) == UNKNOWN
+        overlay.mark_old(False)
+        assert tuple(asked.color) == SEARCHED
+        overlay.show(LSR1, ground, way)
+        assert overlay._layers[ASKED][0].visible
+        overlay.show(LSR1, ground, None)
+        assert not overlay._layers
+    finally:
+        server.stop()
+
+
+@pytest.fixture(params=[wall_with_gap, whole_wall])
+def page(request) -> Iterator[Page]:
+    served = Page(walled_session(request.param), port=0)
+    wait_until(lambda: not served.is_busy, "the ground", PATIENCE)
+    yield served
+    served.close()
+
+
+def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page):
+    session = page.session
+    page.requests.add(lambda: page.click(BEYOND, False))
+    wait_until(lambda: session.finished.way is not None and not page.is_busy, "a way", PATIENCE)
+    overlay, tab = page.scene.search, page.ground_tab
+    closes = session.finished.way.closed is not None
+    wait_until(lambda: set(overlay._layers) == ({CLOSED, ASKED} if closes else {ASKED}), "layers")
+    text = page.drive_tab._verdict.content
+    if closes:
+        assert "no way within the map" in text and len(tab._choice.options) == 6
+    else:
+        wait_until(lambda: len(tab._choice.options) == 7, "the list of paths")
+        assert tab._choice.options[6].startswith("6: passable")
+        assert page.playback.duration == session.shown.trajectory.duration
+    page.requests.add(lambda: page.click(np.array([-1.1, 0.0]), False))
+    wait_until(lambda: session.finished.way is None and not overlay._layers, "no layers", PATIENCE)
+    assert not page.errors.messages

@@ -1,0 +1,247 @@
+"""Ways around obstacles on the page, without a browser: searched, shown, cancelled, explained."""
+
+import dataclasses
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+import pytest
+
+from rover_physics.names import TORQUE_POLICIES
+from rover_physics.traversability.judge_path import judge_path
+from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.planning.ways.way_search import FOUND, NO_WAY, OUT_OF_TIME
+from rover_planner.viewer.state.judging import PATH, POLICY, WAY, JudgeRequest, judge_request
+from rover_planner.viewer.state.session import ViewSession
+from support.grounds import wall_with_gap, whole_wall
+from support.ros_fixtures import wait_until
+from support.viewer_sessions import LSR1, walled_session
+
+GOAL = (1.6, 0.0, 0.0)
+"""A pose on the other side of the wall."""
+BEYOND = np.array(GOAL[:2])
+"""Its place [m]."""
+FRICTION = [("friction",)]
+
+
+@pytest.fixture(scope="module")
+def found() -> ViewSession:
+    """A session with a way through the gap; tests do not change it."""
+    session = walled_session(wall_with_gap)
+    assert session.plan_to(BEYOND)
+    return session
+
+
+@pytest.fixture(scope="module")
+def closed() -> ViewSession:
+    """A session that has found no way; tests do not change it."""
+    session = walled_session(whole_wall)
+    assert session.plan_to(BEYOND)
+    return session
+
+
+def steps_of(session: ViewSession) -> list:
+    """Return what is reported and how many candidates each result has."""
+    steps: list = []
+    request = JudgeRequest(session.wanted)
+    for judged in judge_request(request, lambda what, *_: steps.append(what)):
+        steps.append(len(judged.answer.candidates))
+    return steps
+
+
+def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown(found):
+    *direct, way = found.candidates
+    assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
+    assert found.finished.way.outcome == FOUND
+    assert found.shown.index == found.answer.best == found.answer.nearest == 5
+    assert found.shown.candidate is way
+    poses = way.poses
+    np.testing.assert_allclose(poses[[0, -1], :2], [found.start[:2], BEYOND], atol=1e-9)
+    assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
+    assert judge_path(LSR1, found.terrain, poses, found.sweep_options())[1].traversable
+
+
+def test_the_way_has_the_same_board_as_other_paths(found):
+    shown = found.shown
+    assert [one.policy for one in shown.by_policy] == list(TORQUE_POLICIES)
+    assert not any(one.is_old for one in shown.by_policy)
+    assert shown.by_policy[0].traversable and found.finished.reason == ""
+    assert shown.trajectory.length == len(shown.candidate.poses)
+    assert f"way of {shown.candidate.length:.1f} m around" in shown.summary
+
+
+def test_where_there_is_no_way_the_closed_area_and_the_reason_are_kept(closed):
+    way = closed.finished.way
+    assert way.outcome == NO_WAY and len(closed.candidates) == 5
+    assert not closed.shown.verdict.traversable
+    reason = closed.finished.reason
+    assert reason.startswith("no way within the map: ") and "closed in by: " in reason
+    assert reason.endswith(closed.shown.verdict.reason)
+    ends = [value_at(way, way.closed.places, pose) for pose in (closed.start, closed.goal)]
+    assert ends == [not way.closed.around_goal, way.closed.around_goal]
+
+
+def value_at(way, places, pose) -> bool:
+    """Return the value of places (rows, columns) at a pose."""
+    column, row = np.rint(np.array(pose[:2]) / way.nodes.cell).astype(int) - way.nodes.first
+    return bool(places[row, column])
+
+
+def test_the_search_is_reported_after_paths_and_policies(closed, found):
+    before = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY]
+    assert steps_of(closed) == [*before, 5]
+    assert steps_of(found) == [*before, 6, *[POLICY] * 3, 6]
+
+
+def test_nothing_is_searched_where_a_candidate_passes_or_the_goal_is_off_the_map():
+    session = walled_session(wall_with_gap)
+    for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
+        assert session.plan_to(np.array(goal))
+        assert session.finished.way is None and session.answer.traversable == passes
+        assert WAY not in steps_of(session)
+
+
+def test_nothing_is_searched_for_a_recorded_path():
+    session = walled_session(wall_with_gap)
+    shown = session.shown
+    session.replay(shown.candidate.prediction, shown.verdict.reasons)
+    assert session.change_rover(FRICTION, 0.05) and session.plan_again()
+    assert not session.shown.verdict.traversable and session.finished.way is None
+
+
+def test_a_goal_where_the_rover_cannot_stand_is_named_as_the_reason():
+    session = walled_session(whole_wall)
+    assert session.plan_to(np.array([0.25, 0.0]))
+    assert session.finished.reason.startswith("the rover cannot stand at the goal: ")
+    assert session.finished.way.closed is None and not session.finished.way.asked.any()
+
+
+def test_a_search_that_runs_out_of_time_says_that_there_may_be_a_way(closed):
+    short = dataclasses.replace(closed.wanted.search, budget=0.01)
+    hurried = dataclasses.replace(closed.wanted, search=short)
+    *_, judged = judge_request(JudgeRequest(hurried), lambda *_: None)
+    assert judged.way.outcome == OUT_OF_TIME and judged.way.closed is None
+    assert "there may be one" in judged.reason
+
+
+def test_what_was_searched_is_where_the_model_was_asked(found, closed):
+    for session in (found, closed):
+        way = session.finished.way
+        assert way.asked.shape == way.nodes.shape
+        assert 0 < way.asked.sum() < way.asked.size
+        assert value_at(way, way.asked, (0.0, 0.0))  # the wall between the ends
+
+
+def test_a_second_search_remembers_what_the_first_has_asked():
+    session = walled_session(wall_with_gap)
+    session.plan_to(BEYOND)
+    first = session.finished.way
+    session.plan_to(np.array([1.6, 0.1]))
+    second = session.finished.way
+    assert second.outcome == FOUND and second.edges_judged < first.edges_judged
+    assert np.all(second.asked >= first.asked)
+    *_, anew = judge_request(JudgeRequest(session.wanted), lambda *_: None, EdgeMemory())
+    np.testing.assert_array_equal(anew.shown.candidate.poses[-1], second.path.poses[-1])
+
+
+def test_a_slider_judges_the_shown_way_again_and_then_searches_another():
+    session = walled_session(wall_with_gap)
+    session.plan_to(BEYOND)
+    poses, way = session.shown.candidate.poses, session.finished.way
+    assert session.change_rover(FRICTION, 0.7)
+    assert session.shown.index == 5 and session.finished.way is way
+    np.testing.assert_array_equal(session.shown.candidate.poses, poses)
+    assert session.plan_again()
+    assert session.shown.index == 5 and session.finished.way is not way
+    assert session.shown.verdict.traversable
+
+
+# In the background.
+
+
+@pytest.fixture
+def session() -> Iterator[ViewSession]:
+    """A session before a wall with a gap that judges in the background."""
+    made = walled_session(wall_with_gap)
+    made.judge_in_background(lambda: None)
+    yield made
+    assert made.close()
+
+
+def finish(session: ViewSession) -> None:
+    wait_until(lambda: session.progress is None, "the end of the work", 60.0)
+    session.take_finished()
+
+
+def begin_search(session: ViewSession) -> None:
+    """Plan beyond the wall, wait for the search, and take what was finished before."""
+    assert session.plan_to(BEYOND)
+    wait_until(lambda: session.progress.what == WAY, "the search", 60.0)
+    assert session.progress.describe() == "searching a way"
+    session.take_finished()
+
+
+def test_while_a_way_is_searched_the_verdict_on_the_candidates_is_there(session):
+    begin_search(session)
+    assert not session.is_outdated and len(session.candidates) == 5
+    assert not session.shown.verdict.traversable
+    finish(session)
+    assert session.shown.index == 5 and session.shown.verdict.traversable
+
+
+def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begun_again(session):
+    begin_search(session)
+    shown = session.shown
+    session.cancel()
+    session.take_finished()
+    assert session.is_stopped and session.shown is shown and session.finished.way is None
+    assert session.plan_again()
+    finish(session)
+    assert session.finished.way.outcome == FOUND
+
+
+def test_a_path_that_is_chosen_during_the_search_stays_and_the_way_is_listed(session):
+    begin_search(session)
+    other = 1 if session.shown.index != 1 else 2
+    assert session.show_candidate(other)
+    finish(session)
+    assert session.shown.index == other and len(session.candidates) == 6
+    assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
+    assert session.show_candidate(5)
+    finish(session)
+    assert session.shown.verdict.traversable
+
+
+def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wall():
+    slippery = dataclasses.replace(LSR1, friction=0.35)
+    session = walled_session(partial(wall_with_gap, height=0.05), GOAL, slippery)
+    session.judge_in_background(lambda: None)
+    try:
+        finish(session)
+        assert session.shown.index == 5
+        session.change_rover(FRICTION, 1.5)
+        finish(session)
+        session.plan_again()
+        wait_until(lambda: session.progress is None, "all candidates")  # and not taken yet
+        session.change_rover(FRICTION, 1.4)
+        session.take_finished()
+        session.change_rover(FRICTION, 1.3)
+        finish(session)
+        assert not session.is_outdated and session.rover.friction == 1.3
+        assert session.candidates[session.shown.index].verdict.traversable
+        session.plan_again()
+        finish(session)
+        assert len(session.candidates) == 5 and session.answer.traversable
+    finally:
+        assert session.close()
+
+
+def test_a_session_that_begins_before_a_wall_searches_as_soon_as_it_has_a_thread():
+    session = walled_session(wall_with_gap, GOAL)
+    assert session.finished.needs_way and len(session.candidates) == 5
+    session.judge_in_background(lambda: None)
+    try:
+        finish(session)
+        assert session.shown.index == 5 and session.shown.verdict.traversable
+    finally:
+        assert session.close()
