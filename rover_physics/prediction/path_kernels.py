@@ -62,7 +62,7 @@ class JumpLimits(NamedTuple):
     peak_spacing: float
     """Way below which no peaks at a limit are searched [m]."""
     fall_spacing: float
-    """Way below which no peaks of smaller forces, and no begin or end of a fall are searched [m]."""
+    """The same for peaks of smaller forces, and for the begin and end of a fall [m]."""
 
 
 class PathPoints(NamedTuple):
