@@ -34,9 +34,10 @@ PIECES = 4
 """Number of pieces into which a stretch with a jump is divided in each round."""
 MIN_SPACING = 1e-4
 """Distance between poses [m] below which a jump counts as at one place."""
-PEAK_SPACING, NEAR_SPACING, FALL_SPACING = 0.01, 0.06, 0.02
-"""Distances [wheel radii] below which peaks of forces at a limit, smaller peaks, and ends of falls
-are not searched."""
+PEAK_SPACING, FALL_SPACING = 0.01, 0.02
+"""Distances [wheel radii] below which peaks of forces at a limit are not searched, and smaller
+peaks and ends of falls. With 0.06 for smaller peaks, twice as many waypoints change 5 verdicts in
+1,000, not 2, and rough ground costs less than 1 % less."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""
@@ -189,7 +190,6 @@ def limits_of(wheels: Wheels) -> JumpLimits:
         friction=no_peaks if wheels.on_servos else wheels.friction_limit,
         torque=no_peaks if wheels.on_servos else wheels.torque_limit,
         peak_spacing=PEAK_SPACING * radius,
-        near_spacing=NEAR_SPACING * radius,
         fall_spacing=FALL_SPACING * radius,
     )
 

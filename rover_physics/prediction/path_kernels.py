@@ -60,11 +60,9 @@ class JumpLimits(NamedTuple):
     torque: float
     """Torque saturation whose peaks are searched, infinite for none."""
     peak_spacing: float
-    """Way below which no peaks are searched [m]."""
-    near_spacing: float
-    """The same where the forces are not close to a limit."""
+    """Way below which no peaks at a limit are searched [m]."""
     fall_spacing: float
-    """Way below which no begin or end of a fall is searched [m]."""
+    """The same for peaks of smaller forces, and for the begin and end of a fall [m]."""
 
 
 class PathPoints(NamedTuple):
@@ -275,7 +273,7 @@ def _finest(here, there, limits):
     largest = max(use, other_use)
     rises = largest > LEAST_USE and largest * (1.0 + PEAK * turn) > 1.0
     if min(use, other_use) <= 1.0 and (rises or (largest > NEAR_LIMIT and turn > LEAST_TURN)):
-        return limits.peak_spacing if largest > AT_LIMIT else limits.near_spacing
+        return limits.peak_spacing if largest > AT_LIMIT else limits.fall_spacing
     return limits.fall_spacing if falls else np.inf
 
 

@@ -195,7 +195,7 @@ def find_drift(
             of the poses on the way to it counts; elsewhere waypoints are enough.
     """
     n = len(poses)
-    if not (results["deviation"].any() or crossings.results["deviation"].any()):
+    if not wheels.on_servos:
         return np.zeros((n, 2))
     long_steps = np.append(False, _ways(wheels, poses) > wheels.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)

@@ -22,7 +22,7 @@ LIMITS = JumpLimits(
     friction=1.0,
     torque=1.0,
     peak_spacing=0.004,
-    fall_spacing=0.004,
+    fall_spacing=0.006,
 )
 
 
@@ -131,6 +131,19 @@ def test_a_piece_is_closed_only_where_it_is_short_or_holds_a_pose_that_does_not_
         PoseStatus.SETTLED,
     ]
     assert sorted_pieces(results_with(angles, stuck), xs) == ([], [[2, 4]])
+
+
+def open_pieces_of_a_peak(friction):
+    """Return how many pieces 5 mm long stay open, with this friction and contacts that turn."""
+    results = results_with([0.0, 0.8, 0.2, 0.4, 0.6])
+    results["contact_angle"] *= 0.5
+    results["friction_utilisation"], results["torque_saturation"] = friction, 0.0
+    return len(sorted_pieces(results, np.array([0.0, 0.02, 0.005, 0.01, 0.015]))[0])
+
+
+def test_peaks_close_to_a_limit_are_searched_more_closely_than_others():
+    assert open_pieces_of_a_peak(0.96) == 4
+    assert open_pieces_of_a_peak(0.94) == 0
 
 
 def test_way_time_and_energy_are_summed_over_settled_stretches():
