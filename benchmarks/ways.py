@@ -20,7 +20,7 @@ from benchmarks.measure import WIDTH, quantile
 from benchmarks.way_trials.estimate import check_estimate
 from benchmarks.way_trials.grounds import Case, Pair, grounds
 from benchmarks.way_trials.trial import Trial, same_on_threads, search, try_pair, try_warm
-from benchmarks.way_trials.truth import OutOfTime, Truth
+from benchmarks.way_trials.truth import NoTruthError, Truth
 from rover_physics.names import EQUAL
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.planning.ways.way_search import FOUND
@@ -35,7 +35,7 @@ def run_case(case: Case, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
     search(case, pairs[0], asked["budget"])  # compiles, and reads the code from the disk
     truth = Truth(case) if asked["truth"] else None
     for index, pair in enumerate(pairs):
-        trial, _ = try_pair(case, pair, index, asked["budget"])
+        trial = try_pair(case, pair, index, asked["budget"])
         yield {**asdict(trial), **compare(case, pair, trial, truth, asked)}
     if asked["nodes"]:
         yield {"ground": case.name, **check_estimate(case, asked["nodes"])}
@@ -49,13 +49,12 @@ def compare(
     if truth is not None and trial.pair < asked["truth"]:
         try:
             found["best"] = truth.find(pair, asked["truth_seconds"])
-        except OutOfTime:
+        except NoTruthError:
             found["best"] = np.nan
         found["truth_judged"], found["truth_edges"] = truth.judged, truth.count
     if trial.pair < asked["warm"]:
-        answer, first = try_warm(case, pair, asked["budget"], trial.pair)
-        found["warm_outcome"], found["warm_cpu_first"] = answer.outcome, first
-        found["warm_seconds_first"] = answer.seconds_first
+        answer = try_warm(case, pair, asked["budget"], trial.pair)
+        found["warm_outcome"], found["warm_first"] = answer.outcome, answer.seconds_first
     if trial.pair < asked["ompl"]:
         from benchmarks.way_trials.sampling import sample_way
 
@@ -88,11 +87,10 @@ def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
     yield "pairs", str(len(trials))
     yield "outcomes", ", ".join(f"{name} {outcomes.count(name)}" for name in sorted({*outcomes}))
     yield "ways that judge_path passes", f"{sum(column(ways, 'passes'))} of {len(ways)}"
-    yield "first way, CPU [s]: median; 95 %", tell(column(ways, "cpu_first"))
-    yield "first way, clock [s]", tell(column(ways, "seconds_first"))
+    yield "first way [s]: median; 95 %", tell(column(ways, "seconds_first"))
     far = [row for row in ways if row["distance"] > 12.0]
-    yield "first way beyond 12 m, CPU [s]", f"{tell(column(far, 'cpu_first'))} ({len(far)})"
-    yield "whole search, CPU [s]", tell(column(trials, "cpu"))
+    yield "first way beyond 12 m [s]", f"{tell(column(far, 'seconds_first'))} ({len(far)})"
+    yield "whole search [s]", tell(column(trials, "seconds"))
     yield "judged edges [%]: median; 95 %", tell([100 * v for v in column(trials, "judged_share")])
     yield "judged edges [%]: mean", f"{100 * np.mean(column(trials, 'judged_share')):.3f}"
     yield "bound: median; 95 %", tell(column(ways, "bound"))
@@ -118,14 +116,14 @@ def summarise_comparisons(trials: Rows) -> Iterator[tuple[str, str]]:
         yield "cost over the best [%]", tell(over, 1)
     warm = [row for row in trials if row.get("warm_outcome") == FOUND]
     if warm:
-        yield "warm: first way, CPU [s]", f"{tell(column(warm, 'warm_cpu_first'))} ({len(warm)})"
+        yield "warm: first way [s]", f"{tell(column(warm, 'warm_first'))} ({len(warm)})"
     sampled = [row for row in trials if "ompl_cpu" in row]
     if sampled:
         both = [row for row in sampled if row["ompl_length"] > 0 and row["outcome"] == FOUND]
         yield "OMPL: found", f"{sum(row['ompl_length'] > 0 for row in sampled)} of {len(sampled)}"
         yield "ours: found of the same", str(sum(row["outcome"] == FOUND for row in sampled))
-        yield "OMPL: first way, CPU [s]", tell(column(both, "ompl_cpu"))
-        ratios = [row["ompl_cpu"] / row["cpu_first"] for row in both]
+        yield "OMPL: first way [s]", tell(column(both, "ompl_cpu"))
+        ratios = [row["ompl_cpu"] / row["seconds_first"] for row in both]
         yield "OMPL over ours, first way", tell(ratios, 1)
         yield "OMPL slower", f"{sum(ratio > 1.0 for ratio in ratios)} of {len(both)}"
     threads = [same for same in column(trials, "same_on_threads") if same is not None]
@@ -139,7 +137,7 @@ def show(rows: Rows) -> None:
     columns = {
         name: dict(summarise([row for row in rows if row["ground"] == name])) for name in names
     }
-    table = Table(title="Median; 95th percentile")
+    table = Table(title="Median; 95th percentile. Times are CPU time")
     table.add_column("")
     for name in names:
         table.add_column(name, justify="right")

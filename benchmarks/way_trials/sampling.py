@@ -40,16 +40,16 @@ class _Motions(base.MotionValidator):
     def __init__(self, information: Any, judge: Judge):
         super().__init__(information)
         self._space, self._judge = information.getStateSpace(), judge
+        self._state = self._space.allocState()
 
     def checkMotion(self, first: Any, last: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
         """Return whether the rover may drive from one state to another."""
         spacing = self._judge.options.waypoint_spacing
         pieces = max(1, int(np.ceil(self._space.distance(first, last) / spacing)))
-        state, poses = self._space.allocState(), np.empty((pieces + 1, 3))
+        state, poses = self._state, np.empty((pieces + 1, 3))
         for row in range(pieces + 1):
             self._space.interpolate(first, last, row / pieces, state)
             poses[row] = state.getX(), state.getY(), state.getYaw()
-        self._space.freeState(state)
         return not self._judge.judge([poses], [Gear.FORWARD])[0].code
 
 
@@ -66,8 +66,9 @@ def sample_way(case: Case, pair: Pair, planner: str, seconds: float, seed: int) 
     util.setLogLevel(util.LogLevel.LOG_ERROR)
     util.RNG.setSeed(seed)
     judge, began = case.judge, (time.perf_counter(), time.process_time())
-    setup = _set_up(case, judge, pair)
-    setup.setPlanner(getattr(geometric, planner)(setup.getSpaceInformation()))
+    setup, *kept = _set_up(case, judge, pair)
+    kept.append(getattr(geometric, planner)(setup.getSpaceInformation()))
+    setup.setPlanner(kept[-1])
     setup.solve(seconds)
     taken = time.perf_counter() - began[0], time.process_time() - began[1]
     found = setup.haveExactSolutionPath()
@@ -75,8 +76,8 @@ def sample_way(case: Case, pair: Pair, planner: str, seconds: float, seed: int) 
     return Sampled(*taken, float(length), judge.poses)
 
 
-def _set_up(case: Case, judge: Judge, pair: Pair) -> Any:
-    """Return the problem for OMPL; any way will do."""
+def _set_up(case: Case, judge: Judge, pair: Pair) -> tuple[Any, ...]:
+    """Return the problem for OMPL, any way will do, and objects that must live as long as it."""
     space = base.ReedsSheppStateSpace(tightest_radius(case.rover))
     xmin, xmax, ymin, ymax = case.terrain.bounds
     bounds = base.RealVectorBounds(2)
@@ -87,7 +88,8 @@ def _set_up(case: Case, judge: Judge, pair: Pair) -> Any:
     setup = geometric.SimpleSetup(space)
     information = setup.getSpaceInformation()
     setup.setStateValidityChecker(lambda state: _stands(judge, state))
-    information.setMotionValidator(_Motions(information, judge))
+    motions = _Motions(information, judge)
+    information.setMotionValidator(motions)
     states = []
     for pose in pair:
         state = space.allocState()
@@ -99,7 +101,7 @@ def _set_up(case: Case, judge: Judge, pair: Pair) -> Any:
     objective = base.PathLengthOptimizationObjective(information)
     objective.setCostThreshold(base.Cost(float("inf")))
     setup.setOptimizationObjective(objective)
-    return setup
+    return setup, motions, objective, information, space, states
 
 
 def _stands(judge: Judge, state: Any) -> bool:

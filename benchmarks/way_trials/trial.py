@@ -1,7 +1,8 @@
 """One search for a way, with what it took and how it compares."""
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from unittest import mock
 
 import numba
 import numpy as np
@@ -9,9 +10,8 @@ import numpy as np
 from benchmarks.way_trials.grounds import Case, Pair
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_path
-from rover_planner.planning.lattice.search import Progress
 from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.planning.ways.way_search import FOUND, LatticeSettings, WayAnswer, find_way
+from rover_planner.planning.ways.way_search import LatticeSettings, WayAnswer, find_way
 
 SIDE = 1.0
 """Side of the square of the map that changes [m]."""
@@ -32,12 +32,8 @@ class Trial:
     outcome: str
     """Outcome of the search."""
     seconds_first: float
-    """Time to the first way by the clock [s], NaN without one."""
-    cpu_first: float
-    """CPU time to the first way [s]."""
+    """CPU time to the first way [s], NaN without one."""
     seconds: float
-    """Time of the search by the clock [s]."""
-    cpu: float
     """CPU time of the search [s]."""
     length: float
     """Length of the way [m]."""
@@ -53,47 +49,29 @@ class Trial:
     """Whether `judge_path` passes the way; None without one."""
 
 
-@dataclass
-class _Watch:
-    """Notes the CPU time when a search knows its first way."""
-
-    began: float = field(default_factory=time.process_time)
-    first: float = np.nan
-
-    def look(self, progress: Progress) -> None:
-        """Note the time if there is a way and there was none before."""
-        if progress.best is not None and np.isnan(self.first):
-            self.first = time.process_time() - self.began
-
-
 def search(
     case: Case,
     pair: Pair,
     budget: float,
     memory: EdgeMemory | None = None,
     terrain: Terrain | None = None,
-) -> tuple[WayAnswer, float, float]:
-    """Return the answer, the CPU time to the first way and that of the whole search [s]."""
-    watch = _Watch()
+) -> WayAnswer:
+    """Search a way; its clock is the CPU time, so that other programs do not cut its budget."""
     settings = LatticeSettings(budget=budget)
-    answer = find_way(case.question(pair, terrain), settings, memory, watch.look)
-    cpu = time.process_time() - watch.began
-    first = watch.first if np.isfinite(watch.first) else cpu
-    return answer, first if answer.outcome == FOUND else np.nan, cpu
+    with mock.patch("time.perf_counter", time.process_time):
+        return find_way(case.question(pair, terrain), settings, memory)
 
 
-def try_pair(case: Case, pair: Pair, index: int, budget: float) -> tuple[Trial, WayAnswer]:
+def try_pair(case: Case, pair: Pair, index: int, budget: float) -> Trial:
     """Search a way, judge it once more as `predict` does, and return what was found."""
-    answer, cpu_first, cpu = search(case, pair, budget)
-    trial = Trial(
+    answer = search(case, pair, budget)
+    return Trial(
         ground=case.name,
         pair=index,
         distance=float(np.hypot(*(pair[1] - pair[0])[:2])),
         outcome=answer.outcome,
         seconds_first=answer.seconds_first,
-        cpu_first=cpu_first,
         seconds=answer.seconds,
-        cpu=cpu,
         length=np.nan if answer.path is None else answer.path.length,
         cost=answer.cost,
         bound=answer.bound,
@@ -101,7 +79,6 @@ def try_pair(case: Case, pair: Pair, index: int, budget: float) -> tuple[Trial, 
         repeatable=answer.repeatable,
         passes=None if answer.path is None else passes(case, answer),
     )
-    return trial, answer
 
 
 def passes(case: Case, answer: WayAnswer) -> bool:
@@ -111,20 +88,19 @@ def passes(case: Case, answer: WayAnswer) -> bool:
     return judge_path(case.rover, case.terrain, path.poses, options)[1].traversable
 
 
-def try_warm(case: Case, pair: Pair, budget: float, seed: int) -> tuple[WayAnswer, float]:
-    """Return answer and CPU time [s] to the first way after a change of the map near a way.
+def try_warm(case: Case, pair: Pair, budget: float, seed: int) -> WayAnswer:
+    """Return the answer after a change of the map near a way.
 
     The way is searched first, then heights in a square on it change, and it is searched again with
     what is known. Without a first way, the square lies midway between start and goal.
     """
     memory = EdgeMemory()
-    before = search(case, pair, budget, memory)[0]
+    before = search(case, pair, budget, memory)
     middle = 0.5 * (pair[0] + pair[1])
     if before.path is not None:
         middle = before.path.poses[len(before.path.poses) // 2]
     changed = change_heights(case.terrain, middle, seed)
-    answer, first, _ = search(case, pair, budget, memory, changed)
-    return answer, first
+    return search(case, pair, budget, memory, changed)
 
 
 def change_heights(terrain: Terrain, middle: np.ndarray, seed: int) -> Terrain:
@@ -143,7 +119,7 @@ def same_on_threads(case: Case, pair: Pair, budget: float) -> bool | None:
     before = numba.get_num_threads()
     for threads in (1, 2):
         numba.set_num_threads(threads)
-        answers.append(search(case, pair, budget)[0])
+        answers.append(search(case, pair, budget))
     numba.set_num_threads(before)
     one, two = answers
     if not (one.repeatable and two.repeatable):
