@@ -18,6 +18,8 @@ from rover_planner.planning.lattice.primitives import Gear
 
 PLANNERS = ("BITstar", "RRTConnect", "RRTstar")
 """Planners of OMPL that can be asked for."""
+PATIENCE = 3.0
+"""Time by the clock over CPU time after which a planner that waits is stopped."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def sample_way(case: Case, pair: Pair, planner: str, seconds: float, seed: int) 
         case: The rover on its ground.
         pair: Start and goal.
         planner: One of PLANNERS.
-        seconds: Time after which it gives up [s].
+        seconds: CPU time after which it gives up [s].
         seed: Seed of OMPL's random numbers; only the first of a process counts.
     """
     util.setLogLevel(util.LogLevel.LOG_ERROR)
@@ -69,7 +71,13 @@ def sample_way(case: Case, pair: Pair, planner: str, seconds: float, seed: int) 
     setup, *kept = _set_up(case, judge, pair)
     kept.append(getattr(geometric, planner)(setup.getSpaceInformation()))
     setup.setPlanner(kept[-1])
-    setup.solve(seconds)
+    ends = began[0] + PATIENCE * seconds, began[1] + seconds
+    kept.append(
+        base.PlannerTerminationCondition(
+            lambda: time.process_time() > ends[1] or time.perf_counter() > ends[0]
+        )
+    )
+    setup.solve(kept[-1])
     taken = time.perf_counter() - began[0], time.process_time() - began[1]
     found = setup.haveExactSolutionPath()
     length = setup.getSolutionPath().length() if found else np.nan
