@@ -110,3 +110,21 @@ def test_the_fan_has_as_many_paths_as_enav(monkeypatch):
     )
     steps = np.linalg.norm(np.diff(fan[:, :, :2], axis=1), axis=2)
     np.testing.assert_allclose(steps, 0.25)
+
+
+@pytest.mark.slow
+def test_ways_are_compared_with_the_best_of_the_lattice_in_a_small_size(capsys):
+    ways = importlib.import_module("benchmarks.ways")
+    trials = importlib.import_module("benchmarks.way_trials.grounds")
+    rover = importlib.import_module("rover_physics.rover.rover_file").load_rover("lsr1")
+    worlds = importlib.import_module("rover_planner.worlds.mars_terrain")
+    case = trials.Case("small", rover, worlds.make_mars_terrain(3, 8.0), "equal")
+    asked = {"count": 2, "seed": 0, "budget": 2.0, "truth": 2, "truth_seconds": 100.0, "warm": 1}
+    asked |= {"ompl": 0, "threads": 1, "nodes": 1000}
+    rows = list(ways.run_case(case, asked))
+    assert [row.get("outcome") for row in rows] == ["found", "found", None]
+    assert all(row["passes"] and 0.0 < row["best"] < np.inf for row in rows[:2])
+    assert rows[0]["warm_outcome"] == "found" and rows[0]["same_on_threads"] is not False
+    assert rows[2]["wrong"] == 0
+    ways.show(rows)
+    assert "found of connected" in capsys.readouterr().out

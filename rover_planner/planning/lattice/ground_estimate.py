@@ -1,7 +1,8 @@
 """Cheap estimates of all nodes, from the heights below the wheels without the model.
 
-Nodes where the centre of a wheel is over unknown ground are refused, as the model does. Steep
-ground is only doubted: the model decides, but it is asked about other ways first.
+Nodes where the centre of a wheel is over unknown ground however the rover tilts are refused, as
+the model does. Other unknown ground and steep ground are only doubted: the model decides, but it
+is asked about other ways first.
 """
 
 import math
@@ -9,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
@@ -23,15 +25,15 @@ STEEP = 0.4
 """Share of that steepness from where on ground is doubted."""
 UNEVEN = 0.5
 """Weight of the slopes at the wheels beside that of the ground as a whole."""
-_ROUNDING = 1e-6
-"""Distance from the edge of the map [m] that counts as on it."""
+_ROUNDING = 1e-4
+"""Distance from the edge of the map [cells] that counts as on it."""
 
 
 class GroundEstimate(NamedTuple):
     """Estimates of all nodes."""
 
     groundless: NDArray[np.bool_]
-    """(nodes,) whether the centre of a wheel is over unknown ground or off the map."""
+    """(nodes,) whether the centre of a wheel is over unknown ground or off the map in any case."""
     doubt: NDArray[np.float32]
     """(nodes,) doubt that the rover can be there, 0 to FULL_DOUBT."""
 
@@ -43,6 +45,8 @@ class _Map(NamedTuple):
     """(ny, nx) heights [m]."""
     slope: np.ndarray
     """(ny, nx) slope at the size of a wheel [rise over run]; NaN where unknown."""
+    away: np.ndarray
+    """(ny, nx) distance to the next known cell [m]."""
     resolution: float
     """Cell size [m]."""
 
@@ -55,6 +59,8 @@ class _Wheels(NamedTuple):
     map's first cell [m]."""
     plane: np.ndarray
     """(2, 6) weights of the heights below the wheels in the slopes of the plane through them."""
+    reach: float
+    """Largest distance of a wheel centre from its place on level ground [m], seen from above."""
 
 
 def estimate_ground(
@@ -73,9 +79,14 @@ def estimate_ground(
     c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
     x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
     plane = np.linalg.pinv(np.column_stack([np.ones(6), places]))[1:]
-    wheels = _Wheels(np.stack([x, y], axis=-1) - terrain.origin, np.ascontiguousarray(plane))
+    offsets = np.stack([x, y], axis=-1) - terrain.origin
+    wheels = _Wheels(offsets, np.ascontiguousarray(plane), reach_of_wheels(rover))
+    elevation = np.asarray(terrain.elevation)
     ground = _Map(
-        np.asarray(terrain.elevation), _slopes(terrain, rover.wheel.radius), terrain.resolution
+        elevation,
+        _slopes(terrain, rover.wheel.radius),
+        _distance_to_known(elevation, terrain.resolution),
+        terrain.resolution,
     )
     found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
     window = nodes.cell, nodes.first[0], nodes.first[1], nodes.shape[1]
@@ -89,6 +100,45 @@ def steepest_climb(rover: Rover, friction: float) -> float:
     pull = 6.0 * rover.wheel.max_torque * limits.torque_saturation / rover.wheel.radius
     by_torque = math.tan(math.asin(min(pull / rover.weight, 0.99)))
     return min(friction * limits.friction_utilisation, by_torque, math.tan(limits.tilt))
+
+
+def reach_of_wheels(rover: Rover) -> float:
+    """Return how far a wheel centre may be from its place on level ground [m], seen from above.
+
+    Body, rocker and bogie each turn by what their limits allow at most.
+    """
+    suspension, tilt = rover.suspension, rover.limits.tilt
+    rocking, turning = (
+        min(max(map(abs, limits)), 0.5 * math.pi)
+        for limits in (suspension.rocker_limits, suspension.bogie_limits)
+    )
+    farthest = 0.0
+    for name, wheel in suspension.wheels.items():
+        links = [(suspension.rocker_pivot, wheel, rocking)]
+        if name in suspension.bogie_wheels:
+            both = min(rocking + turning, 0.5 * math.pi)
+            links = [
+                (suspension.rocker_pivot, suspension.bogie_pivot, rocking),
+                (suspension.bogie_pivot, wheel, both),
+            ]
+        along = up = 0.0
+        for pivot, end, angle in links:
+            x, z = abs(end[0] - pivot[0]), abs(end[2] - pivot[2])
+            along += x * (1.0 - math.cos(angle)) + z * math.sin(angle)
+            up += z * (1.0 - math.cos(angle)) + x * math.sin(angle)
+        level = math.hypot(wheel[0], wheel[1]) + along
+        tilted = level * (1.0 - math.cos(tilt)) + (abs(wheel[2]) + up) * math.sin(tilt)
+        farthest = max(farthest, along + tilted)
+    return farthest
+
+
+def _distance_to_known(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
+    """Return (ny, nx) distances to the next known cell [m]."""
+    unknown = np.isnan(elevation)
+    if not unknown.any():
+        return np.zeros(elevation.shape)
+    away: NDArray[np.float64] = resolution * ndimage.distance_transform_edt(unknown)
+    return away
 
 
 def _slopes(terrain: Terrain, radius: float) -> NDArray[np.float64]:
@@ -117,22 +167,20 @@ def estimate_nodes(ground, wheels, window, climb, found):
         found: GroundEstimate of zeros, written where it differs.
     """
     cell, first_column, first_row, columns = window
-    ny, nx = ground.elevation.shape
-    edge = _ROUNDING / ground.resolution
     for node in range(found.doubt.size):
         heading, place = node % HEADINGS, node // HEADINGS
         x = cell * (place % columns + first_column)
         y = cell * (place // columns + first_row)
-        pitch, roll, uneven = 0.0, 0.0, 0.0
+        pitch, roll, uneven, doubted = 0.0, 0.0, 0.0, False
         for wheel in range(6):
             u = (x + wheels.offsets[heading, wheel, 0]) / ground.resolution
             v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
-            if not (-edge <= u <= nx - 1 + edge and -edge <= v <= ny - 1 + edge):
-                found.groundless[node] = True
-                break
             if not _is_known(ground.elevation, u, v):
-                found.groundless[node] = True
-                break
+                doubted = True
+                if _distance(ground, u, v) > wheels.reach:
+                    found.groundless[node] = True
+                    break
+                continue
             i, j = int(u + 0.5), int(v + 0.5)
             height, slope = ground.elevation[j, i], ground.slope[j, i]
             if height == height:
@@ -140,18 +188,32 @@ def estimate_nodes(ground, wheels, window, climb, found):
                 roll += wheels.plane[1, wheel] * height
             if slope == slope:
                 uneven += slope / 6.0
-        if not found.groundless[node]:
+        if doubted:
+            found.doubt[node] = FULL_DOUBT
+        else:
             steepness = (np.hypot(pitch, roll) + UNEVEN * uneven) / ((1.0 + UNEVEN) * climb)
             share = min(max((steepness - STEEP) / (1.0 - STEEP), 0.0), 1.0)
             found.doubt[node] = FULL_DOUBT * share
 
 
 @exact_kernel
+def _distance(ground, u, v):
+    """Return a bound from below on the distance from a place [cells] to known ground [m]."""
+    ny, nx = ground.away.shape
+    i, j = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
+    beyond = ground.resolution * np.hypot(u - i, v - j)
+    return max(beyond, ground.away[j, i] - beyond) - ground.resolution
+
+
+@exact_kernel
 def _is_known(elevation, u, v):
-    """Return whether the ground at a place [cells] is known: all corners around it are.
+    """Return whether a place [cells] is on the map, and known: all corners around it are.
 
     Within rounding of a line between cells, the corners on one side of it suffice.
     """
+    ny, nx = elevation.shape
+    if not (-_ROUNDING <= u <= nx - 1 + _ROUNDING and -_ROUNDING <= v <= ny - 1 + _ROUNDING):
+        return False
     i, j = min(int(u), elevation.shape[1] - 2), min(int(v), elevation.shape[0] - 2)
     a, b = u - i, v - j
     known = True

@@ -110,7 +110,8 @@ def _curves(
     fits = arc_legs >= radius * np.tan(0.5 * abs(angle)) - 1e-9
     lengths = legs.sum(axis=1) - 2.0 * arc_legs
     lengths += abs(angle) / np.tan(0.5 * abs(angle)) * arc_legs
-    order = [row for row in np.lexsort((steps[:, 1], steps[:, 0], lengths.round(9))) if fits[row]]
+    rows = np.flatnonzero(fits)
+    order = rows[np.lexsort((steps[rows, 1], steps[rows, 0], lengths[rows].round(9)))]
     found: list[Primitive] = []
     for row in order:
         if len(found) == max(CURVES.values()):

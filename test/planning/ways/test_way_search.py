@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge_path import judge_path
 from rover_planner.errors import PlanningError
-from rover_planner.planning.lattice.ground_estimate import estimate_ground
+from rover_planner.planning.lattice.ground_estimate import FULL_DOUBT, estimate_ground
 from rover_planner.planning.lattice.judge import Judge
 from rover_planner.planning.lattice.nodes import nodes_within
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
@@ -195,6 +195,7 @@ def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
     elevation = np.array(ground.elevation)
     rng = np.random.default_rng(1)
     elevation[rng.random(elevation.shape) < 0.02] = np.nan
+    elevation[: len(elevation) // 2] = np.nan
     ground = Terrain(elevation, ground.resolution, ground.origin)
     nodes = nodes_within(0.1, (-3.2, -3.2), (3.2, 3.2))
     estimate = estimate_ground(LSR1, ground, nodes, LSR1.friction)
@@ -203,6 +204,16 @@ def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
     chosen = rng.choice(groundless, 2000, replace=False)
     codes = Judge(LSR1, ground, OPTIONS).stand(nodes.poses(chosen))
     assert set(codes) <= {"unknown_ground", "off_map"}
+
+
+def test_nodes_where_tilt_moves_a_wheel_off_unknown_ground_are_only_doubted():
+    spirit = load_terrain("spirit")
+    nodes = nodes_within(0.04, (-47.12, -19.92), (-45.88, -19.2))
+    estimate = estimate_ground(LSR1, spirit, nodes, LSR1.friction)
+    codes = Judge(LSR1, spirit, OPTIONS).stand(nodes.poses(np.arange(nodes.count)))
+    stands = np.array([code == "" for code in codes])
+    assert not (stands & estimate.groundless).any()
+    assert (stands & (estimate.doubt == FULL_DOUBT)).any()
 
 
 def test_a_map_without_end_is_searched_in_a_window_around_start_and_goal():
