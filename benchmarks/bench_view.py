@@ -90,11 +90,13 @@ def measure_ground(name: str, ground: Terrain) -> Iterator[Figure]:
         figure = partial(Figure, "view", unit="ms", repeats=repeats)
         yield figure(f"{title}: slider to verdict", value=1e3 * quantile(times.verdicts, 0.5),
                      target=target)  # fmt: skip
-        yield figure("the longest", value=1e3 * max(times.verdicts), target=target)
+        yield figure(f"{title}: the longest", value=1e3 * max(times.verdicts), target=target)
         if times.rests:
-            yield figure("slider to all policies", value=1e3 * quantile(times.rests, 0.5))
-            yield figure("the longest", value=1e3 * max(times.rests))
-        yield figure("longest pause of the pictures", value=1e3 * max(times.pauses))
+            yield figure(
+                f"{title}: slider to all policies", value=1e3 * quantile(times.rests, 0.5)
+            )
+            yield figure(f"{title}: the longest to all", value=1e3 * max(times.rests))
+        yield figure(f"{title}: longest pause of the pictures", value=1e3 * max(times.pauses))
 
 
 def choose_pairs(rover: Rover, ground: Terrain) -> list[tuple[Pose, Pose]]:

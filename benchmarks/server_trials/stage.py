@@ -176,8 +176,9 @@ class Stage:
         Args:
             terrain: Its map; None waits for one on the topic.
             environment: Additions to this process's environment.
-            parameters: Its parameters.
+            parameters: Its parameters. It tries candidates only, no search around obstacles.
         """
+        parameters = {"planner": "fan", **parameters}
         if terrain is not None:
             file = self._folder / "terrain.npz"
             save_terrain(file, terrain)

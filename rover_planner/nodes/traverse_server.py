@@ -38,7 +38,7 @@ from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.warm_up import WAYS
 from rover_planner.parameters.declare import declare_parameters, follow_changes
-from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import Judgement, refusal
@@ -73,10 +73,11 @@ class TraverseServer(Node):
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
-        # Other nodes discover this one meanwhile, which may take DDS three seconds.
-        self._behind = load_kernels(EXACT, (*WAYS, *UNCERTAIN), self.get_logger().info)
-        warn_of_disk(self.get_logger())
         self._values = declare_parameters(self, TraverseServerParameters)
+        behind = UNCERTAIN if self._values.planner == FAN else (*UNCERTAIN, *WAYS)
+        # Other nodes discover this one meanwhile, which may take DDS three seconds.
+        self._behind = load_kernels(EXACT, behind, self.get_logger().info)
+        warn_of_disk(self.get_logger())
         self._service = TraverseService(load_service_settings(self._values))
         self.guard = Guard(self.get_logger())
         """Takes unexpected errors."""

@@ -121,6 +121,7 @@ def test_a_wall_is_refused_for_a_physical_reason(server, client):
 
 def test_leaving_the_map_and_entering_unknown_ground_are_told_apart(server, client):
     client.send_terrain(make_terrain(gap))
+    assert client.set_parameter("planner", "fan") == (True, "")
     _, verdict, _ = ask(client)
     assert verdict["code"] == "unknown_ground"
     _, verdict, _ = ask(client, goal=(-5.0, 0.0, math.pi), start=(-2.0, 0.0, math.pi))

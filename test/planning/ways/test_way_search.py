@@ -103,8 +103,8 @@ def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
     assert f"{closed.area:.1f} m2" in answer.reason
     rows, columns = np.nonzero(closed.places)
     cell, (column, row) = answer.nodes.cell, answer.nodes.first
-    assert np.abs(cell * (columns + column)).max() < 2.0
-    assert np.abs(cell * (rows + row)).max() < 2.0
+    assert np.abs(cell * (columns + column)).max() < 2.1
+    assert np.abs(cell * (rows + row)).max() < 2.1
 
 
 def test_a_closed_goal_is_told_from_a_closed_start():
