@@ -1,4 +1,6 @@
-"""Counts how often values on random maps leave their bounds: the tables of docs/uncertainty.md.
+"""Counts how often values on random maps leave their bounds.
+
+The tables are in docs/notes/uncertainty.md.
 
 Run from the repository: python -m benchmarks.uncertainty [maps per case]
 """

@@ -31,6 +31,17 @@ LAPTOP = {"width": 1280, "height": 720}
 WAIT = 120.0
 """Longest wait for the page [s]; rendering takes seconds on a busy machine."""
 
+RECORD = """text => {
+    window.shownTexts = window.shownTexts || {};
+    window.shownTexts[text] = false;
+    new MutationObserver(() => {
+        window.shownTexts[text] ||= document.body.innerText.includes(text);
+    }).observe(document.body, {
+        attributes: true, characterData: true, childList: true, subtree: true
+    });
+}"""
+"""Notes in the page when a text has appeared."""
+
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
 )
@@ -107,6 +118,14 @@ class Visitor:
     def text(self, selector: str) -> str:
         """Return the text of an element of the page."""
         return self.tab.inner_text(selector)
+
+    def record(self, text: str) -> Callable[[], bool]:
+        """Record from now on whether the page shows a text; return what tells it later.
+
+        A text that comes and goes may be gone when a test looks for it on a busy machine.
+        """
+        self.tab.evaluate(RECORD, text)
+        return lambda: bool(self.tab.evaluate("text => window.shownTexts[text]", text))
 
     def wait_for(self, text: str) -> None:
         """Wait until the page shows a text."""

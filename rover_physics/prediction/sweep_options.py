@@ -46,7 +46,7 @@ class SweepOptions:
     max_torque: float | None = None
     """Largest wheel torque [N m] (default: that of the rover file)."""
     soil: str | None = None
-    """Preset soil where the terrain names none, see docs/soil.md (default: Coulomb friction)."""
+    """Preset soil where the terrain names none (default: Coulomb friction; docs/notes/soil.md)."""
     joint_angles: Mapping[str, float] | JointAngles | None = None
     """Arm angles [rad] by joint name, stored as pairs. Joints left out are stowed; None stows
     all."""

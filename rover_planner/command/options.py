@@ -23,7 +23,7 @@ Policy = Annotated[
 ]
 SoilName = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="Preset soil where the terrain names none (docs/soil.md)."),
+    typer.Option(metavar="NAME", help="Preset soil where the terrain names none; see docs/notes."),
 ]
 MaxGap = Annotated[
     float,

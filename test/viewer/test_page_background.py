@@ -92,9 +92,9 @@ def test_while_a_change_is_judged_the_page_says_so_and_the_rover_drives_on(visit
     before, shown = session.wanted, session.shown
     slow_page.playback.speed = 1.0
     slow_page.requests.add(slow_page.playback.play)
+    tells = visitor.record("judging")
     visitor.set_slider(FRICTION, "1.9")
-    visitor.tab.wait_for_selector("#judging")
-    assert "judging" in visitor.text("#judging")
+    wait_until(tells, "the notice")
     assert session.wanted is not before and session.progress is not None
     pause = longest_pause(slow_page, lambda: session.progress is None)
     assert session.rover.friction == 1.9 and session.shown is not shown
@@ -104,10 +104,11 @@ def test_while_a_change_is_judged_the_page_says_so_and_the_rover_drives_on(visit
 
 
 def test_the_old_verdict_is_greyed_until_the_new_one_is_there(visitor, slow_page):
+    tells = visitor.record("old values: judging")
     visitor.set_slider(FRICTION, "1.8")
-    visitor.tab.locator("#old:visible").wait_for()
-    assert "old values: judging" in visitor.text("#verdict:visible")
-    assert slow_page.scene.paths._old == set(range(len(slow_page.session.candidates)))
+    grey = set(range(len(slow_page.session.candidates)))
+    wait_until(lambda: slow_page.scene.paths._old == grey, "grey paths")
+    wait_until(tells, "the grey verdict")
     wait_for_rest(slow_page)
     visitor.tab.locator("#old").first.wait_for(state="detached")
     assert slow_page.scene.paths._old == set()
@@ -117,15 +118,16 @@ def test_camera_and_second_visitor_are_served_while_a_change_is_judged(
     visitor, slow_page, browser
 ):
     second = Visitor(browser, slow_page.url)
-    visitor.set_slider(FRICTION, "1.7")
-    second.wait_for("judging")
-    visitor.wait_for("judging")
+    tells_first, tells_second = visitor.record("judging"), second.record("judging")
     picture = visitor.picture()
+    visitor.set_slider(FRICTION, "1.7")
     visitor.tab.mouse.move(600, 420)
     visitor.tab.mouse.down()
     visitor.tab.mouse.move(700, 420, steps=4)
     visitor.tab.mouse.up()
     wait_until(lambda: visitor.picture() != picture, "the camera to turn")
+    wait_until(tells_first, "the first visitor to be told")
+    wait_until(tells_second, "the second visitor to be told")
     wait_for_rest(slow_page)
     second.tab.wait_for_selector("#judging", state="hidden")
     assert second.page_errors == visitor.page_errors == []

@@ -70,7 +70,7 @@ def roll(soil, load, velocity, droop=0.3, limit=0.2, share=1.0):
 
 
 def soil_forces(soil, load, velocity, rim) -> tuple[np.ndarray, float]:
-    """Return F_x, S, D and R over the weight at the speed of the rim, by docs/soil.md."""
+    """Return F_x, S, D and R over the weight at the speed of the rim, by notes/soil.md."""
     row = pack_soils((soil,))[-1]
     N = load * WEIGHT
     sinkage = find_sinkage(row, RADIUS, WIDTH, N)

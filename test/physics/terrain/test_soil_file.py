@@ -46,7 +46,7 @@ def test_presets_have_the_published_values_in_si_units(
 
 
 def test_every_preset_says_where_it_is_from_and_is_in_the_docs():
-    page = find_config("soils.yaml").parent.parent / "docs" / "soil.md"
+    page = find_config("soils.yaml").parent.parent / "docs" / "notes" / "soil.md"
     text = page.read_text(encoding="utf-8") if page.exists() else None
     for name, soil in load_soils().items():
         assert soil.source.strip()
