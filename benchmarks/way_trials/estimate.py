@@ -21,7 +21,7 @@ def check_estimate(case: Case, count: int) -> dict[str, float]:
     checked, wrong, share = 0, 0, np.nan
     for cell in SHARES:
         nodes = _nodes(case, cell * wheelbase(case.rover))
-        groundless = estimate_ground(case.rover, case.terrain, nodes, case.rover.friction)[0]
+        groundless = estimate_ground(case.rover, case.terrain, nodes)[0]
         if np.isnan(share):
             share = float(groundless.mean())
         refused = np.flatnonzero(groundless)

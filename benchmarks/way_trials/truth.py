@@ -20,7 +20,7 @@ from rover_planner.planning.lattice.edges import Edges
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.judge import Judge
 from rover_planner.planning.lattice.primitives import make_primitives
-from rover_planner.planning.ways.way_search import choose_window
+from rover_planner.planning.ways.window import choose_window
 
 BATCH = 500
 """Edges judged in one call."""

@@ -5,6 +5,8 @@ Journal of Mathematics 79(3). The six words are solved in the normalised form of
 (2001), Classification of the Dubins set, Robotics and Autonomous Systems 34.
 """
 
+import math
+
 import numpy as np
 
 _TURN = {"L": 1.0, "S": 0.0, "R": -1.0}
@@ -45,9 +47,11 @@ def _words_between(
     start: np.ndarray, goal: np.ndarray, radius: float
 ) -> list[tuple[str, tuple[float, float, float]]]:
     """Return the words between two poses; pieces as `_solve_words` returns them."""
-    dx, dy = (goal[:2] - start[:2]) / radius
-    bearing, distance = np.arctan2(dy, dx), float(np.hypot(dx, dy))
-    return _solve_words(_turn(start[2] - bearing), _turn(goal[2] - bearing), distance)
+    dx, dy = ((goal[:2] - start[:2]) / radius).tolist()
+    bearing, distance = math.atan2(dy, dx), math.hypot(dx, dy)
+    return _solve_words(
+        _turn(float(start[2]) - bearing), _turn(float(goal[2]) - bearing), distance
+    )
 
 
 def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, float, float]]]:
@@ -55,36 +59,36 @@ def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, f
 
     Return each word that exists, with the lengths of its three pieces [radii; rad on arcs].
     """
-    sa, ca, sb, cb, cab = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.cos(a - b)
+    sa, ca, sb, cb, cab = math.sin(a), math.cos(a), math.sin(b), math.cos(b), math.cos(a - b)
     words = []
 
     square = 2 + d * d - 2 * cab + 2 * d * (sa - sb)
     if square >= 0:
-        line = np.arctan2(cb - ca, d + sa - sb)
-        words.append(("LSL", (_turn(line - a), np.sqrt(square), _turn(b - line))))
+        line = math.atan2(cb - ca, d + sa - sb)
+        words.append(("LSL", (_turn(line - a), math.sqrt(square), _turn(b - line))))
     square = 2 + d * d - 2 * cab + 2 * d * (sb - sa)
     if square >= 0:
-        line = np.arctan2(ca - cb, d - sa + sb)
-        words.append(("RSR", (_turn(a - line), np.sqrt(square), _turn(line - b))))
+        line = math.atan2(ca - cb, d - sa + sb)
+        words.append(("RSR", (_turn(a - line), math.sqrt(square), _turn(line - b))))
     square = -2 + d * d + 2 * cab + 2 * d * (sa + sb)
     if square >= 0:
-        p = np.sqrt(square)
-        line = np.arctan2(-ca - cb, d + sa + sb) - np.arctan2(-2.0, p)
+        p = math.sqrt(square)
+        line = math.atan2(-ca - cb, d + sa + sb) - math.atan2(-2.0, p)
         words.append(("LSR", (_turn(line - a), p, _turn(line - b))))
     square = -2 + d * d + 2 * cab - 2 * d * (sa + sb)
     if square >= 0:
-        p = np.sqrt(square)
-        line = np.arctan2(ca + cb, d - sa - sb) - np.arctan2(2.0, p)
+        p = math.sqrt(square)
+        line = math.atan2(ca + cb, d - sa - sb) - math.atan2(2.0, p)
         words.append(("RSL", (_turn(a - line), p, _turn(b - line))))
     cosine = (6 - d * d + 2 * cab + 2 * d * (sa - sb)) / 8
     if abs(cosine) <= 1:
-        p = 2 * np.pi - np.arccos(cosine)
-        t = _turn(a - np.arctan2(ca - cb, d - sa + sb) + p / 2)
+        p = 2 * math.pi - math.acos(cosine)
+        t = _turn(a - math.atan2(ca - cb, d - sa + sb) + p / 2)
         words.append(("RLR", (t, p, _turn(a - b - t + p))))
     cosine = (6 - d * d + 2 * cab + 2 * d * (sb - sa)) / 8
     if abs(cosine) <= 1:
-        p = 2 * np.pi - np.arccos(cosine)
-        t = _turn(-a - np.arctan2(ca - cb, d + sa - sb) + p / 2)
+        p = 2 * math.pi - math.acos(cosine)
+        t = _turn(-a - math.atan2(ca - cb, d + sa - sb) + p / 2)
         words.append(("LRL", (t, p, _turn(b - a - t + p))))
     return words
 
@@ -117,5 +121,5 @@ def _advance(x, y, yaw, turn, s):
 
 def _turn(angle: float) -> float:
     """Wrap an angle [rad] into 0 to 2 pi; a full turn within rounding errors becomes 0."""
-    turned = float(np.mod(angle, 2 * np.pi))
-    return 0.0 if 2 * np.pi - turned < 1e-9 else turned
+    turned = angle % (2.0 * math.pi)
+    return 0.0 if 2.0 * math.pi - turned < 1e-9 else turned

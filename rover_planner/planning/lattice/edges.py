@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.planning.lattice.costs import least_cost
+from rover_planner.planning.lattice.difficulty import SAMPLE_SHARE, sample_primitives
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.lattice.primitives import Primitive
@@ -60,6 +61,11 @@ class Edges:
             back[heading, : len(pairs)] = pairs
         return PrimitiveTable(step, end, cost, back)
 
+    @cached_property
+    def samples(self) -> NDArray[np.float64]:
+        """Places along the primitives, see `sample_primitives`."""
+        return sample_primitives(self.primitives, SAMPLE_SHARE * self.nodes.cell)
+
     @property
     def width(self) -> int:
         """Largest number of primitives of a heading, P."""
@@ -102,6 +108,8 @@ class JudgedEdges:
         """(nodes, P) cost [m] where the edge passes."""
         self.standing = np.zeros(edges.nodes.count, np.int8)
         """(nodes,) as `state`: whether the rover can stand at a node with its wheels ahead."""
+        self.difficulty = np.zeros(shape, np.uint8)
+        """(nodes, P) as `Difficulty.known`."""
         self.codes: list[str] = []
         """Codes of the limits that failed so far."""
 
@@ -117,7 +125,7 @@ class JudgedEdges:
 
     def forget(self, places: NDArray[np.int64]) -> None:
         """Forget what is known of the nodes at places (k,) and of the edges that begin there."""
-        for values in (self.state, self.standing):
+        for values in (self.state, self.standing, self.difficulty):
             values.reshape(-1, HEADINGS, *values.shape[1:])[places] = UNJUDGED
 
     @property

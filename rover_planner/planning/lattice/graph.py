@@ -1,7 +1,8 @@
 """Shortest paths over the edges of a lattice, compiled.
 
 An edge that is judged costs what the model found, or cannot be driven. One that is not judged
-costs what it would on level ground, times 1 + `caution` x the doubt at its end.
+costs what it would on level ground, times 1 + `caution` x the doubt at its end, and `caution` x
+PRICE x its difficulty more.
 """
 
 import heapq
@@ -10,8 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
+from rover_planner.planning.lattice.difficulty import Difficulty, difficulty_of
 from rover_planner.planning.lattice.edges import FAILS, PASSES, PrimitiveTable
 from rover_planner.planning.lattice.headings import HEADINGS
+
+PRICE = 4.0
+"""Price of a unit of difficulty with a caution of 1 [cells]."""
 
 
 class Graph(NamedTuple):
@@ -27,8 +32,10 @@ class Graph(NamedTuple):
     """(nodes,) states of the nodes, see `JudgedEdges`."""
     doubt: np.ndarray
     """(nodes,) doubt that edges to a node pass, 0 for none."""
+    difficulty: Difficulty
+    """Estimates how likely edges are refused."""
     caution: float
-    """Weight of the doubt; with 0 no edge is estimated above its true cost."""
+    """Weight of doubt and difficulty; with 0 no edge is estimated above its true cost."""
     rows: int
     """Number of rows of places."""
     columns: int
@@ -77,7 +84,12 @@ def edge_cost(graph, node, k, end):
         return np.inf
     if state == PASSES:
         return float(graph.cost[node, k])
-    return graph.table.least_cost[node % HEADINGS, k] * (1.0 + graph.caution * graph.doubt[end])
+    least = graph.table.least_cost[node % HEADINGS, k]
+    if graph.caution == 0.0:
+        return least
+    price = PRICE * graph.difficulty.cell
+    difficulty = difficulty_of(graph.difficulty, graph.columns, node, k)
+    return least + graph.caution * (least * graph.doubt[end] + price * difficulty)
 
 
 @exact_kernel

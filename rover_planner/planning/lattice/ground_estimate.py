@@ -1,8 +1,8 @@
 """Cheap estimates of all nodes, from the heights below the wheels without the model.
 
 Nodes where the centre of a wheel is over unknown ground however the rover tilts are refused, as
-the model does. Other unknown ground and steep ground are only doubted: the model decides, but it
-is asked about other ways first.
+the model does. Nodes with unknown ground below a wheel on level ground are only doubted: the model
+decides, but it is asked about other ways first.
 """
 
 import math
@@ -19,12 +19,8 @@ from rover_planner.planning.lattice.headings import HEADINGS, YAWS
 from rover_planner.planning.lattice.nodes import Nodes
 
 FULL_DOUBT = 4.0
-"""Doubt of ground that is as steep as the rover can climb: edges that lead there cost 1 + that as
-much while the search is cautious."""
-STEEP = 0.4
-"""Share of that steepness from where on ground is doubted."""
-UNEVEN = 0.5
-"""Weight of the slopes at the wheels beside that of the ground as a whole."""
+"""Doubt of nodes near unknown ground: edges that lead there cost 1 + that as much while the search
+is cautious."""
 _ROUNDING = 1e-4
 """Distance from the edge of the map [cells] that counts as on it."""
 
@@ -35,7 +31,7 @@ class GroundEstimate(NamedTuple):
     groundless: NDArray[np.bool_]
     """(nodes,) whether the centre of a wheel is over unknown ground or off the map in any case."""
     doubt: NDArray[np.float32]
-    """(nodes,) doubt that the rover can be there, 0 to FULL_DOUBT."""
+    """(nodes,) doubt that the rover can be there, 0 or FULL_DOUBT."""
 
 
 class _Map(NamedTuple):
@@ -43,8 +39,6 @@ class _Map(NamedTuple):
 
     elevation: np.ndarray
     """(ny, nx) heights [m]."""
-    slope: np.ndarray
-    """(ny, nx) slope at the size of a wheel [rise over run]; NaN where unknown."""
     away: np.ndarray
     """(ny, nx) distance to the next known cell [m]."""
     resolution: float
@@ -57,49 +51,34 @@ class _Wheels(NamedTuple):
     offsets: np.ndarray
     """(HEADINGS, 6, 2) wheel centres at a node at the map frame's origin, from the centre of the
     map's first cell [m]."""
-    plane: np.ndarray
-    """(2, 6) weights of the heights below the wheels in the slopes of the plane through them."""
     reach: float
     """Largest distance of a wheel centre from its place on level ground [m], seen from above."""
 
 
-def estimate_ground(
-    rover: Rover, terrain: Terrain, nodes: Nodes, friction: float
-) -> GroundEstimate:
+def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstimate:
     """Estimate all nodes.
 
     Args:
         rover: The rover.
         terrain: The ground.
         nodes: The nodes.
-        friction: Friction coefficient where the terrain has none.
     """
     own = np.array([place[:2] for place in rover.suspension.wheels.values()])
     places = np.concatenate([own, own * (1.0, -1.0)])
     c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
     x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
-    plane = np.linalg.pinv(np.column_stack([np.ones(6), places]))[1:]
     offsets = np.stack([x, y], axis=-1) - terrain.origin
-    wheels = _Wheels(offsets, np.ascontiguousarray(plane), reach_of_wheels(rover))
+    wheels = _Wheels(offsets, reach_of_wheels(rover))
     elevation = np.asarray(terrain.elevation)
     ground = _Map(
         elevation,
-        _slopes(terrain, rover.wheel.radius),
         _distance_to_known(elevation, terrain.resolution),
         terrain.resolution,
     )
     found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
     window = nodes.cell, nodes.first[0], nodes.first[1], nodes.shape[1]
-    estimate_nodes(ground, wheels, window, steepest_climb(rover, friction), found)
+    estimate_nodes(ground, wheels, window, found)
     return found
-
-
-def steepest_climb(rover: Rover, friction: float) -> float:
-    """Return the slope [rise over run] at which friction, torque or tilt end a climb."""
-    limits = rover.limits
-    pull = 6.0 * rover.wheel.max_torque * limits.torque_saturation / rover.wheel.radius
-    by_torque = math.tan(math.asin(min(pull / rover.weight, 0.99)))
-    return min(friction * limits.friction_utilisation, by_torque, math.tan(limits.tilt))
 
 
 def reach_of_wheels(rover: Rover) -> float:
@@ -141,29 +120,14 @@ def _distance_to_known(elevation: NDArray[np.float64], resolution: float) -> NDA
     return away
 
 
-def _slopes(terrain: Terrain, radius: float) -> NDArray[np.float64]:
-    """Return (ny, nx) slopes between points about one wheel radius to all sides, NaN at edges."""
-    step = max(1, round(radius / terrain.resolution))
-    z, slopes = terrain.elevation, np.full(terrain.elevation.shape, np.nan)
-    if min(z.shape) <= 2 * step:
-        return slopes
-    inner = slice(step, -step)
-    run = 2.0 * step * terrain.resolution
-    along_x = (z[inner, 2 * step :] - z[inner, : -2 * step]) / run
-    along_y = (z[2 * step :, inner] - z[: -2 * step, inner]) / run
-    slopes[inner, inner] = np.hypot(along_x, along_y)
-    return slopes
-
-
 @exact_kernel
-def estimate_nodes(ground, wheels, window, climb, found):
+def estimate_nodes(ground, wheels, window, found):
     """Write the estimates of all nodes.
 
     Args:
         ground: _Map.
         wheels: _Wheels.
         window: Cell [m], first column and row, and number of columns of the nodes.
-        climb: Slope at which a climb ends [rise over run].
         found: GroundEstimate of zeros, written where it differs.
     """
     cell, first_column, first_row, columns = window
@@ -171,29 +135,14 @@ def estimate_nodes(ground, wheels, window, climb, found):
         heading, place = node % HEADINGS, node // HEADINGS
         x = cell * (place % columns + first_column)
         y = cell * (place // columns + first_row)
-        pitch, roll, uneven, doubted = 0.0, 0.0, 0.0, False
         for wheel in range(6):
             u = (x + wheels.offsets[heading, wheel, 0]) / ground.resolution
             v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
             if not _is_known(ground.elevation, u, v):
-                doubted = True
+                found.doubt[node] = FULL_DOUBT
                 if _distance(ground, u, v) > wheels.reach:
                     found.groundless[node] = True
                     break
-                continue
-            i, j = int(u + 0.5), int(v + 0.5)
-            height, slope = ground.elevation[j, i], ground.slope[j, i]
-            if height == height:
-                pitch += wheels.plane[0, wheel] * height
-                roll += wheels.plane[1, wheel] * height
-            if slope == slope:
-                uneven += slope / 6.0
-        if doubted:
-            found.doubt[node] = FULL_DOUBT
-        else:
-            steepness = (np.hypot(pitch, roll) + UNEVEN * uneven) / ((1.0 + UNEVEN) * climb)
-            share = min(max((steepness - STEEP) / (1.0 - STEEP), 0.0), 1.0)
-            found.doubt[node] = FULL_DOUBT * share
 
 
 @exact_kernel

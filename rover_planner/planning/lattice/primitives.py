@@ -7,6 +7,7 @@ radius. Each begins and ends exactly at a node, so that primitives join without 
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,10 @@ class Primitive:
     """Way of the body origin, or of the outermost wheel on the spot [m]."""
     poses: NDArray[np.float64]
     """(n, 3) waypoints from the first node to the last, x, y [m] from the first node, yaw [rad];
-    yaw goes on beyond pi."""
+    yaw goes on beyond pi. Read-only: all searches share it."""
+
+    def __post_init__(self) -> None:
+        self.poses.setflags(write=False)
 
 
 def make_primitives(
@@ -59,8 +63,15 @@ def make_primitives(
         cell: Distance of neighbouring nodes [m].
         waypoint_spacing: Largest distance between waypoints [m].
     """
-    radius = tightest_radius(rover)
     swing = swing_radius(rover) if can_turn_on_the_spot(rover) else None
+    return _make_primitives(tightest_radius(rover), swing, cell, waypoint_spacing)
+
+
+@lru_cache(maxsize=8)
+def _make_primitives(
+    radius: float, swing: float | None, cell: float, waypoint_spacing: float
+) -> tuple[tuple[Primitive, ...], ...]:
+    """Return the primitives of a smallest radius [m] and, to turn on the spot, of a swing [m]."""
     return tuple(
         (
             *_forward(heading, cell, radius, waypoint_spacing, CURVES),

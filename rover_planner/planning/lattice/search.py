@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.planning.lattice.connections import Connection
+from rover_planner.planning.lattice.difficulty import Difficulty, difficulty_of
 from rover_planner.planning.lattice.edges import PASSES, UNJUDGED, JudgedEdges
 from rover_planner.planning.lattice.graph import Seeds
 from rover_planner.planning.lattice.judge import Judge
@@ -33,8 +34,11 @@ rises by this share."""
 FEW_NODES, NODES_ASKED = 200, 0.05
 """Number of nodes around refused ones that are asked about at least, and in addition for each node
 that the last search expanded: then both take about as long."""
-FIRST_PIECES = 2
-"""Number of pieces that are judged first at either end of a path."""
+FIRST_PIECES = 4
+"""Number of pieces of a path that are judged first."""
+MOST_REFUSED = 3
+"""Number of refused connections of start or goal from which on all of its others are judged: it
+may be closed in, and each of them costs a search."""
 NEAR_OPTIMAL = 0.02
 """A path is good enough if no path of the lattice costs less by more than this share."""
 
@@ -110,12 +114,14 @@ class LatticeSearch:
     """Connections from nodes to the goal."""
     doubt: NDArray[np.float32]
     """(nodes,) doubt that the rover can be at a node, 0 for none; grows with the search."""
+    difficulty: Difficulty
+    """Estimates how likely edges are refused."""
     progress: Progress = field(default_factory=Progress)
     """What it has found."""
 
     def __post_init__(self) -> None:
         self._ends = _Ends(self.starts), _Ends(self.goals)
-        self.shortest = ShortestPaths(self.known, self.doubt, self._ends[0].seeds)
+        self.shortest = ShortestPaths(self.known, self.doubt, self.difficulty, self._ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
         self._judged = 0
 
@@ -204,22 +210,42 @@ class LatticeSearch:
         return self.known.standing[nodes] == PASSES
 
     def _judge_route(self, route: Route) -> bool:
-        """Judge what is open of a route; return whether all of it passes.
+        """Judge what is open of a route, the hardest first; return whether all of it passes.
 
-        It is judged from both ends inwards, more and more at a time: a refusal near an end may
-        close it.
+        More and more pieces are judged at a time.
         """
-        pieces = self._open_pieces(route)
+        pieces = sorted(self._open_pieces(route), key=self._hardness, reverse=True)
         size = FIRST_PIECES
         while pieces:
-            count = len(pieces)
-            chosen = range(count) if count <= 2 * size else [*range(size), *range(-size, 0)]
-            found = self._judge([pieces[k] for k in chosen])
-            if not all(found):
+            if not all(self._judge(pieces[:size])):
+                self._judge_ends()
                 return False
-            pieces = [] if count <= 2 * size else pieces[size:-size]
-            size *= 2
+            pieces, size = pieces[size:], 2 * size
         return True
+
+    def _hardness(self, piece: "_Piece") -> float:
+        """Return how likely a piece is refused; the connections of the ends come first."""
+        side, index = piece.place
+        if side is not None:
+            return np.inf
+        node, k = divmod(index, self.known.edges.width)
+        return float(difficulty_of(self.difficulty, self.known.edges.nodes.shape[1], node, k))
+
+    def _judge_ends(self) -> None:
+        """Judge all connections of start or goal if many are refused."""
+        for side in self._ends:
+            if len(side.codes) < MOST_REFUSED or side.judged.all():
+                continue
+            open_ = np.flatnonzero(~side.judged)
+            stands = self.known.standing[side.nodes[open_]]
+            self._stand(np.unique(side.nodes[open_[stands == UNJUDGED]]))
+            stands = self.known.standing[side.nodes[open_]]
+            pieces = []
+            for k in open_[stands == PASSES]:
+                one = side.connections[k]
+                pieces.append(_Piece(one.poses, one.gear, (side, int(k))))
+            self._judge(pieces)
+            side.judged[:] = True
 
     def _open_pieces(self, route: Route) -> list["_Piece"]:
         """Return the pieces of a route that are not judged, in the order of the drive."""
@@ -236,6 +262,8 @@ class LatticeSearch:
 
     def _judge(self, pieces: Sequence["_Piece"]) -> list[bool]:
         """Judge pieces, keep what is found, and return whether they pass."""
+        if not pieces:
+            return []
         found = self.judge.judge([one.poses for one in pieces], [one.gear for one in pieces])
         for piece, judged in zip(pieces, found, strict=True):
             side, index = piece.place

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_planner.planning.lattice.difficulty import Difficulty
 from rover_planner.planning.lattice.edges import JudgedEdges
 from rover_planner.planning.lattice.graph import (
     Graph,
@@ -38,9 +39,15 @@ class Route:
 class ShortestPaths:
     """Searches one lattice between fixed ends again and again, while edges are judged."""
 
-    def __init__(self, known: JudgedEdges, doubt: NDArray[np.float32], starts: Seeds):
+    def __init__(
+        self,
+        known: JudgedEdges,
+        doubt: NDArray[np.float32],
+        difficulty: Difficulty,
+        starts: Seeds,
+    ):
         """Search from about the nodes of the first seeds; later ones must be among them."""
-        self._known, self._doubt = known, doubt
+        self._known, self._doubt, self._difficulty = known, doubt, difficulty
         nodes = known.edges.nodes
         count = nodes.count
         self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell)
@@ -85,6 +92,7 @@ class ShortestPaths:
             known.cost,
             known.standing,
             self._doubt,
+            self._difficulty,
             caution,
             *nodes.shape,
         )

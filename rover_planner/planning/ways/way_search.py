@@ -13,11 +13,12 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.lattice.connections import connect_goal, connect_start
+from rover_planner.planning.lattice.difficulty import estimate_difficulty, steepest_climb
 from rover_planner.planning.lattice.edges import UNJUDGED
 from rover_planner.planning.lattice.ground_estimate import estimate_ground
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.judge import Judge
-from rover_planner.planning.lattice.nodes import Nodes, nodes_within
+from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.lattice.search import LatticeSearch, Progress, Stretch, join_pieces
 from rover_planner.planning.path_query import Candidate
@@ -25,13 +26,12 @@ from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.no_way import ClosedArea, find_closed_area
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.smoothing import smooth
+from rover_planner.planning.ways.window import choose_window, cut_out
 
 FOUND, NO_WAY, OUT_OF_TIME = "found", "no_way", "out_of_time"
 START_REFUSED, GOAL_REFUSED = "start_refused", "goal_refused"
 """Outcomes of a search."""
 
-MAX_NODES = 1_500_000
-"""Largest number of nodes of a window; each takes 70 bytes."""
 POSES_PER_SECOND = 20_000
 """Poses that the model may be asked about per second of the budget."""
 EXPANSIONS_PER_POSE = 40
@@ -148,14 +148,22 @@ class _WaySearch:
         progress = search.run(self._allowed)
         if progress.best is not None:
             return self._answer(FOUND, "", search, way=self._smooth(search))
+        where = self._describe_extent()
         if not progress.exhausted:
             budget = self._settings.budget
-            reason = f"no way was found within the budget of {budget:g} s; there may be one"
-            return self._answer(OUT_OF_TIME, reason, search)
+            reason = f"no way within {where} was found in the budget of {budget:g} s; "
+            return self._answer(OUT_OF_TIME, f"{reason}there may be one", search)
         closed = find_closed_area(search)
-        where = "the window that was searched" if self._is_limited else "the map"
         reason = f"no way within {where}: {closed.describe()}"
         return self._answer(NO_WAY, reason, search, closed=closed)
+
+    def _describe_extent(self) -> str:
+        """Return what part of the map is searched, in words."""
+        if not self._is_limited:
+            return "the map"
+        rows, columns = self._nodes.shape
+        cell = self._nodes.cell
+        return f"the {columns * cell:.0f} m x {rows * cell:.0f} m around start and goal"
 
     def _prepare(self) -> LatticeSearch:
         """Return the search, with the estimates of the ground and the connections of the ends."""
@@ -163,7 +171,10 @@ class _WaySearch:
         spacing = question.options.waypoint_spacing
         known = self._memory.recall(question, nodes)
         friction = question.options.friction or question.rover.friction
-        ground = estimate_ground(question.rover, question.terrain, nodes, friction)
+        climb = steepest_climb(question.rover, friction)
+        terrain = cut_out(question, nodes)
+        ground = estimate_ground(question.rover, terrain, nodes)
+        lists = known.edges.samples, known.difficulty
         known.standing[ground.groundless] = known.state_of("unknown_ground")
         self._groundless = ground.groundless
         return LatticeSearch(
@@ -172,6 +183,7 @@ class _WaySearch:
             connect_start(question.rover, nodes, self._start, spacing),
             connect_goal(question.rover, nodes, self._goal, spacing),
             ground.doubt,
+            estimate_difficulty(question.rover, terrain, nodes, climb, lists),
         )
 
     def _try_directly(self, search: LatticeSearch) -> None:
@@ -246,22 +258,6 @@ class _WaySearch:
         """Return the places (rows, columns) where the model was asked about a node."""
         was_asked = (search.known.standing != UNJUDGED) & ~self._groundless
         return np.asarray(was_asked.reshape(*self._nodes.shape, HEADINGS).any(axis=2))
-
-
-def choose_window(question: WayQuestion, cell: float) -> tuple[Nodes, bool]:
-    """Return the nodes to search, and whether they are fewer than those of the map.
-
-    A window that must be limited is a square around start and goal.
-    """
-    xmin, xmax, ymin, ymax = question.terrain.bounds
-    nodes = nodes_within(cell, (xmin, ymin), (xmax, ymax))
-    if nodes.count <= MAX_NODES:
-        return nodes, False
-    half = 0.5 * cell * (math.isqrt(MAX_NODES // HEADINGS) - 1)
-    centre = 0.5 * (np.asarray(question.start)[:2] + np.asarray(question.goal)[:2])
-    low = np.maximum(centre - half, (xmin, ymin))
-    high = np.minimum(centre + half, (xmax, ymax))
-    return nodes_within(cell, (low[0], low[1]), (high[0], high[1])), True
 
 
 def _check_end(name: str, question: WayQuestion) -> NDArray[np.float64]:

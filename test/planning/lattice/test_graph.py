@@ -5,6 +5,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from rover_physics.rover.rover_file import load_rover
+from rover_planner.planning.lattice.difficulty import Difficulty
 from rover_planner.planning.lattice.edges import FAILS, PASSES, Edges, JudgedEdges
 from rover_planner.planning.lattice.graph import Seeds, ToGoal, edge_cost, measure_to_goal
 from rover_planner.planning.lattice.graph import _bound_to_goal as bound_to_goal
@@ -26,7 +27,14 @@ def random_knowledge(seed):
     least = np.tile(EDGES.table.least_cost, (EDGES.nodes.count // 16, 1))
     known.cost[:] = np.where(np.isfinite(least), least, 0.0) * (1.0 + rng.random(least.shape))
     known.standing[rng.random(EDGES.nodes.count) < 0.3] = FAILS
-    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32)
+    known.difficulty[:] = rng.integers(1, 256, known.state.shape)
+    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness(known)
+
+
+def hardness(known):
+    """Return level ground with the difficulties that are known."""
+    flat = np.zeros((16, 2, 2), np.float32)
+    return Difficulty(flat, np.zeros(2), 1.0, EDGES.nodes.cell, EDGES.samples, known.difficulty)
 
 
 def explicit_costs(known, graph):
@@ -55,13 +63,13 @@ def explicit_costs(known, graph):
 def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
     found = 0
     for seed in range(12):
-        known, doubt = random_knowledge(seed)
+        known, *estimates = random_knowledge(seed)
         rng = np.random.default_rng(seed + 100)
         free = np.flatnonzero(known.standing == 0)
         starts = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
         goals = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
         for caution in (1.0, 0.0):
-            search = ShortestPaths(known, doubt, starts)
+            search = ShortestPaths(known, *estimates, starts)
             route = search.find(starts, goals, caution)
             costs = dijkstra(explicit_costs(known, search.graph(caution)), indices=starts.nodes)
             totals = starts.costs[:, None] + costs[:, goals.nodes] + goals.costs
@@ -78,10 +86,10 @@ def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
 
 
 def test_bounds_to_the_goal_are_never_above_the_costs():
-    known, doubt = random_knowledge(3)
+    known, *estimates = random_knowledge(3)
     free = np.flatnonzero(known.standing == 0)
     starts, goals = Seeds(free[[5]], np.zeros(1)), Seeds(free[[-7]], np.zeros(1))
-    graph = ShortestPaths(known, doubt, starts).graph(1.0)
+    graph = ShortestPaths(known, *estimates, starts).graph(1.0)
     focus, reach = EDGES.nodes.surround(starts.nodes)
     to_goal = ToGoal(np.empty(EDGES.nodes.count), focus, reach, EDGES.nodes.cell)
     limit, _ = measure_to_goal(graph, goals, starts, 1.1, to_goal)
@@ -92,13 +100,13 @@ def test_bounds_to_the_goal_are_never_above_the_costs():
 
 
 def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
-    known, doubt = random_knowledge(7)
+    known, *estimates = random_knowledge(7)
     known.standing[:], known.state[:] = 0, 0
     starts, goals = (
         Seeds(np.array([16 * 14]), np.zeros(1)),
         Seeds(np.array([16 * 100]), np.zeros(1)),
     )
-    search, before = ShortestPaths(known, doubt, starts), 0.0
+    search, before = ShortestPaths(known, *estimates, starts), 0.0
     for _ in range(60):
         route = search.find(starts, goals, 0.0)
         assert route is not None and route.cost >= before - 1e-9

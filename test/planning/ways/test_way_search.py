@@ -23,9 +23,9 @@ from rover_planner.planning.ways.way_search import (
     OUT_OF_TIME,
     START_REFUSED,
     LatticeSettings,
-    choose_window,
     find_way,
 )
+from rover_planner.planning.ways.window import choose_window, cut_out
 from support.grounds import make_terrain, waves
 from support.rough_grounds import rocky
 
@@ -198,7 +198,7 @@ def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
     elevation[: len(elevation) // 2] = np.nan
     ground = Terrain(elevation, ground.resolution, ground.origin)
     nodes = nodes_within(0.1, (-3.2, -3.2), (3.2, 3.2))
-    estimate = estimate_ground(LSR1, ground, nodes, LSR1.friction)
+    estimate = estimate_ground(LSR1, ground, nodes)
     groundless = np.flatnonzero(estimate.groundless)
     assert 0.1 * nodes.count < len(groundless) < nodes.count
     chosen = rng.choice(groundless, 2000, replace=False)
@@ -209,7 +209,7 @@ def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
 def test_nodes_where_tilt_moves_a_wheel_off_unknown_ground_are_only_doubted():
     spirit = load_terrain("spirit")
     nodes = nodes_within(0.04, (-47.12, -19.92), (-45.88, -19.2))
-    estimate = estimate_ground(LSR1, spirit, nodes, LSR1.friction)
+    estimate = estimate_ground(LSR1, spirit, nodes)
     codes = Judge(LSR1, spirit, OPTIONS).stand(nodes.poses(np.arange(nodes.count)))
     stands = np.array([code == "" for code in codes])
     assert not (stands & estimate.groundless).any()
@@ -224,3 +224,21 @@ def test_a_map_without_end_is_searched_in_a_window_around_start_and_goal():
     row, column = np.array(nodes.shape) / 2
     centre = nodes.cell * (nodes.first[0] + column), nodes.cell * (nodes.first[1] + row)
     np.testing.assert_allclose(centre, (55.0, 60.0), atol=0.5)
+
+
+def test_only_the_heights_around_the_window_are_looked_at():
+    wide = Terrain(np.zeros((4000, 4000), np.float32), 0.1, (-200.0, -200.0))
+    question = ask(wide, (50.0, 60.0, 0.0), (60.0, 60.0, 0.0))
+    nodes, _ = choose_window(question, 0.2)
+    part = cut_out(question, nodes)
+    assert part.elevation.size < 0.05 * wide.elevation.size
+    estimate = estimate_ground(LSR1, part, nodes)
+    assert not estimate.groundless.any() and not estimate.doubt.any()
+    answer = find_way(question, LatticeSettings(budget=5.0))
+    assert answer.outcome == FOUND
+    wall = np.array(wide.elevation)
+    wall[:, 2550] = 3.0
+    enclosed = replace(wide, elevation=wall)
+    refused = find_way(replace(question, terrain=enclosed), LatticeSettings(budget=0.3))
+    assert refused.outcome in (OUT_OF_TIME, NO_WAY)
+    assert "m around start and goal" in refused.reason

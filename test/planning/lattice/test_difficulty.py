@@ -1,0 +1,99 @@
+"""Tests of the estimate how likely the model refuses an edge."""
+
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.lattice.difficulty import (
+    STEPS_PER_UNIT,
+    difficulty_of,
+    estimate_difficulty,
+    steepest_climb,
+)
+from rover_planner.planning.lattice.edges import Edges, JudgedEdges
+from rover_planner.planning.lattice.judge import Judge
+from rover_planner.planning.lattice.nodes import nodes_within
+from rover_planner.planning.lattice.primitives import Gear, make_primitives
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.grounds import make_terrain
+
+LSR1 = load_rover("lsr1")
+CLIMB = steepest_climb(LSR1, LSR1.friction)
+NODES = nodes_within(0.2, (-1.6, -1.6), (1.6, 1.6))
+EDGES = Edges(NODES, make_primitives(LSR1, NODES.cell, 0.04))
+
+
+def difficulties(ground):
+    """Return the difficulties (n,) of the edges that stay in the window, and the edges."""
+    known = JudgedEdges(EDGES)
+    lists = EDGES.samples, known.difficulty
+    estimate = estimate_difficulty(LSR1, ground, NODES, CLIMB, lists)
+    edges = []
+    for node in range(NODES.count):
+        row, column = divmod(node // 16, NODES.shape[1])
+        for k, primitive in enumerate(EDGES.primitives[node % 16]):
+            x, y = column + primitive.step[0], row + primitive.step[1]
+            if 0 <= x < NODES.shape[1] and 0 <= y < NODES.shape[0]:
+                edges.append(node * EDGES.width + k)
+    columns = NODES.shape[1]
+    found = [difficulty_of(estimate, columns, *divmod(edge, EDGES.width)) for edge in edges]
+    return np.array(found), np.array(edges)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_edges_that_the_model_refuses_are_the_more_difficult_ones(seed):
+    ground = make_mars_terrain(seed, rock_cover=0.15, crater_density=0.0, size=6.0)
+    estimate, edges = difficulties(ground)
+    chosen = np.random.default_rng(seed).choice(len(edges), 500, replace=False)
+    judge = Judge(LSR1, ground, PathQueryOptions(control_margin=0.0, waypoint_spacing=0.04))
+    asked = edges[chosen]
+    verdicts = judge.judge(
+        [EDGES.poses(edge) for edge in asked], [EDGES.primitive(edge).gear for edge in asked]
+    )
+    refused = np.array([verdict.code != "" for verdict in verdicts])
+    assert 20 < refused.sum() < 480
+    passed, failed = estimate[chosen][~refused], estimate[chosen][refused]
+    ranked = np.mean(failed[:, None] > passed) + 0.5 * np.mean(failed[:, None] == passed)
+    assert ranked > 0.75  # 0.5 if the estimate knew nothing
+
+
+def test_steeper_ground_is_more_difficult_and_level_ground_alike_everywhere():
+    before = 0.0
+    for slope in (0.0, 0.2, 0.3, 0.4):
+        found, _ = difficulties(make_terrain(lambda x, y, s=slope: s * x, half=3.5))
+        assert np.median(found) > before
+        before = np.median(found)
+        if slope == 0.0:
+            assert np.ptp(found) == 0.0
+
+
+def test_unknown_ground_is_as_difficult_as_the_ground_beside_it():
+    level = make_terrain(lambda x, y: 0.0 * x, half=3.5)
+    elevation = np.array(level.elevation)
+    elevation[:, : elevation.shape[1] // 2] = np.nan
+    found, _ = difficulties(Terrain(elevation, level.resolution, level.origin))
+    assert np.ptp(found) == 0.0
+
+
+def test_an_estimate_is_made_once_and_kept_until_it_is_forgotten():
+    known = JudgedEdges(EDGES)
+    slope = make_terrain(lambda x, y: 0.3 * x, half=3.5)
+    level = make_terrain(lambda x, y: 0.0 * x, half=3.5)
+    lists = EDGES.samples, known.difficulty
+    steep, flat = (
+        estimate_difficulty(LSR1, ground, NODES, CLIMB, lists) for ground in (slope, level)
+    )
+    node = NODES.count // 2
+    first = difficulty_of(steep, NODES.shape[1], node, 0)
+    assert difficulty_of(flat, NODES.shape[1], node, 0) == first > 1.0 / STEPS_PER_UNIT
+    known.forget(np.array([node // 16]))
+    assert difficulty_of(flat, NODES.shape[1], node, 0) < first
+
+
+def test_gears_have_difficulties_too():
+    found, edges = difficulties(make_terrain(lambda x, y: 0.2 * x, half=3.5))
+    gears = np.array([EDGES.primitive(edge).gear for edge in edges])
+    for gear in Gear:
+        assert found[gears == gear].min() > 0.0
