@@ -121,17 +121,24 @@ def _slopes(
     if min(heights.shape) < 2:
         flat = np.zeros(heights.shape, np.float32)
         return flat, flat
-    along_y, along_x = np.gradient(heights, np.float32(resolution))
+    along_y, along_x = (
+        np.asarray(np.gradient(heights, resolution, axis=axis), np.float32) for axis in (0, 1)
+    )
     if stride == 1:
         return along_x, along_y
-    ny, nx = (max(1, size // stride) for size in heights.shape)
-    blocks = [
-        values[: ny * stride, : nx * stride].reshape(ny, stride, nx, stride).swapaxes(1, 2)
-        for values in (along_x, along_y)
-    ]
-    along_x, along_y = (block.reshape(ny, nx, -1) for block in blocks)
+    along_x, along_y = _blocks(along_x, stride), _blocks(along_y, stride)
     steepest = np.argmax(along_x**2 + along_y**2, axis=2)[..., None]
-    return tuple(np.take_along_axis(v, steepest, axis=2)[..., 0] for v in (along_x, along_y))
+    return (
+        np.take_along_axis(along_x, steepest, axis=2)[..., 0],
+        np.take_along_axis(along_y, steepest, axis=2)[..., 0],
+    )
+
+
+def _blocks(values: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
+    """Return the values (ny, nx, stride^2) of each block of a grid; incomplete blocks are left."""
+    ny, nx = (max(1, size // stride) for size in values.shape)
+    cut = values[: ny * stride, : nx * stride].reshape(ny, stride, nx, stride)
+    return cut.swapaxes(1, 2).reshape(ny, nx, -1)
 
 
 def _below_wheels(
