@@ -66,7 +66,8 @@ def estimate_difficulty(
         climb: Slope at which a climb ends [rise over run].
         edges: `samples` and `known` of Difficulty.
     """
-    stride = max(1, round(SHARE * nodes.cell / terrain.resolution))
+    blocks = round(SHARE * nodes.cell / terrain.resolution)
+    stride = max(1, min(blocks, *terrain.elevation.shape))
     slopes = _slopes(_felt_surface(terrain, rover.wheel.radius), terrain.resolution, stride)
     spacing = stride * terrain.resolution
     steepness = np.hypot(*slopes)
