@@ -1,4 +1,4 @@
-"""Writes the health of a traverse server as a diagnostic status."""
+"""Writes the health of a traverse server and the progress of its searches as diagnostics."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 STATUS_NAME = "traverse_server: health"
+SEARCH_NAME = "traverse_server: search"
 
 _LEVELS = {
     "ok": DiagnosticStatus.OK,
@@ -29,6 +30,22 @@ def server_diagnostics(
     status = DiagnosticStatus(
         level=_LEVELS[level], name=STATUS_NAME, message=text, hardware_id=hardware_id
     )
+    return _with_values(status, values, stamp)
+
+
+def search_diagnostics(
+    values: Mapping[str, Any], text: str, hardware_id: str, stamp: Any
+) -> DiagnosticArray:
+    """Return the progress of a search for a way as one status; arguments as for the health."""
+    status = DiagnosticStatus(
+        level=DiagnosticStatus.OK, name=SEARCH_NAME, message=text, hardware_id=hardware_id
+    )
+    return _with_values(status, values, stamp)
+
+
+def _with_values(
+    status: DiagnosticStatus, values: Mapping[str, Any], stamp: Any
+) -> DiagnosticArray:
     status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     message = DiagnosticArray(status=[status])
     message.header.stamp = stamp

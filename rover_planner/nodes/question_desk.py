@@ -1,17 +1,25 @@
 """Takes the questions of a node's services and answers them in a thread, within their budget."""
 
+import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from msg_adapters.results.server_status import search_diagnostics
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import Budget
 from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.question_queue import Question, QuestionQueue
+from rover_planner.planning.answering.search_watch import (
+    NewerMapError,
+    SearchReport,
+    SearchWatch,
+)
 from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -19,6 +27,7 @@ from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover
 from rover_planner.ros.paced_sender import PacedSender
+from rover_planner.ros.qos import topic_qos
 from rover_planner.ros.refusals import refuse_error
 
 PATROL = 0.05
@@ -56,8 +65,9 @@ class QuestionDesk:
         self.health = ServerHealth()
         """Counts of answers and faults."""
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        handover = Handover(node, guard)
-        self._queue = QuestionQueue(0, lambda: handover.call(self._deliver))
+        self._handover = Handover(node, guard)
+        self._queue = QuestionQueue(0, lambda: self._handover.call(self._deliver))
+        self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
         self._patrol = node.create_timer(
             PATROL, guard.around(self._refuse_overdue), clock=steady, autostart=False
         )
@@ -75,13 +85,16 @@ class QuestionDesk:
     def ask(self, inquiry: Inquiry) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
         now = self._node.get_clock().now().nanoseconds
-        asked = _Asked(self._register.next_number(), self._service.situation(now))
+        situation = replace(self._service.situation(now), watch=self._watch())
+        asked = _Asked(self._register.next_number(), situation)
         ticket = self._maps.ticket()
 
         def answer(budget: Budget) -> Any:
             self._maps.wait(ticket, budget.check)
-            asked.situation = self._service.add_map(asked.situation, now)
-            return inquiry.answer(asked.situation)
+            while True:
+                asked.situation = self._service.add_map(asked.situation, now)
+                with contextlib.suppress(NewerMapError):
+                    return inquiry.answer(asked.situation)
 
         def fail(error: Exception) -> Any:
             return refuse_error(self.guard, inquiry.service, error, inquiry.refuse)
@@ -97,6 +110,21 @@ class QuestionDesk:
         self._queue.ask(Question(answer, inquiry.refuse, fail, self.guard.around(deliver), budget))
         if self._queue.open_count:
             self._patrol.reset()
+
+    def _watch(self) -> SearchWatch:
+        """Return a watch that publishes the progress of a question's searches."""
+        patience = self._service.settings.lattice.budget
+
+        def tell(report: SearchReport) -> None:
+            self._handover.call(lambda: self._publish_progress(report))
+
+        return SearchWatch(lambda: self._service.known_map, tell, patience)
+
+    def _publish_progress(self, report: SearchReport) -> None:
+        text = "a way is found, a better one is searched" if report.found else "no way found yet"
+        name = self._service.settings.rover.name
+        stamp = self._node.get_clock().now().to_msg()
+        self._progress.publish(search_diagnostics(asdict(report), text, name, stamp))
 
     def cancel(self, code: str, reason: str) -> int:
         """Answer all open questions with a refusal; return their number."""

@@ -14,8 +14,10 @@ from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.suspension_check import compare_suspension
+from rover_planner.planning.lattice.search import Progress
 from rover_planner.planning.path_geometry import densify
 from rover_planner.planning.path_planner import PathPlanner, PathSearch, Pose, add_way
 from rover_planner.planning.path_query import Candidate
@@ -63,6 +65,8 @@ class Situation:
 
     edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
     """What earlier searches have found of the ground; grows with each search."""
+    watch: SearchWatch | None = None
+    """Watches searches for a way."""
 
     @property
     def terrain(self) -> Terrain | None:
@@ -81,6 +85,7 @@ class Situation:
         Raises:
             PlanningError: The request is invalid.
             RoverError: The model refuses the request.
+            NewerMapError: The map has changed while a way was searched, see `SearchWatch`.
         """
         if not (math.isfinite(tolerance) and tolerance >= 0.0):
             raise PlanningError(f"tolerance is {tolerance}; it must be a distance of at least 0 m")
@@ -111,7 +116,7 @@ class Situation:
         question = WayQuestion(
             planner.rover, planner.terrain, *ends, planner.options, planner.joint_angles
         )
-        answer = find_way(question, self.settings.lattice, self.edge_memory)
+        answer = find_way(question, self.settings.lattice, self.edge_memory, self._look)
         if answer.path is not None:
             candidates = None if refused is None else refused.search
             search = add_way(candidates, answer.path, ends[1])
@@ -123,6 +128,11 @@ class Situation:
             return replace(refusal(answer.outcome, answer.reason), way=answer)
         reason = f"{answer.reason}; the best candidate: {refused.reason}"
         return replace(refused, code=answer.outcome, reason=reason, way=answer)
+
+    def _look(self, progress: Progress) -> None:
+        """Let the watch look at a search."""
+        if self.watch is not None and self.known_map is not None:
+            self.watch.look(self.known_map, progress)
 
     def check_path(self) -> Judgement:
         """Judge the last path.

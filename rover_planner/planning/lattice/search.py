@@ -67,6 +67,8 @@ class Progress:
     """Bound from below on the cost of any path of the lattice [m]."""
     exhausted: bool = False
     """Whether the lattice has no path left to look at."""
+    judged: int = 0
+    """Number of edges that the model has judged."""
     first_time: float = np.nan
     """Time of the monotonic clock when the first path was found [s]."""
     stretches: list[Stretch] = field(default_factory=list)
@@ -123,12 +125,6 @@ class LatticeSearch:
         self._ends = _Ends(self.starts), _Ends(self.goals)
         self.shortest = ShortestPaths(self.known, self.doubt, self.difficulty, self._ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
-        self._judged = 0
-
-    @property
-    def judged(self) -> int:
-        """Number of edges that the model has judged in this search."""
-        return self._judged
 
     def open_ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the nodes of the start's and of the goal's connections that may pass."""
@@ -268,7 +264,7 @@ class LatticeSearch:
         for piece, judged in zip(pieces, found, strict=True):
             side, index = piece.place
             if side is None:
-                self._judged += 1
+                self.progress.judged += 1
                 self.known.write(index, judged.code, judged.cost)
                 if judged.code:
                     self._doubt_around(index)

@@ -244,7 +244,7 @@ class _WaySearch:
             cost=way[1],
             bound=bound,
             expanded=0 if search is None else search.shortest.expanded,
-            edges_judged=0 if search is None else search.judged,
+            edges_judged=progress.judged,
             edges=0 if search is None else search.known.edges.count,
             seconds_first=progress.first_time - self._began,
             seconds=time.perf_counter() - self._began,

@@ -1,13 +1,18 @@
 """The traverse server finds ways around obstacles over DDS, and says why there is none."""
 
+import threading
+
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.closed_areas import NOT_REACHED, REACHED
 from rover_physics.terrain.grid import Terrain
+from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain, waves
-from support.planner_client import ask
+from support.planner_client import SERVER, ask
+from support.ros_fixtures import wait_until
 
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
 
@@ -94,3 +99,22 @@ def test_after_a_new_map_the_way_is_searched_on_it(patient):
     again, verdict, _ = ask(patient, start=START, goal=GOAL)
     assert verdict["traversable"] == ("true" if again.poses else "false")
     assert len(first.poses) > 0 and again.poses != first.poses
+
+
+def test_a_search_tells_of_its_progress_and_goes_on_with_a_newer_map(patient):
+    reports, plans = [], []
+    patient.create_subscription(
+        DiagnosticArray, f"{SERVER}/search_progress", reports.append, topic_qos()
+    )
+    assert patient.set_parameter("lattice_cell", 0.06) == (True, "")  # so that it takes long
+    patient.send_terrain(make_terrain(pen))
+    goal = (3.0, 0.0, 0.0)
+    asking = threading.Thread(target=lambda: plans.append(patient.can_traverse((0, 0, 0), goal)))
+    asking.start()
+    wait_until(lambda: reports, "the first report")
+    values = {entry.key: entry.value for entry in reports[0].status[0].values}
+    assert values["found"] == "False" and float(values["cost"]) == np.inf
+    assert int(values["edges_judged"]) >= 0 and float(values["seconds"]) >= 0.0
+    patient.send_terrain(make_terrain(waves))
+    asking.join(60.0)
+    assert plans and len(plans[0].poses) > 0

@@ -15,6 +15,7 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.table import ParameterError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.path_geometry import densify
@@ -326,3 +327,25 @@ def test_where_the_way_fails_far_from_the_goal_no_other_goal_is_tried():
     service = make_service(make_terrain(wall_at(-1.0)))
     report = service.answer((-3.0, 0.0, 0.0), (3.0, 0.0, 0.0), tolerance=0.1).report
     assert not report.traversable and report.search.alternative_goals_tried == 0
+
+
+def test_a_changed_map_ends_a_search_while_there_is_patience():
+    ground, start, goal = make_terrain(wall_at(0.0)), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
+    service, reports = make_service(ground, planner="lattice", search_budget=60.0), []
+    newer = replace(ground, elevation=ground.elevation + 0.01)
+    maps = [service.known_map]
+
+    def look_and_change(report):
+        reports.append(report)
+        service.take_terrain(newer)
+        maps.append(service.known_map)
+
+    watched = replace(
+        service.situation(), watch=SearchWatch(lambda: maps[-1], look_and_change, 60.0)
+    )
+    with pytest.raises(NewerMapError):
+        watched.answer(start, goal)
+    assert len(reports) == 1 and not reports[0].found and reports[0].cost == math.inf
+    impatient = SearchWatch(lambda: maps[-1], reports.append, 0.0)
+    answer = replace(watched, watch=impatient).answer(start, goal)
+    assert answer.code == "no_way" and len(reports) > 1
