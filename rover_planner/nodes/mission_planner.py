@@ -6,11 +6,13 @@ It is a short example of a planner client: it publishes a map, calls `~/can_trav
 the verdict, wheel loads and slip ratios that the server publishes with its answer.
 """
 
+import contextlib
 import json
 import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,13 +24,17 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.identity import plan_request_hash
-from msg_adapters.paths import stamped_pose
+from msg_adapters.errors import MessageError
+from msg_adapters.identity import path_hash, plan_request_hash
+from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.nodes.mission_options import MissionOptions
+from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
+from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.programs import read_words
 from rover_planner.ros.disk import init_ros
 from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, service_qos, topic_qos
@@ -56,10 +62,6 @@ class NoAnswerError(Exception):
     """The server did not answer in time; the text names the missing answer."""
 
 
-class DriveFailedError(Exception):
-    """The rover did not reach the end of its path; the text names the reason."""
-
-
 class MissionPlanner(Node):
     """Queries the server and collects the results that it publishes with each answer.
 
@@ -75,9 +77,12 @@ class MissionPlanner(Node):
         self._verdict: dict[str, Any] = {}
         self._verdict_about: tuple[Any, Any] | None = None
         self._arrays: dict[str, np.ndarray] = {}
-        self._plan = Path()
-        self._place: tuple[float, float] | None = None
+        self._pose: np.ndarray | None = None
         self._path_publisher = self.create_publisher(Path, "path", topic_qos())
+        self._check_publisher = self.create_publisher(Path, f"{SERVER}/path", topic_qos())
+        self._checker = self.create_client(
+            Trigger, f"{SERVER}/check_path", qos_profile=service_qos()
+        )
         self.create_subscription(Odometry, "odometry", self._take_odometry, sensor_qos())
         self._map_publisher = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._client = self.create_client(
@@ -121,8 +126,9 @@ class MissionPlanner(Node):
             goal: x, y [m] and yaw [rad] in the map frame.
 
         Returns:
-            The server's verdict by key, plus `plan` [[x, y, z], ...] [m], `max_wheel_load` [N]
-            and `max_slip_ratio` of the judged path, None if no path was judged.
+            The server's verdict by key, plus `plan` [[x, y, z], ...] [m], its `poses`
+            [[x, y, yaw], ...] [m, rad], `max_wheel_load` [N] and `max_slip_ratio` of the judged
+            path, None if no path was judged.
 
         Raises:
             NoAnswerError: The server does not answer in time.
@@ -144,52 +150,66 @@ class MissionPlanner(Node):
         future = self._client.call_async(request)
         future.add_done_callback(self._notify)
         self._wait(future.done, f"the answer of {SERVER}/can_traverse")
-        plan = self._plan = future.result().plan
+        plan = future.result().plan
         # The hash tells this question from those of other clients, the stamp from earlier ones.
         about = plan.header.stamp, plan_request_hash(request.start, request.goal, 0.0)
         self._wait(lambda: self._verdict_about == about, f"the verdict on {SERVER}/verdict")
         answer = dict(self._verdict)
         positions = [pose.pose.position for pose in plan.poses]
         answer["plan"] = [[p.x, p.y, p.z] for p in positions]
+        answer["poses"] = path_to_poses(plan, self._frame).tolist() if plan.poses else []
         answer["max_wheel_load"] = self._largest("wheel_loads", answer)
         answer["max_slip_ratio"] = self._largest("slip_ratios", answer)
         return answer
 
-    def drive(self, within: float = 0.2, timeout: float = 3600.0) -> None:
-        """Publish the last plan on the topic `path` and wait until the rover reaches its end.
-
-        Args:
-            within: Distance from the end that counts as reached [m].
-            timeout: Longest wait [s].
+    def send_path(self, poses: np.ndarray) -> None:
+        """Let the rover follow a path of poses (n, 3), x, y [m] and yaw [rad], map frame.
 
         Raises:
-            DriveFailedError: There is no plan, no node follows it, or the rover does not reach
-                its end in time.
+            NoAnswerError: No node subscribes to paths in time.
         """
-        if not self._plan.poses:
-            raise DriveFailedError("there is no plan to drive")
-        end = self._plan.poses[-1].pose.position
-        try:
-            self._wait(
-                lambda: self._path_publisher.get_subscription_count() > 0,
-                "a rover on the topic path",
-            )
-            self._path_publisher.publish(self._plan)
-            self._wait(
-                lambda: (
-                    self._place is not None
-                    and np.hypot(self._place[0] - end.x, self._place[1] - end.y) < within
-                ),
-                "the rover to get there",
-                timeout,
-            )
-        except NoAnswerError as error:
-            raise DriveFailedError(str(error)) from error
+        self._wait(
+            lambda: self._path_publisher.get_subscription_count() > 0, "a rover on the topic path"
+        )
+        self._path_publisher.publish(poses_path(poses, self._frame))
+
+    def check(self, poses: np.ndarray) -> str:
+        """Return why the server refuses a path (n, 3) on its newest map, empty if it passes.
+
+        Raises:
+            NoAnswerError: The server does not answer in time.
+        """
+        path = poses_path(poses, self._frame)
+        about, deadline = path_hash(path), time.monotonic() + self._timeout
+        while time.monotonic() < deadline:
+            self._check_publisher.publish(path)
+            future = self._checker.call_async(Trigger.Request())
+            future.add_done_callback(self._notify)
+            self._wait(future.done, f"the answer of {SERVER}/check_path")
+            answer = json.loads(future.result().message)
+            if answer["path_hash"] == about:  # else it was an earlier one, or another client's
+                return "" if answer["traversable"] else str(answer["reason"])
+        raise NoAnswerError(f"waited {self._timeout:.0f} s in vain for {SERVER}/check_path")
+
+    def wait_for_pose(self, is_wanted: Callable[[np.ndarray], bool], seconds: float) -> np.ndarray:
+        """Return the first measured pose (3,) that is wanted, or the last one after some seconds.
+
+        Raises:
+            NoAnswerError: No pose was measured in time.
+        """
+        self._wait(lambda: self._pose is not None, "odometry")
+        with contextlib.suppress(NoAnswerError):
+            self._wait(lambda: is_wanted(np.array(self._pose)), "the rover", seconds)
+        return np.array(self._pose)
 
     def _take_odometry(self, odometry: Odometry) -> None:
-        place = odometry.pose.pose.position
+        try:
+            pose, _ = odometry_to_pose(odometry, self._frame)
+        except MessageError as error:
+            self.get_logger().warning(f"odometry not used: {error}", once=True)
+            return
         with self._changed:
-            self._place = (place.x, place.y)
+            self._pose = pose[[0, 1, 3]]
             self._changed.notify_all()
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
@@ -291,7 +311,8 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
         codes.add(_exit_code(answer))
         if options.drive and answer["traversable"]:
             report({"event": "driving", "goal": number})
-            node.drive()
+            tell = partial(_report_change, report, number)
+            drive_to(node, goal, answer["poses"], DriveSettings(), tell)
             report({"event": "arrived", "goal": number})
     return next(code for code in (EXIT_FAILED, EXIT_NOT_TRAVERSABLE, EXIT_OK) if code in codes)
 
@@ -313,6 +334,10 @@ def _spin(executor: SingleThreadedExecutor) -> None:
         executor.spin()
     except ExternalShutdownException:
         return
+
+
+def _report_change(report: Callable[[dict[str, Any]], None], goal: int, text: str) -> None:
+    report({"event": text, "goal": goal})
 
 
 def _print_json(event: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from rover_planner.errors import PlanningError
-from rover_planner.nodes.mission_options import read_mission
+from rover_planner.nodes.mission.options import read_mission
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.table import ParameterSpec, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-from rover_planner.nodes.mission_options import MissionOptions, Pose
+from rover_planner.nodes.mission.options import MissionOptions, Pose
 from rover_planner.nodes.mission_planner import main
 from rover_planner.nodes.programs import read_words
 from support.command_line import REPOSITORY

@@ -17,6 +17,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_planner.nodes.mission.drive import DriveSettings, drive_to
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator, main
 from rover_planner.nodes.traction_controller import TractionController
@@ -165,9 +166,11 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     planner.wait_for_server()
     wait_until(lambda: server.service.terrain is not None, "the map")
     place = simulator.simulation.plant.pose()
-    answer = planner.ask(place, [place[0] + 0.6, 0.05, 0.0])
+    goal = [place[0] + 0.6, 0.05, 0.0]
+    answer = planner.ask(place, goal)
     assert answer["traversable"], answer["reason"]
-    planner.drive(within=0.15, timeout=60.0)
+    told = []
+    drive_to(planner, goal, answer["poses"], DriveSettings(within=0.15, timeout=60.0), told.append)
     assert simulator.simulation.plant.pose()[0] > place[0] + 0.4
     assert controller.statistics.updates > 50
     assert controller.statistics.fallbacks == 0

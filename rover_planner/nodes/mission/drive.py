@@ -1,0 +1,115 @@
+"""Drives a rover to its goal: watches the rest of the plan, and asks for another one if needed."""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_planner.planning.plan_progress import PlanProgress
+
+Poses = NDArray[np.float64]
+"""(n, 3) x, y [m] and yaw [rad], map frame."""
+MAX_PLANS = 100
+"""Largest number of plans on the way to one goal."""
+
+
+class DriveFailedError(Exception):
+    """The rover did not reach the end of its path; the text names the reason."""
+
+
+class RoverClient(Protocol):
+    """What a drive needs of server and rover."""
+
+    def ask(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
+        """Return `traversable`, `reason` and the `poses` of a way from start to goal."""
+
+    def send_path(self, poses: Poses) -> None:
+        """Let the rover follow a path."""
+
+    def check(self, poses: Poses) -> str:
+        """Return why the server refuses a path on its newest map, empty if it passes."""
+
+    def wait_for_pose(self, is_wanted: Callable[[Poses], bool], seconds: float) -> Poses:
+        """Return the first measured pose (3,) that is wanted, or the last one in time."""
+
+
+@dataclass(frozen=True)
+class DriveSettings:
+    """How a drive is watched."""
+
+    within: float = 0.2
+    """Distance from the end of a plan that counts as there [m]."""
+    period: float = 2.0
+    """Time between two looks at the rest of the plan [s]."""
+    timeout: float = 3600.0
+    """Longest time for the way to a goal [s]."""
+
+
+def drive_to(
+    client: RoverClient,
+    goal: Sequence[float],
+    plan: Sequence[Sequence[float]],
+    settings: DriveSettings,
+    tell: Callable[[str], object],
+) -> None:
+    """Drive a plan; replan where the newest map refuses the rest of it, or it ends too early.
+
+    Args:
+        client: Server and rover.
+        goal: Where to, x, y [m] and yaw [rad].
+        plan: Poses of the first plan.
+        settings: How it is watched.
+        tell: Takes in words what happens.
+
+    Raises:
+        DriveFailedError: There is no way from where the rover is, or it takes too long.
+    """
+    deadline = time.monotonic() + settings.timeout
+    for _ in range(MAX_PLANS):
+        pose, refused = _follow(client, np.array(plan), settings, deadline)
+        ends_at_goal = math.dist(plan[-1][:2], goal[:2]) < settings.within
+        if not refused and ends_at_goal:
+            return
+        if refused:
+            client.send_path(pose[None, :])  # it stands there
+            tell(f"the rest of the plan is refused: {refused}")
+        answer = client.ask(pose.tolist(), goal)
+        if not answer["traversable"]:
+            raise DriveFailedError(f"no way on from {_describe(pose)}: {answer['reason']}")
+        plan = answer["poses"]
+        tell(f"another plan from {_describe(pose)}")
+    raise DriveFailedError(f"the goal is not reached after {MAX_PLANS} plans")
+
+
+def _follow(
+    client: RoverClient, plan: Poses, settings: DriveSettings, deadline: float
+) -> tuple[Poses, str]:
+    """Follow a plan to its end; return the last pose (3,), and why the rest of it is refused."""
+    progress = PlanProgress(plan)
+    client.send_path(plan)
+
+    def is_there(pose: Poses) -> bool:
+        progress.advance(pose)
+        return progress.is_over(pose, settings.within)
+
+    while True:
+        pose = client.wait_for_pose(is_there, settings.period)
+        if is_there(pose):
+            return pose, ""
+        refused = client.check(progress.rest)
+        if refused:
+            return pose, refused
+        if time.monotonic() > deadline:
+            raise DriveFailedError(
+                f"waited {settings.timeout:.0f} s in vain for the rover to get there; it is at "
+                f"{_describe(pose)}"
+            )
+
+
+def _describe(pose: Poses) -> str:
+    """Return a pose (3,) as text."""
+    return ", ".join(f"{value:.2f}" for value in pose)
