@@ -54,6 +54,10 @@ def plan(
             metavar="M", help="Distance of the lattice's nodes in m; a quarter of the wheelbase."
         ),
     ] = None,
+    frontier: Annotated[
+        bool,
+        typer.Option("--frontier", help="Plan as near as possible to a goal on unknown ground."),
+    ] = False,
     sigmas: Annotated[
         float,
         typer.Option(
@@ -79,7 +83,7 @@ def plan(
     from rover_planner.planning.ways.question_file import write_question
     from rover_planner.planning.ways.way_search import LatticeSettings
 
-    settings = LatticeSettings(budget=budget, cell=cell)
+    settings = LatticeSettings(budget=budget, cell=cell, frontier=frontier)
     question = WayQuestion(
         load_rover(rover),
         load_terrain(terrain, max_cells),
@@ -137,6 +141,8 @@ def _ask(
         from rover_planner.figures.way_picture import draw_way
 
         draw_way(picture, question, answer)
+    if answer.warning:
+        typer.echo(f"warning: {answer.warning}", err=True)
     typer.echo(json.dumps(report_way(question.rover, answer), allow_nan=False))
 
 

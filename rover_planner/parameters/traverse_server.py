@@ -81,6 +81,11 @@ class TraverseServerParameters(ParameterTable):
         unit="m",
         bounds=(0.0, 10.0),
     )
+    search_frontier: bool = parameter(
+        False,
+        "Whether a goal on unknown ground is answered with a way that ends as near to it as known "
+        "ground allows; the verdict has goal_offset.",
+    )
     plan_spacing: float = parameter(
         0.1,
         "Distance between poses of a plan, which also has those where the class changes; "

@@ -47,11 +47,14 @@ class PathSearch:
 
 
 def add_way(search: PathSearch | None, way: Candidate, goal: Pose) -> PathSearch:
-    """Return the search with a traversable way as the chosen one, after its own candidates."""
+    """Return the search with a traversable way as the chosen one, after its own candidates.
+
+    The way may end elsewhere than at the requested `goal`.
+    """
     candidates = (way,) if search is None else (*search.answer.candidates, way)
     last = len(candidates) - 1
     tried = 0 if search is None else search.alternatives_tried
-    return PathSearch(PathAnswer(candidates, last, last), goal, goal, tried)
+    return PathSearch(PathAnswer(candidates, last, last), goal, way.poses[-1], tried)
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,7 +78,9 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
         suspension_tolerance=parameters.suspension_tolerance,
         planner=parameters.planner,
         lattice=LatticeSettings(
-            budget=parameters.search_budget, cell=parameters.lattice_cell or None
+            budget=parameters.search_budget,
+            cell=parameters.lattice_cell or None,
+            frontier=parameters.search_frontier,
         ),
         max_map_age=parameters.max_map_age,
     )

@@ -124,9 +124,10 @@ class Situation:
             return replace(_judgement(planner, answer.path, suspension, search), way=answer)
         if answer.outcome in (START_REFUSED, GOAL_REFUSED) and refused is not None:
             return refused
+        why = "; ".join(filter(None, (answer.reason, answer.warning)))
         if refused is None:
-            return replace(refusal(answer.outcome, answer.reason), way=answer)
-        reason = f"{answer.reason}; the best candidate: {refused.reason}"
+            return replace(refusal(answer.outcome, why), way=answer)
+        reason = f"{why}; the best candidate: {refused.reason}"
         return replace(refused, code=answer.outcome, reason=reason, way=answer)
 
     def _look(self, progress: Progress) -> None:

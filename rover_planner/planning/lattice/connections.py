@@ -44,6 +44,8 @@ class Connection:
     """(n, 3) waypoints in the order of the drive, x, y [m], yaw [rad], map frame."""
     least_cost: float
     """Cost on level ground [m]."""
+    surcharge: float = 0.0
+    """Cost that comes to that of driving [m]."""
 
 
 def connect_start(

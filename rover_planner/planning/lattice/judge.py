@@ -75,9 +75,10 @@ class Judge:
             sigmas=self.options.map_sigmas,
         )[1]
 
-    def refuse(self, pose: NDArray[np.float64]) -> str:
-        """Return why the rover cannot stand at a pose (3,), empty if it can."""
-        return self._stand(pose[None, :]).reasons[0]
+    def refuse(self, pose: NDArray[np.float64]) -> tuple[str, str]:
+        """Return code and reason why the rover cannot stand at a pose (3,), empty if it can."""
+        verdict = self._stand(pose[None, :])
+        return verdict.codes[0], verdict.reasons[0]
 
     def check(self, poses: NDArray[np.float64]) -> Candidate:
         """Judge a whole path (n, 3) with all that belongs to it, up to its first failure."""

@@ -81,7 +81,7 @@ class _Ends:
     def __init__(self, connections: list[Connection]):
         self.connections = connections
         self.nodes = np.array([one.node for one in connections], np.int64)
-        self.costs = np.array([one.least_cost for one in connections])
+        self.costs = np.array([one.least_cost + one.surcharge for one in connections])
         self.judged = np.zeros(len(connections), bool)
         self.codes: list[str] = []
 
@@ -269,7 +269,8 @@ class LatticeSearch:
                 if judged.code:
                     self._doubt_around(index)
             else:
-                side.judged[index], side.costs[index] = True, judged.cost
+                cost = judged.cost + side.connections[index].surcharge
+                side.judged[index], side.costs[index] = True, cost
                 side.codes += [judged.code] if judged.code else []
         return [not judged.code for judged in found]
 

@@ -32,6 +32,7 @@ def report_way(rover: Rover, answer: WayAnswer) -> dict[str, Any]:
             "seconds": answer.seconds,
             "bound": answer.bound,
             "repeatable": answer.repeatable,
+            "warning": answer.warning,
             "closed_area": None if answer.closed is None else answer.closed.area,
             "closed_by": None if answer.closed is None else answer.closed.causes,
         }

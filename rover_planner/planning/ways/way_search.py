@@ -12,7 +12,7 @@ from rover_physics.rover.turning import tightest_radius, wheelbase
 from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import generate_candidates
-from rover_planner.planning.lattice.connections import connect_goal, connect_start
+from rover_planner.planning.lattice.connections import Connection, connect_goal, connect_start
 from rover_planner.planning.lattice.difficulty import estimate_difficulty, steepest_climb
 from rover_planner.planning.lattice.edges import UNJUDGED
 from rover_planner.planning.lattice.ground_estimate import estimate_ground
@@ -22,6 +22,7 @@ from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.lattice.search import LatticeSearch, Progress, Stretch, join_pieces
 from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.ways.frontier import connect_frontier
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.no_way import ClosedArea, find_closed_area
 from rover_planner.planning.ways.question import WayQuestion
@@ -36,6 +37,8 @@ POSES_PER_SECOND = 20_000
 """Poses that the model may be asked about per second of the budget."""
 EXPANSIONS_PER_POSE = 40
 """Expanded nodes that count as much as one pose."""
+COARSE = 0.5
+"""Distance of neighbouring nodes above which obstacles are finer than the lattice [wheelbases]."""
 SMOOTHING = 0.2
 """Share of the budget for smoothing."""
 
@@ -48,6 +51,9 @@ class LatticeSettings:
     """Time for the search [s]."""
     cell: float | None = None
     """Distance of neighbouring nodes [m]; None: a quarter of the wheelbase."""
+    frontier: bool = False
+    """Whether a way may end at the frontier of the known ground, as near as possible to a goal
+    on unknown ground."""
 
     def __post_init__(self) -> None:
         for name in ("budget", "cell"):
@@ -87,6 +93,8 @@ class WayAnswer:
     """The nodes of the lattice."""
     closed: ClosedArea | None
     """What is closed in where no way exists; else None."""
+    warning: str
+    """What may have hidden a way, such as a coarse lattice; empty if nothing has."""
     asked: NDArray[np.bool_]
     """(rows, columns) True for the places where the model was asked whether the rover can stand,
     in this search or in an earlier one that the memory holds; row 0 at the smallest y."""
@@ -132,7 +140,7 @@ class _WaySearch:
         cell = settings.cell or 0.25 * wheelbase(question.rover)
         self._nodes, self._is_limited = choose_window(question, cell)
         self._memory = memory or EdgeMemory()
-        self._repeatable = True
+        self._repeatable, self._to_frontier = True, False
 
     def answer(self) -> WayAnswer:
         """Search the way."""
@@ -140,14 +148,18 @@ class _WaySearch:
             ("start", START_REFUSED, self._start),
             ("goal", GOAL_REFUSED, self._goal),
         ):
-            refusal = self._judge.refuse(pose)
-            if refusal:
-                return self._answer(outcome, f"the rover cannot stand at the {name}: {refusal}")
+            code, reason = self._judge.refuse(pose)
+            is_frontier = self._settings.frontier and outcome == GOAL_REFUSED
+            self._to_frontier = is_frontier and code == "unknown_ground"
+            if code and not self._to_frontier:
+                return self._answer(outcome, f"the rover cannot stand at the {name}: {reason}")
         search = self._prepare()
-        self._try_directly(search)
+        if not self._to_frontier:
+            self._try_directly(search)
         progress = search.run(self._allowed)
         if progress.best is not None:
-            return self._answer(FOUND, "", search, way=self._smooth(search))
+            way = self._smooth(search)
+            return self._answer(FOUND, self._describe_rest(way[0]), search, way=way)
         where = self._describe_extent()
         if not progress.exhausted:
             budget = self._settings.budget
@@ -156,6 +168,23 @@ class _WaySearch:
         closed = find_closed_area(search)
         reason = f"no way within {where}: {closed.describe()}"
         return self._answer(NO_WAY, reason, search, closed=closed)
+
+    def _warn(self) -> str:
+        """Return what is wrong with the lattice, in words."""
+        cell, coarse = self._nodes.cell, COARSE * wheelbase(self._question.rover)
+        if cell <= coarse:
+            return ""
+        return (
+            f"the lattice's cell of {cell:g} m is larger than {coarse:.2f} m, half the wheelbase: "
+            "gaps between obstacles may lie between its places"
+        )
+
+    def _describe_rest(self, path: Candidate) -> str:
+        """Return how far before a goal on unknown ground a way ends, in words."""
+        left = np.hypot(*(path.poses[-1] - self._goal)[:2])
+        if not self._to_frontier:
+            return ""
+        return f"the goal is on unknown ground; the way ends {left:.1f} m before it"
 
     def _describe_extent(self) -> str:
         """Return what part of the map is searched, in words."""
@@ -181,10 +210,17 @@ class _WaySearch:
             self._judge,
             known,
             connect_start(question.rover, nodes, self._start, spacing),
-            connect_goal(question.rover, nodes, self._goal, spacing),
+            self._connect_goal(),
             ground.doubt,
             estimate_difficulty(question.rover, terrain, nodes, climb, lists),
         )
+
+    def _connect_goal(self) -> list[Connection]:
+        """Return the connections to the goal, or the places where a way to it may end."""
+        rover, spacing = self._question.rover, self._question.options.waypoint_spacing
+        if self._to_frontier:
+            return connect_frontier(self._judge, self._nodes, self._goal)
+        return connect_goal(rover, self._nodes, self._goal, spacing)
 
     def _try_directly(self, search: LatticeSearch) -> None:
         """Let the search begin with the direct curve, if the rover may drive it."""
@@ -251,6 +287,7 @@ class _WaySearch:
             repeatable=self._repeatable,
             nodes=self._nodes,
             closed=closed,
+            warning=self._warn(),
             asked=asked,
         )
 

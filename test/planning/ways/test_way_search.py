@@ -242,3 +242,33 @@ def test_only_the_heights_around_the_window_are_looked_at():
     refused = find_way(replace(question, terrain=enclosed), LatticeSettings(budget=0.3))
     assert refused.outcome in (OUT_OF_TIME, NO_WAY)
     assert "m around start and goal" in refused.reason
+
+
+def half_known(goal):
+    """Return a question for a goal; the ground beyond x = 1.5 m is unknown."""
+    ground = make_terrain(waves)
+    elevation = np.array(ground.elevation)
+    elevation[:, round((1.5 - ground.origin[0]) / ground.resolution) :] = np.nan
+    return ask(Terrain(elevation, ground.resolution, ground.origin), goal=goal)
+
+
+def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
+    question = half_known(GOAL)
+    assert find_way(question, LONG).outcome == GOAL_REFUSED
+    answer = find_way(question, replace(LONG, frontier=True))
+    assert answer.outcome == FOUND and answer.path.verdict.traversable
+    end = answer.path.poses[-1]
+    left = np.hypot(*(end[:2] - GOAL[:2]))
+    assert f"{left:.1f} m before it" in answer.reason
+    # On level ground, a wheel of the rover that stands across the edge is 0.4 m from its middle.
+    assert 1.0 < left < 1.7
+    known = half_known((0.5, 0.0, 0.0))
+    plain, frontier = find_way(known, LONG), find_way(known, replace(LONG, frontier=True))
+    np.testing.assert_array_equal(plain.path.poses, frontier.path.poses)
+
+
+def test_a_lattice_coarser_than_obstacles_is_warned_of():
+    question = ask(make_terrain(waves))
+    assert find_way(question, LONG).warning == ""
+    coarse = find_way(question, replace(LONG, cell=0.5))
+    assert "cell of 0.5 m is larger than 0.40 m" in coarse.warning
