@@ -38,3 +38,10 @@ MaxCells = Annotated[
 MAX_CELLS = 25_000_000
 """Default of the option --max-cells; a test compares it with that of `load_terrain`."""
 Payload = Annotated[float | None, typer.Option(metavar="KG", help="Mass at the arm's tip in kg.")]
+Sigmas = Annotated[
+    float,
+    typer.Option(
+        metavar="K",
+        help="Standard deviations to allow for where the map has elevation_std; 0: none.",
+    ),
+]

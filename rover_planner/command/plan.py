@@ -14,6 +14,7 @@ from rover_planner.command.options import (
     Payload,
     Policy,
     RoverName,
+    Sigmas,
     SoilName,
     TerrainName,
 )
@@ -58,13 +59,7 @@ def plan(
         bool,
         typer.Option("--frontier", help="Plan as near as possible to a goal on unknown ground."),
     ] = False,
-    sigmas: Annotated[
-        float,
-        typer.Option(
-            metavar="K",
-            help="Standard deviations to allow for where the map has elevation_std; 0: none.",
-        ),
-    ] = 3.0,
+    sigmas: Sigmas = 3.0,
     picture: Picture = None,
     dump: Annotated[
         Path | None,

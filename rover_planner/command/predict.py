@@ -13,6 +13,7 @@ from rover_planner.command.options import (
     Payload,
     Policy,
     RoverName,
+    Sigmas,
     SoilName,
     TerrainName,
     Vector,
@@ -62,13 +63,7 @@ def predict(
         Vector | None,
         typer.Option(metavar="MX MY MZ", help="Moment on the arm's tip in N m, body frame."),
     ] = None,
-    sigmas: Annotated[
-        float,
-        typer.Option(
-            metavar="K",
-            help="Standard deviations to allow for where the map has elevation_std; 0: none.",
-        ),
-    ] = 3.0,
+    sigmas: Sigmas = 3.0,
     classes: Annotated[
         bool,
         typer.Option(
