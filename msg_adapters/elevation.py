@@ -93,6 +93,7 @@ def terrain_from_point_cloud(
         cell_height: How the points of a cell are combined. "max" keeps the top of every obstacle,
             which is safe; it raises noisy ground by about the noise and narrows a ditch by up
             to a cell. "mean" is unbiased on plain ground and lowers the edges of obstacles.
+            "median" also ignores stray points, and loses obstacles below half of a cell's points.
 
     Raises:
         MessageError: The cloud cannot be read, has no valid point or one beyond MAX_COORDINATE,

@@ -90,7 +90,8 @@ def cell_height_parameter() -> str:
     """Return the field of the parameter cell_height."""
     return parameter(
         CELL_HEIGHTS[0],
-        "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
+        "Height of a cell with several points; max keeps obstacles, mean is unbiased, median "
+        "ignores stray points.",
         choices=CELL_HEIGHTS,
     )
 
