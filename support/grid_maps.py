@@ -13,7 +13,7 @@ def grid_map_of(
     centre: tuple[float, float] = (0.0, 0.0),
     basic: tuple[str, ...] = ("elevation",),
 ) -> Any:
-    """Return a column-major GridMap of layers (ny, nx), x and y ascending, as grid_map stores it."""
+    """Return a column-major GridMap, as grid_map stores it, of layers (ny, nx), x, y ascending."""
     ny, nx = next(iter(layers.values())).shape
     header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0), frame_id="map")
     position = SimpleNamespace(x=centre[0], y=centre[1], z=0.0)

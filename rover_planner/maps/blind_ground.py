@@ -60,6 +60,7 @@ class SeenGround:
         ny, nx = self.kinds.shape
         swept = np.zeros((ny, nx), bool)
         off_map, first, beyond = 0, -1, -1
+        poses, waypoints = self._spread_out(rover, poses)
         for start, rows, columns in self._cells_below(rover, poses):
             on_map = (rows >= 0) & (rows < ny) & (columns >= 0) & (columns < nx)
             i, j = np.clip(rows, 0, ny - 1), np.clip(columns, 0, nx - 1)
@@ -74,14 +75,28 @@ class SeenGround:
         counts = np.bincount(self.kinds[swept], minlength=3)
         total = max(int(counts.sum()) + off_map, 1)
         assumed, unseen = int(counts[ASSUMED]), int(counts[UNSEEN]) + off_map
+        first, beyond = (-1 if k < 0 else int(waypoints[k]) for k in (first, beyond))
         return BlindShare((assumed + unseen) / total, assumed / total, first, beyond)
+
+    def _spread_out(
+        self, rover: Rover, poses: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Return the poses at which the belly has moved on by a cell, and their indices."""
+        half = max(np.hypot(x, y) for x in rover.belly.x for y in rover.belly.y)
+        steps = np.diff(poses, axis=0)
+        turns = np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*steps[:, :2].T) + half * turns)])
+        cells = np.floor(way / self.terrain.resolution)
+        kept = np.concatenate([[True], np.diff(cells) > 0])
+        kept[-1] = True
+        return poses[kept], np.flatnonzero(kept)
 
     def _cells_below(
         self, rover: Rover, poses: NDArray[np.float64]
     ) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.intp]]]:
         """Yield first pose, and rows and columns (k, m) of the cells below the belly there."""
         terrain, belly = self.terrain, rover.belly
-        step = 0.5 * terrain.resolution
+        step = 0.7 * terrain.resolution  # no cell is narrower than that across its diagonal
         along, across = (
             np.linspace(low, high, max(2, int(np.ceil((high - low) / step)) + 1))
             for low, high in (belly.x, belly.y)

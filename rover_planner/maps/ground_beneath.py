@@ -65,7 +65,9 @@ class GroundBeneath:
     """Distance along the wheel from its contact up to which the ground is measured [m]."""
 
     def patch(self, grid: CellGrid, margin: float, std: float) -> tuple[Patch, NDArray[np.bool_]]:
-        """Return the ground on the cells of a grid, NaN beyond the outline, and where wheels stand.
+        """Return the ground on the cells of a grid, and True for the cells where wheels stand.
+
+        Heights are NaN beyond the outline.
 
         Args:
             grid: The cells.
@@ -88,9 +90,9 @@ class GroundBeneath:
             int(np.ceil(row.max())) - low_row + 1,
             int(np.ceil(column.max())) - low_column + 1,
         )
-        x = grid.anchor[0] + grid.resolution * (low_column + np.arange(box.columns))
-        y = grid.anchor[1] + grid.resolution * (low_row + np.arange(box.rows))[:, None]
-        along, across = self._to_body(x, y)
+        x = grid.anchor[0] + grid.resolution * (low_column + np.arange(box.columns, dtype=float))
+        y = grid.anchor[1] + grid.resolution * (low_row + np.arange(box.rows, dtype=float))
+        along, across = self._to_body(x[None, :], y[:, None])
         inside = (along >= x0 - beyond) & (along <= x1 + beyond)
         inside &= (across >= y0 - beyond) & (across <= y1 + beyond)
         heights = np.where(inside, self._height(along, across), np.nan)
@@ -166,7 +168,7 @@ def find_ground_beneath(rover: Rover, standing: Standing) -> GroundBeneath:
 
 
 def _normal_of(points: Floats) -> Floats:
-    """Return the upward normal (3,) of the plane z(x, y) through points (n, 3) in least squares."""
+    """Return the upward normal (3,) of the plane that fits points (n, 3) best."""
     middle = points.mean(axis=0)
     slopes = np.linalg.lstsq(points[:, :2] - middle[:2], points[:, 2] - middle[2], rcond=None)[0]
     normal = np.array([-slopes[0], -slopes[1], 1.0])

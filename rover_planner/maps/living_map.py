@@ -1,6 +1,7 @@
-"""A map that lives: local maps merge into a loaded one cell by cell, in a growing or rolling window.
+"""A map that lives: local maps merge into a loaded one cell by cell, in a window.
 
-Heights that a newer map does not have stay. Each cell knows its source and its time.
+The window grows with what is seen, or rolls with the rover. Heights that a newer map does not have
+stay. Each cell knows its source and its time.
 """
 
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ GROWTH = 32
 """Cells by which a window grows at least, so that it does not grow with each map."""
 ROLL = 8
 """A window of n cells rolls when the rover is n / ROLL cells from its middle."""
+NEAR = 8
+"""A rover is far from a map if a window around both has more than NEAR times their cells."""
 FINER = 0.75
 """Relative cell size from which a first local map replaces the cells of a loaded map."""
 
@@ -148,8 +151,9 @@ class LivingMap:
         """
         if self._window is None:
             return False
-        x, y = self._centre_of(patch.box)
-        window = self._room_for(patch.box, (x, y))
+        if not self._is_near(patch.box):
+            return False
+        window = self._room_for(patch.box, self._centre_of(patch.box))
         to, own = patch.box.within(window.box), window.box.within(patch.box)
         known = np.isfinite(patch.layers["elevation"][own])
         old, contact = window.layers["source"][to], is_contact[own]
@@ -301,6 +305,15 @@ class LivingMap:
             surer = new <= np.hypot(old, self.rules.ageing * age)
         return known & (is_given | surer)
 
+    def _is_near(self, box: CellBox) -> bool:
+        """Return whether a window that grows to a box stays of the size of both."""
+        if self.rules.window > 0.0 or self._window is None:
+            return True
+        old = self._window.box
+        grown = self._wanted_box(box, self._centre_of(box)).cells
+        most = NEAR * (old.cells + box.cells) + GROWTH**2
+        return grown <= (old.cells if grown == old.cells else min(most, self.rules.max_cells))
+
     def _centre_of(self, box: CellBox) -> tuple[float, float]:
         assert self._grid is not None
         x, y = self._grid.anchor
@@ -309,4 +322,3 @@ class LivingMap:
             x + step * (box.column + 0.5 * (box.columns - 1)),
             y + step * (box.row + 0.5 * (box.rows - 1)),
         )
-

@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.joints import joint_positions
-from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses, stamped_pose_to_array
 from msg_adapters.results.server_status import server_diagnostics
 from msg_adapters.results.verdicts import report_to_json
@@ -160,7 +160,9 @@ class TraverseServer(Node):
     def _take_odometry(self, odometry: Odometry) -> None:
         try:
             pose, _ = odometry_to_pose(odometry, self._values.map_frame)
-            self._service.take_pose(pose[[0, 1, 3]])
+            body = float(pose[2]), *odometry_to_tilt(odometry)
+            self._service.take_pose(pose[[0, 1, 3]], body)
+            self._maps.look_under_rover()
         except MessageError as error:
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True

@@ -59,7 +59,7 @@ def test_the_start_footprint_is_told_apart():
 
 def test_ground_off_the_map_was_not_seen():
     kinds = np.full((81, 161), SEEN, np.uint8)
-    far = PATH + (5.0, 0.0, 0.0)
+    far = PATH + np.array([5.0, 0.0, 0.0])
     share = SeenGround(ground(), kinds).share(LSR1, far)
     assert share.first == share.first_beyond_footprint
     assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
@@ -68,7 +68,7 @@ def test_ground_off_the_map_was_not_seen():
 
 def test_a_long_path_counts_each_cell_once():
     kinds = np.full((81, 161), SEEN, np.uint8)
-    kinds[:, 100] = UNSEEN
+    kinds[:, 60] = UNSEEN
     seen = SeenGround(ground(), kinds)
     often = np.vstack([PATH] * 30)
     whole, once = seen.share(LSR1, often), seen.share(LSR1, PATH)
