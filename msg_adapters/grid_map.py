@@ -34,9 +34,9 @@ class GridMapLayers:
     elevation: str = "elevation"
     """Heights [m]; the map must have it."""
     variance: str = "variance"
-    """Variances of the heights [m^2]; empty, or a layer that the map lacks: exact heights."""
+    """Variances of the heights [m^2]; a map without this layer has exact heights."""
     friction: str = "friction"
-    """Coulomb friction coefficients; empty, or a layer that the map lacks: the default."""
+    """Coulomb friction coefficients; a map without this layer has the default."""
 
 
 @quiet

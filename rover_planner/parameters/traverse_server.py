@@ -111,13 +111,13 @@ class TraverseServerParameters(ParameterTable):
     )
     variance_layer: str = parameter(
         "variance",
-        "Layer of the heights' variances in a GridMap; empty, or not in the map: exact heights.",
+        "Layer of the heights' variances in a GridMap; a map without it has exact heights.",
         unit="m^2",
         read_only=True,
     )
     friction_layer: str = parameter(
         "friction",
-        "Layer of Coulomb friction in a GridMap; empty, or not in the map: friction.",
+        "Layer of Coulomb friction in a GridMap; a map without it has that of friction.",
         read_only=True,
     )
     map_updates: str = parameter(

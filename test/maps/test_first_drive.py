@@ -17,7 +17,7 @@ from rover_planner.planning.answering.service_settings import (
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 from support.grounds import make_terrain, waves
-from support.standing import standing_of
+from support.messages.standing import standing_of
 
 CAMERA = {"sensor_field_of_view": math.radians(60.0), "sensor_least_range": 0.5}
 """A camera that sees 60 degrees ahead, from 0.5 m on."""

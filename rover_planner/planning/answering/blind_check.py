@@ -47,11 +47,17 @@ class BlindCheck:
         return replace(candidate, verdict=verdict, cost=_REFUSED_COST)
 
     def choose(self, search: PathSearch) -> PathSearch:
-        """Return a search whose choice is among the candidates that the rule does not refuse."""
+        """Return a search whose choice is among the candidates that the rule does not refuse.
+
+        If it refuses all that are traversable, the best of them is explained.
+        """
         if self.rule == ALLOW or not search.answer.traversable:
             return search
         held = tuple(self.hold(candidate) for candidate in search.answer.candidates)
-        return replace(search, answer=choose(held))
+        answer = choose(held)
+        if not answer.traversable:
+            answer = replace(answer, nearest=search.answer.best)
+        return replace(search, answer=answer)
 
     def _share(self, candidate: Candidate) -> BlindShare:
         return self.seen.share(self.rover, candidate.poses)
