@@ -14,7 +14,7 @@ from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.maps.living_map import MapSnapshot
-from rover_planner.maps.map_keeper import KeeperSettings, MapKeeper
+from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -44,8 +44,6 @@ class MapSettings:
     """Height of a cell with several points."""
     layers: GridMapLayers
     """Names of the layers of a GridMap."""
-    keeper: KeeperSettings
-    """How the map is kept."""
 
 
 def grid_map_type() -> type | None:
@@ -84,7 +82,8 @@ class MapTopics:
         """
         self._node, self._service, self._tell = node, service, tell
         self._settings = _settings_of(parameters)
-        self._keeper = MapKeeper(service.settings.rover, self._settings.keeper)
+        self._fills = parameters.fill_under_rover
+        self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
         self._is_from_topic = False
         self._topic, self._looked = CLOUD, -float("inf")
         if parameters.terrain_file:
@@ -124,9 +123,13 @@ class MapTopics:
         self._intake.wait(ticket, check, MERGE_WAIT if merges else float("inf"))
 
     def apply(self, parameters: TraverseServerParameters) -> None:
-        """Make the present map anew if a parameter of maps has changed."""
+        """Make the present map anew if a parameter of messages has changed.
+
+        Those of merging and filling count from the next map on.
+        """
         before, self._settings = self._settings, _settings_of(parameters)
-        settings, rover = self._settings.keeper, self._service.settings.rover
+        self._fills = parameters.fill_under_rover
+        settings, rover = keeper_settings(parameters), self._service.settings.rover
         self._intake.do(lambda: self._keeper.apply(rover, settings))
         if self._is_from_topic and before != self._settings:
             self._intake.repeat()
@@ -146,7 +149,7 @@ class MapTopics:
     def look_under_rover(self) -> None:
         """Have unknown ground under the rover filled, at most every LOOK_PERIOD."""
         now = time.monotonic()
-        is_due = self._settings.keeper.fill and now - self._looked >= LOOK_PERIOD
+        is_due = self._fills and now - self._looked >= LOOK_PERIOD
         if is_due and self._service.standing() is not None:
             self._looked = now
             self._intake.do(self._fill_under_rover)
@@ -219,5 +222,4 @@ def _settings_of(parameters: TraverseServerParameters) -> MapSettings:
         parameters.map_resolution,
         parameters.cell_height,
         layers,
-        keeper_settings(parameters),
     )
