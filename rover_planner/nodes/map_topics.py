@@ -28,6 +28,8 @@ CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 """Topics of maps: PointCloud2, and GridMap where its package is installed."""
 LOOK_PERIOD = 0.5
 """Shortest time between two looks for unknown ground under the rover [s]."""
+LOG_PERIOD = 10.0
+"""Shortest time between two log lines about maps that merge [s]."""
 MERGE_WAIT = 0.02
 """Longest wait of a question for a map that is to be merged into the one that is there [s]."""
 
@@ -192,9 +194,13 @@ class MapTopics:
         is_new = self._keep(snapshot, source, stamp)
         self._tell("")
         if is_new:
-            taken = self._service.terrain
+            taken, logger = self._service.terrain, self._node.get_logger()
             assert taken is not None
-            self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
+            told = f"map from {source}: {describe_terrain(taken)}"
+            if self._keeper.merges and source == self._topic:
+                logger.info(told, throttle_duration_sec=LOG_PERIOD)
+            else:
+                logger.info(told)
 
     def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
         return self._service.take_terrain(
