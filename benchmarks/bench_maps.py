@@ -18,8 +18,8 @@ from benchmarks.measure import Figure, median_time, quantile
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics.terrain.grid import Terrain
 from rover_physics.warm_up import warm_up
-from rover_planner.maps.living_map import LivingMap
 from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.worlds.maps.living_map import LivingMap
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.planner_client import PlannerClient
 from support.ros_fixtures import RosRun, wait_until

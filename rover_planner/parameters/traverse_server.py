@@ -4,10 +4,6 @@ from dataclasses import dataclass
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
-from rover_planner.maps.blind_ground import ALLOW, BLIND_GROUND
-from rover_planner.maps.living_map import MERGE_RULES, NEWEST
-from rover_planner.maps.map_keeper import AUTO as AUTO_UPDATES
-from rover_planner.maps.map_keeper import MAP_UPDATES
 from rover_planner.parameters.shared import (
     CONTROL_MARGIN,
     cell_height_parameter,
@@ -21,6 +17,10 @@ from rover_planner.parameters.shared import (
     steering_sign_parameter,
 )
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
+from rover_planner.worlds.maps.blind_ground import ALLOW, BLIND_GROUND
+from rover_planner.worlds.maps.living_map import MERGE_RULES, NEWEST
+from rover_planner.worlds.maps.map_keeper import AUTO as AUTO_UPDATES
+from rover_planner.worlds.maps.map_keeper import MAP_UPDATES
 
 MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""

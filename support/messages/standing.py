@@ -2,8 +2,8 @@
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
-from rover_planner.maps.ground_beneath import Standing
 from rover_planner.simulator.plant import PlantState
+from rover_planner.worlds.maps.ground_beneath import Standing
 
 
 def standing_of(state: PlantState) -> Standing:

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
-from rover_planner.maps.blind_ground import ALLOW, CODE, REFUSE, BlindShare, SeenGround
 from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate, choose
 from rover_planner.planning.verdict_report import GroundReport
+from rover_planner.worlds.maps.blind_ground import ALLOW, CODE, REFUSE, BlindShare, SeenGround
 
 _REFUSED_COST = (float("inf"), float("inf"))
 

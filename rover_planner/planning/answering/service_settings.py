@@ -7,14 +7,14 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
-from rover_planner.maps.blind_ground import ALLOW
-from rover_planner.maps.living_map import MergeRules
-from rover_planner.maps.map_keeper import KeeperSettings
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.worlds.map_file import MapLimits
+from rover_planner.worlds.maps.blind_ground import ALLOW
+from rover_planner.worlds.maps.living_map import MergeRules
+from rover_planner.worlds.maps.map_keeper import KeeperSettings
 
 
 @dataclass(frozen=True)

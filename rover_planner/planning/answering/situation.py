@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.maps.blind_ground import CODE as BLIND
 from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.blind_check import BlindCheck, physical
 from rover_planner.planning.answering.judgement import Judgement, refusal
@@ -27,6 +26,7 @@ from rover_planner.planning.verdict_report import SuspensionReport
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import GOAL_REFUSED, START_REFUSED, find_way
+from rover_planner.worlds.maps.blind_ground import CODE as BLIND
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 

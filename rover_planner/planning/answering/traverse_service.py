@@ -13,8 +13,6 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
-from rover_planner.maps.ground_beneath import Standing
-from rover_planner.maps.sources import CellSources
 from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.measurements import Measurements
@@ -22,6 +20,8 @@ from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.situation import GivenPath, Situation
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.worlds.maps.ground_beneath import Standing
+from rover_planner.worlds.maps.sources import CellSources
 
 
 class TraverseService:

@@ -7,20 +7,20 @@ import time
 import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float32MultiArray, MultiArrayDimension
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain, save_terrain
-from rover_planner.maps.map_keeper import MapKeeper
-from rover_planner.nodes import map_topics
+from rover_planner.nodes.maps import map_topics
 from rover_planner.ros.qos import map_qos
+from rover_planner.worlds.maps.map_keeper import MapKeeper
 from support.grounds import make_terrain, wall_at, waves
 from support.messages.grid_maps import grid_map_of, move_buffer
 from support.messages.interfaces import GRID_MAP_MSGS, build_messages
-from support.planner_client import GOAL, START, ask, verdict_of
+from support.planner_client import GOAL, SERVER, START, ask, verdict_of
 from support.ros_fixtures import wait_until
 
 PRIOR = make_terrain(waves)
@@ -123,6 +123,24 @@ def test_a_loaded_map_survives_100_local_updates(server, client, tmp_path):
         "footprint": 0,
         "elevation_cloud": int(seen.sum()),
     }
+
+
+def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, tmp_path):
+    file = tmp_path / "prior.npz"
+    save_terrain(file, PRIOR)
+    assert client.load_map(file).result == 0
+    client.send_terrain(local_map(10, 10, 0.5))
+    heard = []
+    client.create_subscription(PointCloud2, f"{SERVER}/map", heard.append, map_qos())
+    wait_until(lambda: heard, "the map")
+    cloud = heard[-1]
+    names = [field.name for field in cloud.fields]
+    assert names == ["x", "y", "z", "source", "age"] and cloud.header.frame_id == "map"
+    values = np.frombuffer(cloud.data, "<f4").reshape(cloud.height, cloud.width, 5)
+    merged = server.service.terrain.elevation
+    np.testing.assert_array_equal(values[..., 2], merged.astype(np.float32))
+    assert (values[10:30, 10:30, 3] == 4).all() and (values[31:, :, 3] == 1).all()
+    assert values[..., 4].min() >= 0.0 and values[..., 4].max() < 60.0
 
 
 def test_without_a_loaded_map_a_cloud_replaces_the_last_one(server, client):

@@ -5,7 +5,7 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.maps.blind_ground import (
+from rover_planner.worlds.maps.blind_ground import (
     ALLOW,
     ALLOW_FOOTPRINT,
     REFUSE,
@@ -14,7 +14,7 @@ from rover_planner.maps.blind_ground import (
     SeenGround,
     seen_ground,
 )
-from rover_planner.maps.sources import FOOTPRINT, CellSources
+from rover_planner.worlds.maps.sources import FOOTPRINT, CellSources
 
 LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])

@@ -12,9 +12,9 @@ from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
-from rover_planner.maps.cells import CellBox, CellGrid, Layer, Patch, grid_of, lay_onto
-from rover_planner.maps.layers import Window, empty_window
-from rover_planner.maps.sources import (
+from rover_planner.worlds.maps.cells import CellBox, CellGrid, Layer, Patch, grid_of, lay_onto
+from rover_planner.worlds.maps.layers import Window, empty_window
+from rover_planner.worlds.maps.sources import (
     CONTACT,
     FIRST_NAMES,
     FOOTPRINT,

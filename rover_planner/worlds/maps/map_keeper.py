@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
-from rover_planner.maps.living_map import LivingMap, MapSnapshot, MergeRules
+from rover_planner.worlds.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
+from rover_planner.worlds.maps.living_map import LivingMap, MapSnapshot, MergeRules
 
 AUTO, MERGE, REPLACE = "auto", "merge", "replace"
 MAP_UPDATES = (AUTO, MERGE, REPLACE)

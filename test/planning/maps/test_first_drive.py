@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.maps.map_keeper import MERGE, MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import (
@@ -16,6 +15,7 @@ from rover_planner.planning.answering.service_settings import (
 )
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
+from rover_planner.worlds.maps.map_keeper import MERGE, MapKeeper
 from support.grounds import make_terrain, waves
 from support.messages.standing import standing_of
 

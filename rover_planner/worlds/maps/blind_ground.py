@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.maps.sources import FOOTPRINT, CellSources
+from rover_planner.worlds.maps.sources import FOOTPRINT, CellSources
 
 ALLOW, ALLOW_FOOTPRINT, REFUSE = "allow", "allow_footprint", "refuse"
 BLIND_GROUND = (ALLOW, ALLOW_FOOTPRINT, REFUSE)

@@ -13,8 +13,6 @@ from msg_adapters.frames import check_frame
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.maps.living_map import MapSnapshot
-from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -22,6 +20,8 @@ from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions
 from rover_planner.ros.qos_warnings import warn_of_mismatch
+from rover_planner.worlds.maps.living_map import MapSnapshot
+from rover_planner.worlds.maps.map_keeper import MapKeeper
 from rover_planner.worlds.summary import describe_terrain
 
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rover_planner.maps.cells import CellBox, Layer, Patch
-from rover_planner.maps.sources import UNKNOWN
+from rover_planner.worlds.maps.cells import CellBox, Layer, Patch
+from rover_planner.worlds.maps.sources import UNKNOWN
 
 EMPTY = {
     "elevation": (np.float64, np.nan),
