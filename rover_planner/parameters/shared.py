@@ -107,6 +107,27 @@ def max_map_cells_parameter(read_only: bool = False) -> int:
     )
 
 
+def imu_frame_parameter() -> str:
+    """Return the field of the parameter imu_frame."""
+    return parameter(
+        "",
+        "Frame of the IMU; empty is that of the body. An IMU with another frame_id is refused, an "
+        "empty one is this.",
+        read_only=True,
+    )
+
+
+def imu_mounting_parameter() -> tuple[float, ...]:
+    """Return the field of the parameter imu_mounting [rad]."""
+    return parameter(
+        (0.0, 0.0, 0.0),
+        "Roll, pitch and yaw of the IMU's axes in the body frame.",
+        unit="rad",
+        bounds=(-6.3, 6.3),
+        read_only=True,
+    )
+
+
 def map_durability_parameter() -> str:
     """Return the field of the parameter map_durability."""
     return parameter(

@@ -7,6 +7,8 @@ from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_planner.parameters.shared import (
     CONTROL_MARGIN,
     cell_height_parameter,
+    imu_frame_parameter,
+    imu_mounting_parameter,
     input_reliability_parameter,
     map_durability_parameter,
     map_resolution_parameter,
@@ -166,6 +168,13 @@ class TraverseServerParameters(ParameterTable):
         unit="m",
         bounds=(0.0, 10.0),
     )
+    imu_attitude: bool = parameter(
+        False,
+        "Whether roll and pitch of the standing rover are those of imu instead of odometry.",
+        read_only=True,
+    )
+    imu_frame: str = imu_frame_parameter()
+    imu_mounting: tuple[float, ...] = imu_mounting_parameter()
     blind_ground: str = parameter(
         ALLOW,
         "Paths whose belly passes over ground that was never seen: allow them, over the filled "

@@ -6,11 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import Imu, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
+from msg_adapters.imu import ImuMounting, imu_to_attitude
+from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
@@ -18,7 +21,7 @@ from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.ros.qos import map_subscriptions
+from rover_planner.ros.qos import map_subscriptions, sensor_qos
 from rover_planner.ros.qos_warnings import warn_of_mismatch
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
@@ -93,6 +96,8 @@ class MapTopics:
             self._keep(self._keeper.load(terrain, self._now(), None), parameters.terrain_file)
         self._intake: MapIntake[None] = MapIntake(self._take_message, self._refuse)
         self._subscribe(CLOUD, PointCloud2, parameters, guard)
+        if parameters.imu_attitude:
+            self._subscribe_to_imu(parameters, guard)
         grid_map = grid_map_type()
         if grid_map is not None:
             self._subscribe(GRID_MAP, grid_map, parameters, guard)
@@ -111,6 +116,20 @@ class MapTopics:
             self._node.create_subscription(
                 kind, topic, guard.around(offer), qos, event_callbacks=events, raw=True
             )
+
+    def _subscribe_to_imu(self, parameters: TraverseServerParameters, guard: Guard) -> None:
+        mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
+
+        def take(imu: Imu) -> None:
+            try:
+                attitude = imu_to_attitude(imu, mounting)
+            except MessageError as error:
+                logger = self._node.get_logger()
+                logger.warning(f"imu not used: {error}", throttle_duration_sec=LOG_PERIOD)
+                return
+            self._service.take_tilt(attitude.roll, attitude.pitch)
+
+        self._node.create_subscription(Imu, "imu", guard.around(take), sensor_qos())
 
     def ticket(self) -> int:
         """Return a number for `wait`: all maps that have come until now."""

@@ -21,6 +21,8 @@ class Measurements:
         self._pose: NDArray[np.float64] | None = None
         self._pose_time = -np.inf
         self._body: tuple[float, float, float] | None = None
+        self._tilt: tuple[float, float] | None = None
+        self._tilt_time = -np.inf
 
     @property
     def joints(self) -> dict[str, float]:
@@ -44,12 +46,23 @@ class Measurements:
         """
         self._pose, self._pose_time, self._body = pose, now, body
 
+    def take_tilt(self, roll: float, pitch: float, now: float) -> None:
+        """Keep roll and pitch [rad] of an IMU, measured at time `now` [s]."""
+        self._tilt, self._tilt_time = (roll, pitch), now
+
     def standing(self, now: float) -> Standing | None:
-        """Return pose and suspension if all of them are not older than MAX_AGE, else None."""
+        """Return pose and suspension if all of them are not older than MAX_AGE, else None.
+
+        Roll and pitch are those of the IMU if there ever was one, else those of the pose.
+        """
         times = [self._times.get(name, -np.inf) for name in SUSPENSION_JOINTS]
         pose, body = self._pose, self._body
         if pose is None or body is None or now - min(*times, self._pose_time) > MAX_AGE:
             return None
+        if self._tilt is not None:
+            if now - self._tilt_time > MAX_AGE:
+                return None
+            body = body[0], *self._tilt
         suspension = {name: self._joints[name] for name in SUSPENSION_JOINTS}
         x, y, yaw = pose.tolist()
         return Standing(x, y, *body, yaw, suspension)

@@ -138,6 +138,10 @@ class TraverseService:
         """
         self._measurements.take_pose(pose, time.monotonic(), body)
 
+    def take_tilt(self, roll: float, pitch: float) -> None:
+        """Keep roll and pitch [rad] of the body, measured by an IMU."""
+        self._measurements.take_tilt(roll, pitch, time.monotonic())
+
     def standing(self) -> Standing | None:
         """Return pose and suspension of the rover if they were measured just now, else None."""
         return self._measurements.standing(time.monotonic())

@@ -6,13 +6,15 @@ import time
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float32MultiArray, MultiArrayDimension
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
 from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.nodes.maps import map_topics
 from rover_planner.ros.qos import map_qos
@@ -215,6 +217,26 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
     assert client.set_parameter("blind_ground", "refuse")[0]
     _, verdict, _ = ask(client, start, goal)
     assert verdict["code"] == "blind_ground" and verdict["first_failure"] == "0"
+
+
+def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu(start_server, client):
+    server = start_server(imu_attitude=True)
+    publisher = client.create_publisher(Imu, "imu", 1)
+    send_standing(client, (0.0, 0.0, 0.3))
+    wait_until(lambda: server.service.standing() is not None, "the odometry")
+    turned = xyzw_from_rpy(0.1, -0.2, 1.0)
+    x, y, z, w = turned.tolist()
+    message = Imu(orientation=Quaternion(x=x, y=y, z=z, w=w))
+
+    def is_tilted():
+        publisher.publish(message)
+        send_standing(client, (0.0, 0.0, 0.3))
+        time.sleep(0.05)
+        now = server.service.standing()
+        return now is not None and now.roll != 0.0 and now
+
+    now = wait_until(is_tilted, "the tilt")
+    assert (now.roll, now.pitch, now.yaw) == pytest.approx((0.1, -0.2, 0.3))
 
 
 def test_friction_and_deviation_of_a_grid_map_are_used(grid_map_msgs, start_server, client):
