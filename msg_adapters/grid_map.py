@@ -67,7 +67,7 @@ def terrain_from_grid_map(message: Any, layers: GridMapLayers | None = None) -> 
         raise MessageError(f"grid map has two layers {twice!r}; names must differ")
     if layers.elevation not in names:
         raise MessageError(
-            f"grid map has no layer {layers.elevation!r}; it has {', '.join(names) or 'none'}: "
+            f"grid map has no layer {layers.elevation!r}; it has {', '.join(names)[:200] or 'none'}: "
             "set elevation_layer to that of the heights"
         )
     start = _start_of(message, rows, columns)
