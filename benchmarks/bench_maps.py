@@ -79,6 +79,7 @@ class Stage:
         self.server: TraverseServer = ros.spin(  # type: ignore[assignment]
             TraverseServer(context=ros.context, parameter_overrides=fixed)
         )
+        self.server.get_logger().set_level(LoggingSeverity.INFO)
         self.client: PlannerClient = ros.spin(PlannerClient(ros))  # type: ignore[assignment]
         self.client.send_terrain(self.prior)
         self.server.get_logger().set_level(LoggingSeverity.WARN)

@@ -66,9 +66,10 @@ def terrain_from_grid_map(message: Any, layers: GridMapLayers | None = None) -> 
         twice = next(name for name in names if names.count(name) > 1)
         raise MessageError(f"grid map has two layers {twice!r}; names must differ")
     if layers.elevation not in names:
+        there = ", ".join(names)[:200] or "none"
         raise MessageError(
-            f"grid map has no layer {layers.elevation!r}; it has {', '.join(names)[:200] or 'none'}: "
-            "set elevation_layer to that of the heights"
+            f"grid map has no layer {layers.elevation!r}; it has {there}: set elevation_layer to "
+            "that of the heights"
         )
     start = _start_of(message, rows, columns)
 
