@@ -7,7 +7,9 @@ read back unchanged.
 """
 
 import array
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
@@ -93,6 +95,7 @@ def terrain_from_point_cloud(
         cell_height: How the points of a cell are combined. "max" keeps the top of every obstacle,
             which is safe; it raises noisy ground by about the noise and narrows a ditch by up
             to a cell. "mean" is unbiased on plain ground and lowers the edges of obstacles.
+            "median" also ignores stray points, and loses obstacles below half of a cell's points.
 
     Raises:
         MessageError: The cloud cannot be read, has no valid point or one beyond MAX_COORDINATE,
@@ -189,6 +192,7 @@ def terrain_to_point_cloud(
     frame_id: str,
     stamp=None,
     datatype: int = PointField.FLOAT32,
+    more: Mapping[str, NDArray[Any]] | None = None,
 ) -> PointCloud2:
     """Convert a terrain into an organised cloud, one point per cell, row 0 first.
 
@@ -197,9 +201,11 @@ def terrain_to_point_cloud(
         frame_id: Frame of the map.
         stamp: builtin_interfaces/Time, zero if None.
         datatype: PointField.FLOAT32, which viewers can show and which rounds heights, or FLOAT64.
+        more: Further fields by name, (ny, nx) each.
     """
     rows, columns = terrain.elevation.shape
-    layers = [name for name in LAYERS if getattr(terrain, name) is not None]
+    fields = {name: getattr(terrain, name) for name in LAYERS} | dict(more or {})
+    layers = [name for name in fields if fields[name] is not None]
     names = ["x", "y", "z", *layers]
     kind = np.dtype("<" + _FLOATS[datatype])
     values = np.empty((rows, columns, len(names)), kind)
@@ -207,7 +213,7 @@ def terrain_to_point_cloud(
     values[:, :, 1] = (terrain.origin[1] + terrain.resolution * np.arange(rows))[:, None]
     values[:, :, 2] = terrain.elevation
     for column, name in enumerate(layers, start=3):
-        values[:, :, column] = getattr(terrain, name)
+        values[:, :, column] = fields[name]
     cloud = PointCloud2(height=rows, width=columns, is_bigendian=False, is_dense=False)
     cloud.header.frame_id = frame_id
     if stamp is not None:

@@ -17,7 +17,7 @@ from rover_physics.numerics.plausible import MAX_COORDINATE, MIN_RESOLUTION
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
 
-CELL_HEIGHTS = ("max", "mean")
+CELL_HEIGHTS = ("max", "mean", "median")
 """Ways to combine several points of a cell into its height."""
 
 _MIN_FILL = 0.05
@@ -236,11 +236,26 @@ def combine(cells, values, grid: CellGrid, how: str) -> NDArray[np.float64]:
     if how == "max":
         combined = np.full(size, np.nan)
         np.fmax.at(combined, cells, values)
+    elif how == "median":
+        combined = _medians(cells, values, size)
     else:
         counts = np.bincount(cells, minlength=size)
         sums = np.bincount(cells, weights=values, minlength=size)
         combined = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
     return combined.reshape(grid.rows, grid.columns)
+
+
+def _medians(cells, values, size: int) -> NDArray[np.float64]:
+    """Return the medians (size,) of the values of each cell; NaN in cells without a value."""
+    ordered = values[np.lexsort((values, cells))]
+    counts = np.bincount(cells, minlength=size)
+    ends = np.cumsum(counts)
+    medians = np.full(size, np.nan)
+    some = counts > 0
+    low = (ends - counts + (counts - 1) // 2)[some]
+    high = (ends - counts + counts // 2)[some]
+    medians[some] = 0.5 * (ordered[low] + ordered[high])
+    return medians
 
 
 def typical_spacing(xy: NDArray[np.float64]) -> float:

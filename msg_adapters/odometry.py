@@ -52,3 +52,11 @@ def odometry_to_pose(
             f"within {MAX_COORDINATE:g} m, variances within {MAX_DEVIATION**2:g} m^2"
         )
     return pose, math.sqrt(max(*variances, 0.0))
+
+
+def odometry_to_tilt(odometry: Odometry) -> tuple[float, float]:
+    """Return roll and pitch [rad] of the body in a message that `odometry_to_pose` accepted."""
+    q = odometry.pose.pose.orientation
+    norm = length_of((q.x, q.y, q.z, q.w))
+    roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w), squared_norm=norm**2)
+    return roll, pitch

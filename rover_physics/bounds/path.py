@@ -119,6 +119,12 @@ def _pack_uncertain(terrain: Terrain, sigmas: float) -> UncertainGround:
     )
 
 
+def prepare_bounds(terrain: Terrain, sigmas: float) -> None:
+    """Pack an uncertain terrain for `bound_path`, so that the first bounds on it are fast."""
+    if terrain.elevation_std is not None and sigmas > 0.0:
+        _pack_uncertain(terrain, sigmas)
+
+
 def forget_terrains() -> None:
     """Forget the terrains of earlier predictions and bounds, which may take much memory."""
     _pack_uncertain.cache_clear()

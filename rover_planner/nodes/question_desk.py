@@ -11,7 +11,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from msg_adapters.results.server_status import search_diagnostics
-from rover_planner.nodes.map_topics import MapTopics
+from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.planning.answering.budget import Budget
 from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.question_queue import Question, QuestionQueue

@@ -22,15 +22,16 @@ from std_srvs.srv import Trigger
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.joints import joint_positions
-from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses, stamped_pose_to_array
 from msg_adapters.results.server_status import server_diagnostics
 from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
-from rover_planner.nodes.map_file_service import MapFileService
-from rover_planner.nodes.map_topics import MapTopics
+from rover_planner.nodes.maps.map_cloud import MapCloud
+from rover_planner.nodes.maps.map_file_service import MapFileService
+from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.path_validity import PathValidity
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
@@ -98,6 +99,7 @@ class TraverseServer(Node):
             self, self._maps, frame, self.guard, lambda: map_limits(self._values)
         )
         self._reach = ReachTopics(self, self.desk, frame, reliability)
+        self._map_cloud = MapCloud(self, self._service, frame)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(
@@ -121,6 +123,7 @@ class TraverseServer(Node):
         """Refuse open questions, end the threads and destroy the node."""
         self.desk.close()
         self._maps.close()
+        self._map_cloud.close()
         self._behind.close()
         super().destroy_node()
 
@@ -160,7 +163,9 @@ class TraverseServer(Node):
     def _take_odometry(self, odometry: Odometry) -> None:
         try:
             pose, _ = odometry_to_pose(odometry, self._values.map_frame)
-            self._service.take_pose(pose[[0, 1, 3]])
+            body = float(pose[2]), *odometry_to_tilt(odometry)
+            self._service.take_pose(pose[[0, 1, 3]], body)
+            self._maps.look_under_rover()
         except MessageError as error:
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True
@@ -222,6 +227,7 @@ class TraverseServer(Node):
         return response
 
     def _publish_diagnostics(self) -> None:
+        self._map_cloud.update()
         now = self.get_clock().now()
         missing = self._service.situation(now.nanoseconds).refuse_map()
         counts = {

@@ -6,6 +6,8 @@ from rover_physics.names import CONTROL_POLICIES, EQUAL, WHEEL_JOINTS
 from rover_planner.parameters.shared import max_map_cells_parameter, steering_sign_parameter
 from rover_planner.parameters.table import ParameterTable, parameter
 
+ALL_AROUND = 6.28
+"""Value of sensor_field_of_view of a sensor that sees in all directions [rad]."""
 QUASI_STATIC, MUJOCO = "quasi_static", "mujoco"
 ENGINES = (QUASI_STATIC, MUJOCO)
 """Values of the parameter engine."""
@@ -106,6 +108,21 @@ class RoverSimulatorParameters(ParameterTable):
     )
     sensor_occlusion: bool = parameter(
         True, "Whether high ground hides the ground behind it.", read_only=True
+    )
+    sensor_field_of_view: float = parameter(
+        ALL_AROUND,
+        "Angle over which the sensor sees, half of it to each side of the heading; 6.28 is all "
+        "around.",
+        unit="rad",
+        bounds=(0.01, ALL_AROUND),
+        read_only=True,
+    )
+    sensor_least_range: float = parameter(
+        0.0,
+        "Distance of the nearest ground that the sensor sees.",
+        unit="m",
+        bounds=(0.0, 100.0),
+        read_only=True,
     )
     seed: int = parameter(
         1, "Seed of noise and of a generated terrain.", bounds=(0, 2**31 - 1), read_only=True

@@ -90,7 +90,8 @@ def cell_height_parameter() -> str:
     """Return the field of the parameter cell_height."""
     return parameter(
         CELL_HEIGHTS[0],
-        "Height of a cell with several points; max keeps obstacles, mean is unbiased.",
+        "Height of a cell with several points; max keeps obstacles, mean is unbiased, median "
+        "ignores stray points.",
         choices=CELL_HEIGHTS,
     )
 
@@ -103,6 +104,27 @@ def max_map_cells_parameter(read_only: bool = False) -> int:
         unit="cells",
         bounds=(4, 10**9),
         read_only=read_only,
+    )
+
+
+def imu_frame_parameter() -> str:
+    """Return the field of the parameter imu_frame."""
+    return parameter(
+        "",
+        "Frame of the IMU; empty is that of the body. An IMU with another frame_id is refused, an "
+        "empty one is this.",
+        read_only=True,
+    )
+
+
+def imu_mounting_parameter() -> tuple[float, ...]:
+    """Return the field of the parameter imu_mounting [rad]."""
+    return parameter(
+        (0.0, 0.0, 0.0),
+        "Roll, pitch and yaw of the IMU's axes in the body frame.",
+        unit="rad",
+        bounds=(-6.3, 6.3),
+        read_only=True,
     )
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from rover_physics.names import CONTROL_POLICIES, OPTIMAL, WHEEL_JOINTS
 from rover_planner.parameters.shared import (
     cell_height_parameter,
+    imu_frame_parameter,
+    imu_mounting_parameter,
     input_reliability_parameter,
     map_durability_parameter,
     map_resolution_parameter,
@@ -133,19 +135,8 @@ class TractionControllerParameters(ParameterTable):
         "Frame of the body; odometry of another child frame is refused, an empty one is the body.",
         read_only=True,
     )
-    imu_frame: str = parameter(
-        "",
-        "Frame of the IMU; empty is that of the body. An IMU with another frame_id is refused, an "
-        "empty one is this.",
-        read_only=True,
-    )
-    imu_mounting: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0),
-        "Roll, pitch and yaw of the IMU's axes in the body frame.",
-        unit="rad",
-        bounds=(-6.3, 6.3),
-        read_only=True,
-    )
+    imu_frame: str = imu_frame_parameter()
+    imu_mounting: tuple[float, ...] = imu_mounting_parameter()
     cmd_vel_stamped: bool = parameter(
         True,
         "Whether cmd_vel is a geometry_msgs/TwistStamped; false for a geometry_msgs/Twist.",

@@ -7,6 +7,8 @@ from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_planner.parameters.shared import (
     CONTROL_MARGIN,
     cell_height_parameter,
+    imu_frame_parameter,
+    imu_mounting_parameter,
     input_reliability_parameter,
     map_durability_parameter,
     map_resolution_parameter,
@@ -17,6 +19,10 @@ from rover_planner.parameters.shared import (
     steering_sign_parameter,
 )
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
+from rover_planner.worlds.maps.blind_ground import ALLOW, BLIND_GROUND
+from rover_planner.worlds.maps.living_map import MERGE_RULES, NEWEST
+from rover_planner.worlds.maps.map_keeper import AUTO as AUTO_UPDATES
+from rover_planner.worlds.maps.map_keeper import MAP_UPDATES
 
 MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""
@@ -102,6 +108,79 @@ class TraverseServerParameters(ParameterTable):
     cell_height: str = cell_height_parameter()
     map_durability: str = map_durability_parameter()
     input_reliability: str = input_reliability_parameter()
+    elevation_layer: str = parameter(
+        "elevation", "Layer of heights in a GridMap on elevation_map.", read_only=True
+    )
+    variance_layer: str = parameter(
+        "variance",
+        "Layer of the heights' variances in a GridMap; a map without it has exact heights.",
+        unit="m^2",
+        read_only=True,
+    )
+    friction_layer: str = parameter(
+        "friction",
+        "Layer of Coulomb friction in a GridMap; a map without it has that of friction.",
+        read_only=True,
+    )
+    map_updates: str = parameter(
+        AUTO_UPDATES,
+        "What a received map does to the one that is there: it merges cell by cell (merge), it "
+        "replaces it (replace), or it merges only if a map was loaded from a file (auto).",
+        choices=MAP_UPDATES,
+    )
+    map_merge: str = parameter(
+        NEWEST,
+        "Which of two heights of a cell counts: the newer, or the one of smaller deviation.",
+        choices=MERGE_RULES,
+    )
+    map_ageing: float = parameter(
+        0.0,
+        "Growth of a height's standard deviation with its age, for map_merge surest.",
+        unit="m/s",
+        bounds=(0.0, 10.0),
+    )
+    loaded_std: float = parameter(
+        0.0,
+        "Standard deviation of the heights of a loaded map without elevation_std; 0 is exact.",
+        unit="m",
+        bounds=(0.0, 1e3),
+    )
+    map_window: float = parameter(
+        0.0,
+        "Side of a window around the rover in which maps merge; 0 covers all that was seen.",
+        unit="m",
+        bounds=(0.0, 1e5),
+    )
+    fill_under_rover: bool = parameter(
+        True,
+        "Whether unknown ground under the standing rover is filled from its six contacts, as "
+        "odometry and joint_states measure them.",
+    )
+    footprint_margin: float = parameter(
+        0.0,
+        "Width around the wheels to which ground is also filled where the rover starts.",
+        unit="m",
+        bounds=(0.0, 10.0),
+    )
+    footprint_std: float = parameter(
+        0.02,
+        "Standard deviation of filled heights on a map that has deviations.",
+        unit="m",
+        bounds=(0.0, 10.0),
+    )
+    imu_attitude: bool = parameter(
+        False,
+        "Whether roll and pitch of the standing rover are those of imu instead of odometry.",
+        read_only=True,
+    )
+    imu_frame: str = imu_frame_parameter()
+    imu_mounting: tuple[float, ...] = imu_mounting_parameter()
+    blind_ground: str = parameter(
+        ALLOW,
+        "Paths whose belly passes over ground that was never seen: allow them, over the filled "
+        "start footprint only (allow_footprint), or refuse them.",
+        choices=BLIND_GROUND,
+    )
     unknown_cells: str = parameter(
         REFUSE,
         "Unknown cells: refuse paths over them, or interpolate small gaps.",

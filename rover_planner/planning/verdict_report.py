@@ -88,6 +88,16 @@ class SuspensionReport:
 
 
 @dataclass(frozen=True)
+class GroundReport:
+    """How much of the ground under the belly was never seen along the judged path."""
+
+    blind_share: float
+    """Share of the cells under the belly that were never seen, 0 to 1; with the next one."""
+    footprint_share: float
+    """Share of the cells under the belly that were filled in around the standing rover."""
+
+
+@dataclass(frozen=True)
 class SearchReport:
     """What was tried to find a path to the goal."""
 
@@ -178,6 +188,8 @@ class VerdictReport:
     """Traversability class of the path."""
     suspension: SuspensionReport | None = None
     """Comparison with the measured suspension; None without measured joints."""
+    ground: GroundReport | None = None
+    """Never seen ground under the belly."""
     search: SearchReport | None = None
     """The search for the path; None if the path was given."""
     identity: IdentityReport | None = None

@@ -1,6 +1,8 @@
 """Prepares maps in a thread of their own, so that a node goes on meanwhile."""
 
+import math
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
@@ -21,44 +23,48 @@ Map = TypeVar("Map")
 
 
 class MapIntake(Generic[Map]):
-    """Takes serialised clouds, prepares a map of the latest one, and returns it on request."""
+    """Takes serialised messages, prepares a map of the latest of each type, and returns it."""
 
-    def __init__(self, prepare: Callable[[PointCloud2], Map], refuse: Callable[[str], None]):
+    def __init__(self, prepare: Callable[[Any], Map], refuse: Callable[[str], None]):
         """Start the thread.
 
         Args:
-            prepare: Makes a map of a cloud; called in the thread; may raise INPUT_ERRORS.
-            refuse: Called in the thread with the reason why a cloud cannot be used.
+            prepare: Makes a map of a message; called in the thread; may raise INPUT_ERRORS.
+            refuse: Called in the thread with the reason why a message cannot be used.
         """
         self._prepare, self._refuse = prepare, refuse
         self._changed = threading.Condition()
-        self._last = b""
+        self._last: dict[type, bytes] = {}
+        self._newest: dict[type, int] = {}
         self._jobs: deque[Callable[[], Any]] = deque()
-        self._given, self._done, self._newest_cloud = 0, 0, 0
+        self._given, self._done = 0, 0
         self._ready: Map | None = None
         self._ending = False
         self._thread = threading.Thread(target=self._run, name="maps", daemon=True)
         self._thread.start()
 
-    def offer(self, cloud: bytes) -> bool:
-        """Take a serialised cloud; return False and ignore one with the same bytes as the last.
+    def offer(self, message: bytes, kind: type = PointCloud2) -> bool:
+        """Take a serialised message; return False and ignore one with the same bytes as the last.
 
-        A cloud that still waits is replaced by the new one.
+        A message that still waits is replaced by the new one of its type.
         """
-        if cloud == self._last:
+        if message == self._last.get(kind):
             return False
-        self._last = cloud
-        self._do_latest(cloud)
+        self._last.pop(kind, None)  # the last of all comes last
+        self._last[kind] = message
+        self._do_latest(message, kind)
         return True
 
     def repeat(self) -> None:
-        """Prepare the last cloud again, if there is one, such as with other settings."""
-        if self._last:
-            self._do_latest(self._last)
+        """Prepare the last message again, if there is one, such as with other settings."""
+        taken = list(self._last.items())  # the thread of the maps may forget them meanwhile
+        if taken:
+            kind, message = taken[-1]
+            self._do_latest(message, kind)
 
     def forget(self) -> None:
-        """Forget the last cloud, because another map replaces it."""
-        self._last = b""
+        """Forget the last messages, because another map replaces them."""
+        self._last.clear()
 
     def do(self, job: Callable[[], Any]) -> None:
         """Call a function in the thread after all that was given before."""
@@ -76,11 +82,21 @@ class MapIntake(Generic[Map]):
         """Return a number for `wait`: all that was given until now."""
         return self._given
 
-    def wait(self, ticket: int, check: Callable[[], object]) -> None:
-        """Wait until all that was given before a ticket is done; `check` may raise meanwhile."""
+    def wait(self, ticket: int, check: Callable[[], object], longest: float = math.inf) -> None:
+        """Wait until all that was given before a ticket is done; `check` may raise meanwhile.
+
+        Args:
+            ticket: What `ticket` returned.
+            check: Called every WAIT.
+            longest: Time after which the wait ends whatever is done [s].
+        """
+        end = time.monotonic() + longest
         with self._changed:
             while self._done < ticket and not self._ending:
-                self._changed.wait(WAIT)
+                left = end - time.monotonic()
+                if left <= 0.0:
+                    return
+                self._changed.wait(min(WAIT, left))
                 check()
 
     def close(self) -> None:
@@ -90,9 +106,9 @@ class MapIntake(Generic[Map]):
             self._changed.notify_all()
         self._thread.join(END_TIME)
 
-    def _do_latest(self, cloud: bytes) -> None:
-        self._newest_cloud = self._given + 1
-        self.do(partial(self._prepare_map, cloud, self._newest_cloud))
+    def _do_latest(self, message: bytes, kind: type) -> None:
+        self._newest[kind] = self._given + 1
+        self.do(partial(self._prepare_map, message, kind, self._newest[kind]))
 
     def _run(self) -> None:
         while True:
@@ -110,25 +126,25 @@ class MapIntake(Generic[Map]):
                 self._done += 1
                 self._changed.notify_all()
 
-    def _prepare_map(self, cloud: bytes, number: int) -> None:
-        if number < self._newest_cloud:
+    def _prepare_map(self, message: bytes, kind: type, number: int) -> None:
+        if number < self._newest[kind]:
             return
         try:
-            self._ready = self._prepare(read_cloud(cloud))
+            self._ready = self._prepare(read_message(message, kind))
         except INPUT_ERRORS as error:
             self._refuse(str(error))
 
 
-def read_cloud(cloud: bytes) -> PointCloud2:
-    """Return the message of a serialised cloud.
+def read_message(message: bytes, kind: type) -> Any:
+    """Return the message of a type from its serialised bytes.
 
     Raises:
-        MessageError: The bytes are no PointCloud2.
+        MessageError: The bytes are no such message.
     """
     try:
-        return deserialize_message(cloud, PointCloud2)
+        return deserialize_message(message, kind)
     except Exception as error:  # RMWError, of a module that differs between distributions
         raise MessageError(
-            f"{len(cloud)} bytes were received that are no PointCloud2; the publisher or the "
-            f"connection is damaged: {error}"
+            f"{len(message)} bytes were received that are no {kind.__name__}; the publisher or "
+            f"the connection is damaged: {error}"
         ) from None

@@ -1,4 +1,4 @@
-"""A terrain sensor on the rover's mast, with range, occlusion and noise."""
+"""A terrain sensor on the rover's mast, with range, field of view, occlusion and noise."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
+from rover_planner.parameters.rover_simulator import ALL_AROUND
 
 RAYS = 1440
 """Directions of the occlusion test: every quarter degree."""
@@ -24,14 +25,24 @@ class RangeSensor:
     """Height of the sensor above the body origin [m]."""
     occlusion: bool
     """Whether high ground hides the ground behind it."""
+    field_of_view: float = ALL_AROUND
+    """Angle over which it sees, half of it to each side of the heading [rad]."""
+    least_range: float = 0.0
+    """Distance of the nearest ground that it sees [m]."""
 
-    def look(self, terrain: Terrain, position: Floats, rng: np.random.Generator) -> Terrain:
+    def look(
+        self, terrain: Terrain, position: Floats, rng: np.random.Generator, yaw: float = 0.0
+    ) -> Terrain:
         """Return the terrain around the rover with noise; cells out of sight are unknown.
 
         Args:
             terrain: The true ground.
             position: (3,) body origin [m].
             rng: Random generator of the noise.
+            yaw: Heading [rad].
+
+        Raises:
+            TerrainError: No cell is in sight.
         """
         rows, columns = self._window(terrain, position)
         x0 = terrain.origin[0] + terrain.resolution * columns.start
@@ -41,9 +52,13 @@ class RangeSensor:
         dx = x0 + terrain.resolution * x - position[0]
         dy = y0 + terrain.resolution * y - position[1]
         away = np.hypot(dx, dy)
-        seen = away <= self.reach
+        bearing = np.arctan2(dy, dx)
+        seen = (away <= self.reach) & (away >= self.least_range)
+        if self.field_of_view < ALL_AROUND:
+            aside = np.abs((bearing - yaw + np.pi) % (2.0 * np.pi) - np.pi)
+            seen &= aside <= 0.5 * self.field_of_view
         if self.occlusion:
-            seen &= self._in_sight(terrain, position, heights, away, np.arctan2(dy, dx))
+            seen &= self._in_sight(terrain, position, heights, away, bearing)
         heights[~seen] = np.nan
         if self.noise > 0.0:
             heights += rng.normal(0.0, self.noise, heights.shape)

@@ -79,6 +79,8 @@ def load_simulation_settings(parameters: RoverSimulatorParameters) -> Simulation
             parameters.sensor_noise,
             parameters.sensor_height,
             parameters.sensor_occlusion,
+            parameters.sensor_field_of_view,
+            parameters.sensor_least_range,
         ),
         seed=parameters.seed,
     )
@@ -185,4 +187,5 @@ class Simulation:
     def look(self) -> Terrain:
         """Return the sensor's map of the ground around the rover."""
         position = self.plant.state().position
-        return self.settings.sensor.look(self.settings.terrain, position, self._rng)
+        yaw = float(self.plant.pose()[2])
+        return self.settings.sensor.look(self.settings.terrain, position, self._rng, yaw)

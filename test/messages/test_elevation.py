@@ -219,8 +219,10 @@ def test_irregular_points_fall_on_multiples_of_the_resolution():
     np.testing.assert_array_equal(terrain.elevation, expected)
 
 
-@pytest.mark.parametrize(("cell_height", "expected"), [("max", 4.0), ("mean", 2.0)])
-def test_several_points_in_a_cell_give_their_highest_or_their_mean(cell_height, expected):
+@pytest.mark.parametrize(
+    ("cell_height", "expected"), [("max", 4.0), ("mean", 2.0), ("median", 1.0)]
+)
+def test_several_points_in_a_cell_give_their_highest_mean_or_median(cell_height, expected):
     points = [
         [0.0, 0.0, 1.0],
         [0.01, 0.02, 4.0],
@@ -232,6 +234,20 @@ def test_several_points_in_a_cell_give_their_highest_or_their_mean(cell_height, 
     terrain = terrain_from_point_cloud(cloud_of(points), 0.1, cell_height)
     assert terrain.elevation[0, 0] == expected
     assert terrain.elevation[1, 1] == 0.0
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 60))
+def test_the_median_of_each_cell_is_that_of_its_points(seed, count):
+    rng = np.random.default_rng(seed)
+    points = np.column_stack([rng.uniform(0.0, 0.5, (count, 2)), rng.normal(size=count)])
+    points[:2, :2] = (0.0, 0.0), (0.5, 0.5)
+    terrain = terrain_from_point_cloud(cloud_of(points, kind="<f8"), 0.1, "median")
+    index = np.rint((points[:, :2] - terrain.origin) / 0.1).astype(int)
+    expected = np.full(terrain.elevation.shape, np.nan)
+    for column, row in {tuple(pair) for pair in index.tolist()}:
+        own = (index == (column, row)).all(axis=1)
+        expected[row, column] = np.median(points[own, 2])
+    np.testing.assert_array_equal(terrain.elevation, expected)
 
 
 @pytest.mark.parametrize("shuffled", [False, True])
@@ -369,8 +385,8 @@ def test_an_impossible_resolution_is_refused(resolution):
 
 
 def test_an_unknown_cell_height_is_refused():
-    with pytest.raises(MessageError, match="'median'; it must be one of"):
-        terrain_from_point_cloud(cloud_of(points_of(rough_terrain())), 0.0, "median")
+    with pytest.raises(MessageError, match="'lowest'; it must be one of"):
+        terrain_from_point_cloud(cloud_of(points_of(rough_terrain())), 0.0, "lowest")
 
 
 def test_the_occupancy_grid_tells_known_from_unknown():

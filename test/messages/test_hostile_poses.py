@@ -27,7 +27,7 @@ from msg_adapters.paths import (
 )
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.numerics.quaternions import length_of
-from support.tool_messages import make_target, make_wrench
+from support.messages.tool_messages import make_target, make_wrench
 
 HUGE = (1.1e9, 1e19, 1e154, 1e155, 1e200, 1e300, 1.7e308, math.inf, math.nan)
 

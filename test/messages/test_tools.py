@@ -5,7 +5,7 @@ import pytest
 
 from msg_adapters.errors import MessageError
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-from support.tool_messages import make_target, make_wrench
+from support.messages.tool_messages import make_target, make_wrench
 
 
 def test_a_target_is_its_place():

@@ -19,6 +19,7 @@ SMALL = {
         "RESOLUTIONS": (0.05,),
     },
     "ingestion": {"CELLS": 60},
+    "maps": {"SIZES": (80,), "LOCAL": 20, "SECONDS": 0.5, "PERIOD": 0.1},
     "mujoco": {"POSES": 2, "MANY": 20},
     "parts": {"POSES": 20, "REPEATS": 2},
     "paths": {"REPEATS": 2},

@@ -13,7 +13,11 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.path_report import report_path
-from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
+from rover_planner.planning.verdict_report import (
+    GroundReport,
+    SuspensionReport,
+    VerdictReport,
+)
 from rover_planner.planning.ways.way_search import WayAnswer
 
 
@@ -35,6 +39,8 @@ class Judgement:
     """The search that found the path; None if the path was given."""
     way: WayAnswer | None = None
     """The search around obstacles; None if there was none."""
+    find_ground: Callable[[], GroundReport] | None = None
+    """Finds the share of never seen ground under the belly; None without a judged path."""
     judge_rest: Callable[[], "Judgement"] | None = None
     """Judges the waypoints beyond the first failure and returns the judgement with them; None if
     they are judged."""
@@ -83,7 +89,8 @@ class Judgement:
         if self.candidate is None:
             return VerdictReport(False, self.code, self.reason)
         report = report_path(self.candidate, self.classes, self.suspension, self.search)
-        return replace(report, code=self.code, reason=self.reason)
+        ground = None if self.find_ground is None else self.find_ground()
+        return replace(report, code=self.code, reason=self.reason, ground=ground)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

@@ -1,8 +1,11 @@
 """The map that a traverse server knows: its terrain, where it comes from, and its age."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from rover_physics.terrain.grid import Terrain
+from rover_planner.worlds.maps.blind_ground import SeenGround, seen_ground
+from rover_planner.worlds.maps.sources import CellSources
 
 NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second."""
@@ -25,6 +28,15 @@ class KnownMap:
 
     fingerprint: str
     """The content of the received map, see `rover_physics.terrain.fingerprint`."""
+    cells: CellSources | None = None
+    """Source and time of each cell; None: all known cells are from `source`."""
+    frame: str = ""
+    """Frame of the map; empty if it has none."""
+
+    @cached_property
+    def seen(self) -> SeenGround:
+        """What was seen of the map; interpolated gaps were not. Computed on first use."""
+        return seen_ground(self.received, self.cells)
 
     def age(self, ros_time: int, steady_time: float) -> float:
         """Return the age [s]: the longer of the times since its stamp and since its arrival.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import SUSPENSION_JOINTS
+from rover_planner.worlds.maps.ground_beneath import Standing
 
 MAX_AGE = 1.0
 """Age up to which a measurement counts as one of now [s]."""
@@ -19,6 +20,9 @@ class Measurements:
         self._times: dict[str, float] = {}
         self._pose: NDArray[np.float64] | None = None
         self._pose_time = -np.inf
+        self._body: tuple[float, float, float] | None = None
+        self._tilt: tuple[float, float] | None = None
+        self._tilt_time = -np.inf
 
     @property
     def joints(self) -> dict[str, float]:
@@ -30,9 +34,38 @@ class Measurements:
         self._joints.update(positions)
         self._times.update(dict.fromkeys(positions, now))
 
-    def take_pose(self, pose: NDArray[np.float64], now: float) -> None:
-        """Keep the pose (3,) x, y [m], yaw [rad], measured at time `now` [s]."""
-        self._pose, self._pose_time = pose, now
+    def take_pose(
+        self,
+        pose: NDArray[np.float64],
+        now: float,
+        body: tuple[float, float, float] | None = None,
+    ) -> None:
+        """Keep the pose (3,) x, y [m], yaw [rad], measured at time `now` [s].
+
+        `body` is z [m], roll and pitch [rad] of the body at the same time; None: not measured.
+        """
+        self._pose, self._pose_time, self._body = pose, now, body
+
+    def take_tilt(self, roll: float, pitch: float, now: float) -> None:
+        """Keep roll and pitch [rad] of an IMU, measured at time `now` [s]."""
+        self._tilt, self._tilt_time = (roll, pitch), now
+
+    def standing(self, now: float) -> Standing | None:
+        """Return pose and suspension if all of them are not older than MAX_AGE, else None.
+
+        Roll and pitch are those of the IMU if there ever was one, else those of the pose.
+        """
+        times = [self._times.get(name, -np.inf) for name in SUSPENSION_JOINTS]
+        pose, body = self._pose, self._body
+        if pose is None or body is None or now - min(*times, self._pose_time) > MAX_AGE:
+            return None
+        if self._tilt is not None:
+            if now - self._tilt_time > MAX_AGE:
+                return None
+            body = body[0], *self._tilt
+        suspension = {name: self._joints[name] for name in SUSPENSION_JOINTS}
+        x, y, yaw = pose.tolist()
+        return Standing(x, y, *body, yaw, suspension)
 
     def pose_with_suspension(self, now: float) -> NDArray[np.float64] | None:
         """Return the pose (3,) if it and the suspension's angles are not older than MAX_AGE."""

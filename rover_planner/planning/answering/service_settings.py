@@ -12,6 +12,9 @@ from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServer
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.worlds.map_file import MapLimits
+from rover_planner.worlds.maps.blind_ground import ALLOW
+from rover_planner.worlds.maps.living_map import MergeRules
+from rover_planner.worlds.maps.map_keeper import KeeperSettings
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,8 @@ class ServiceSettings:
     """How ways around obstacles are searched."""
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
+    blind_ground: str = ALLOW
+    """What paths over never seen ground under the belly are, one of BLIND_GROUND."""
 
     @property
     def manipulator_joints(self) -> tuple[str, ...]:
@@ -43,6 +48,24 @@ class ServiceSettings:
 def map_limits(parameters: TraverseServerParameters) -> MapLimits:
     """Return what clients may load as a map."""
     return MapLimits(parameters.map_folder, parameters.max_map_bytes, parameters.max_map_cells)
+
+
+def keeper_settings(parameters: TraverseServerParameters) -> KeeperSettings:
+    """Return how maps are kept and merged."""
+    rules = MergeRules(
+        parameters.map_merge,
+        parameters.map_ageing,
+        parameters.loaded_std,
+        parameters.map_window,
+        parameters.max_map_cells,
+    )
+    return KeeperSettings(
+        parameters.map_updates,
+        rules,
+        parameters.fill_under_rover,
+        parameters.footprint_margin,
+        parameters.footprint_std,
+    )
 
 
 def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettings:
@@ -83,4 +106,5 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             frontier=parameters.search_frontier,
         ),
         max_map_age=parameters.max_map_age,
+        blind_ground=parameters.blind_ground,
     )

@@ -12,6 +12,7 @@ from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import FAN, LATTICE
+from rover_planner.planning.answering.blind_check import BlindCheck, physical
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.search_watch import SearchWatch
@@ -25,6 +26,7 @@ from rover_planner.planning.verdict_report import SuspensionReport
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import GOAL_REFUSED, START_REFUSED, find_way
+from rover_planner.worlds.maps.blind_ground import CODE as BLIND
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 
@@ -99,9 +101,12 @@ class Situation:
         planner = self._planner()
         search = planner.search(*ends, tolerance)
         suspension = self._compare_suspension(planner.predict_standing)
-        judged = _judgement(planner, search.answer.chosen, suspension, search)
+        search = self._blind.choose(search)
+        judged = _judgement(planner, search.answer.chosen, self._blind, suspension, search)
         are_on_map = all(planner.terrain.contains(*end[:2]) for end in ends)
-        if judged.traversable or self.settings.planner == FAN or not are_on_map:
+        starts_blind = judged.code == BLIND and search.answer.chosen.verdict.first_failure == 0
+        is_final = judged.traversable or starts_blind or not are_on_map
+        if is_final or self.settings.planner == FAN:
             return judged
         return self._search_way(ends, judged)
 
@@ -119,9 +124,10 @@ class Situation:
         answer = find_way(question, self.settings.lattice, self.edge_memory, self._look)
         if answer.path is not None:
             candidates = None if refused is None else refused.search
-            search = add_way(candidates, answer.path, ends[1])
+            way = self._blind.hold(answer.path)
+            search = add_way(candidates, way, ends[1])
             suspension = self._compare_suspension(planner.predict_standing)
-            return replace(_judgement(planner, answer.path, suspension, search), way=answer)
+            return replace(_judgement(planner, way, self._blind, suspension, search), way=answer)
         if answer.outcome in (START_REFUSED, GOAL_REFUSED) and refused is not None:
             return refused
         why = "; ".join(filter(None, (answer.reason, answer.warning)))
@@ -148,8 +154,9 @@ class Situation:
         assert self.path.poses is not None
         planner = self._planner()
         poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
-        candidate = planner.check(poses)
-        return _judgement(planner, candidate, self._compare_suspension(planner.predict_standing))
+        candidate = self._blind.hold(planner.check(poses))
+        suspension = self._compare_suspension(planner.predict_standing)
+        return _judgement(planner, candidate, self._blind, suspension)
 
     def refuse_if_missing(self) -> Judgement | None:
         """Return a refusal if there is no path or no map to use, else None."""
@@ -165,6 +172,12 @@ class Situation:
                 "no map was received yet; publish one on elevation_cloud or call ~/load_map",
             )
         return refusal("stale_map", self.stale_map) if self.stale_map else None
+
+    @property
+    def _blind(self) -> BlindCheck:
+        """Holds paths against what was seen of the map."""
+        assert self.known_map is not None
+        return BlindCheck(self.settings.rover, self.known_map.seen, self.settings.blind_ground)
 
     def _planner(self) -> PathPlanner:
         """Return a planner for the map, the settings and the measured arm angles."""
@@ -193,20 +206,22 @@ class Situation:
 def _judgement(
     planner: PathPlanner,
     candidate: Candidate,
+    blind: BlindCheck,
     suspension: SuspensionReport | None,
     search: PathSearch | None = None,
 ) -> Judgement:
     """Return the judgement of a judged path; classes and the rest of it follow on demand."""
 
     def judge_rest() -> Judgement:
-        return _judgement(planner, planner.check(candidate.poses), suspension, search)
+        return _judgement(planner, planner.check(candidate.poses), blind, suspension, search)
 
     return Judgement(
         candidate.verdict.code,
         candidate.verdict.reason,
         candidate,
-        partial(planner.classify, candidate),
+        partial(planner.classify, physical(candidate)),
         suspension,
         search,
+        find_ground=partial(blind.report, candidate),
         judge_rest=None if candidate.is_complete else judge_rest,
     )

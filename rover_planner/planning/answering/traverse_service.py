@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.bounds.path import forget_terrains
+from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
@@ -20,6 +20,8 @@ from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.situation import GivenPath, Situation
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.worlds.maps.ground_beneath import Standing
+from rover_planner.worlds.maps.sources import CellSources
 
 
 class TraverseService:
@@ -77,15 +79,25 @@ class TraverseService:
         """Names of the joints whose angles are used: those of suspension and manipulator."""
         return SUSPENSION_JOINTS + self._settings.manipulator_joints
 
-    def take_terrain(self, terrain: Terrain, source: str = "", stamp: int | None = None) -> bool:
+    def take_terrain(
+        self,
+        terrain: Terrain,
+        source: str = "",
+        stamp: int | None = None,
+        cells: CellSources | None = None,
+        frame: str = "",
+    ) -> bool:
         """Keep a map until the next one; return whether its content is new.
 
         Args:
             terrain: The map.
             source: Topic or file it comes from.
             stamp: Stamp of its header [ns, ROS time]; None if it has none.
+            cells: Where its cells come from; None if that is `source` for all.
+            frame: Frame of the map; empty if it has none.
         """
-        return self._keep_map(terrain, source, stamp, time.monotonic())
+        about = KnownMap(terrain, terrain, source, stamp, time.monotonic(), "", cells, frame)
+        return self._keep_map(about)
 
     def renew_map(self) -> None:
         """Note that the present map has arrived once more."""
@@ -97,7 +109,7 @@ class TraverseService:
         """Interpolate the gaps of the received map again, with the present settings."""
         known = self._map
         if known is not None:
-            self._keep_map(known.received, known.source, known.stamp, known.arrival)
+            self._keep_map(known)
 
     def take_path(self, poses: NDArray[np.float64], path_hash: str = "", stamp: str = "") -> None:
         """Keep a path for `check_last_path`.
@@ -117,9 +129,22 @@ class TraverseService:
         """Keep measured joint angles [rad] by name; angles of other joints stay."""
         self._measurements.take_joints(positions, time.monotonic())
 
-    def take_pose(self, pose: NDArray[np.float64]) -> None:
-        """Keep the measured pose (3,) x, y [m], yaw [rad] of the body, map frame."""
-        self._measurements.take_pose(pose, time.monotonic())
+    def take_pose(
+        self, pose: NDArray[np.float64], body: tuple[float, float, float] | None = None
+    ) -> None:
+        """Keep the measured pose (3,) x, y [m], yaw [rad] of the body, map frame.
+
+        `body` is its z [m], roll and pitch [rad]; None: not measured.
+        """
+        self._measurements.take_pose(pose, time.monotonic(), body)
+
+    def take_tilt(self, roll: float, pitch: float) -> None:
+        """Keep roll and pitch [rad] of the body, measured by an IMU."""
+        self._measurements.take_tilt(roll, pitch, time.monotonic())
+
+    def standing(self) -> Standing | None:
+        """Return pose and suspension of the rover if they were measured just now, else None."""
+        return self._measurements.standing(time.monotonic())
 
     def situation(self, ros_time: int | None = None) -> Situation:
         """Return all that is known now.
@@ -160,14 +185,18 @@ class TraverseService:
         """Judge the last path that was received; see `Situation.check_path`."""
         return self.situation().check_path()
 
-    def _keep_map(self, received: Terrain, source: str, stamp: int | None, arrival: float) -> bool:
-        """Keep a map; return whether its content is new."""
+    def _keep_map(self, about: KnownMap) -> bool:
+        """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.
+
+        Everything that takes time is done here, so that the first question about it is fast.
+        """
         with self._map_lock:
-            gap = self._settings.largest_gap
+            received, gap = about.received, self._settings.largest_gap
             terrain = received.fill_gaps(gap) if gap > 0.0 else received
             forget_terrains()
-            pack_ground(terrain)  # now, so that the first query is fast
+            pack_ground(terrain)
+            prepare_bounds(terrain, self._settings.query.map_sigmas)
             before = self._map
             content = fingerprint(received)
-            self._map = KnownMap(received, terrain, source, stamp, arrival, content)
+            self._map = replace(about, terrain=terrain, fingerprint=content)
             return before is None or before.fingerprint != content

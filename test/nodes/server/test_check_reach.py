@@ -11,8 +11,8 @@ from std_srvs.srv import Trigger
 from rover_physics.traversability.reach import judge_reach
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain
+from support.messages.tool_messages import make_target, make_wrench
 from support.ros_fixtures import call, wait_until
-from support.tool_messages import make_target, make_wrench
 
 SERVER = "/traverse_server"
 PATH = [[-1.0, 0.0, 0.0], [0.0, 0.0, 0.5]]

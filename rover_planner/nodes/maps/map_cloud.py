@@ -1,0 +1,58 @@
+"""The topic ~/map of a traverse server: its map, with source and age of each cell."""
+
+import contextlib
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import numpy as np
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.stamps import NANOSECONDS
+from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.ros.qos import map_qos
+
+TOPIC = "~/map"
+
+
+class MapCloud:
+    """Publishes the map of a service while someone subscribes; clouds are made in a thread."""
+
+    def __init__(self, node: Node, service: TraverseService, frame: str):
+        """Create the publisher; `frame` is that of maps without one."""
+        self._node, self._service, self._frame = node, service, frame
+        self._publisher = node.create_publisher(PointCloud2, TOPIC, map_qos())
+        self._shown: KnownMap | None = None
+        self._pool = ThreadPoolExecutor(1, "map_cloud")
+        self._work: Future[None] | None = None
+
+    def update(self) -> None:
+        """Publish the map if it is new and someone subscribes; call it about once a second."""
+        known = self._service.known_map
+        is_new = known is not None and known.fingerprint != getattr(
+            self._shown, "fingerprint", None
+        )
+        is_free = self._work is None or self._work.done()
+        if known is not None and is_new and is_free and self._publisher.get_subscription_count():
+            self._shown = known
+            self._work = self._pool.submit(self._publish, known)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._pool.shutdown(cancel_futures=True)
+
+    def _publish(self, known: KnownMap) -> None:
+        now = self._node.get_clock().now()
+        more: dict[str, np.ndarray] = {}
+        if known.cells is not None:
+            age = now.nanoseconds / NANOSECONDS - known.cells.time
+            more = {
+                "source": known.cells.source,
+                "age": np.where(np.isfinite(known.received.elevation), age, np.nan),
+            }
+        frame = known.frame or self._frame
+        cloud = terrain_to_point_cloud(known.received, frame, now.to_msg(), more=more)
+        with contextlib.suppress(InvalidHandle):  # the node has ended meanwhile
+            self._publisher.publish(cloud)

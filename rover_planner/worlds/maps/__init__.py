@@ -1,0 +1,1 @@
+"""A map that lives: loaded and local maps merged cell by cell, and the ground under the rover."""

@@ -1,0 +1,130 @@
+"""Ground under the belly that was never seen: its share of a path, and where it is met first."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.worlds.maps.sources import FOOTPRINT, CellSources
+
+ALLOW, ALLOW_FOOTPRINT, REFUSE = "allow", "allow_footprint", "refuse"
+BLIND_GROUND = (ALLOW, ALLOW_FOOTPRINT, REFUSE)
+"""Values of the parameter blind_ground: paths whose belly passes over ground that was never seen
+are allowed, allowed over the start footprint only, or refused."""
+CODE = "blind_ground"
+"""Code of the refusal."""
+SEEN, ASSUMED, UNSEEN = range(3)
+"""What is known of a cell: measured, filled in as part of the start footprint, or nothing."""
+CHUNK = 500_000
+"""Points that are looked up at once."""
+
+
+@dataclass(frozen=True)
+class BlindShare:
+    """Ground under the belly along a path."""
+
+    blind_share: float
+    """Share of the cells under the belly that were never seen, 0 to 1."""
+    footprint_share: float
+    """Share of the cells under the belly that were filled in as start footprint."""
+    first: int
+    """First waypoint whose belly is over blind ground, -1 if none."""
+    first_beyond_footprint: int
+    """The same without the start footprint."""
+
+    def first_refused(self, rule: str) -> int:
+        """Return the first waypoint that a rule of BLIND_GROUND refuses, -1 if none."""
+        if rule == ALLOW:
+            return -1
+        return self.first if rule == REFUSE else self.first_beyond_footprint
+
+
+@dataclass(frozen=True, eq=False)
+class SeenGround:
+    """What was seen of a map."""
+
+    terrain: Terrain
+    """The map, of which the cells count."""
+    kinds: NDArray[np.uint8]
+    """(ny, nx) SEEN, ASSUMED or UNSEEN."""
+
+    def share(self, rover: Rover, poses: NDArray[np.float64]) -> BlindShare:
+        """Return the blind share under the belly of a rover along poses (n, 3).
+
+        The belly is the rectangle of the rover file, seen from above; ground off the map is
+        UNSEEN.
+        """
+        ny, nx = self.kinds.shape
+        swept = np.zeros((ny, nx), bool)
+        off_map, first, beyond = 0, -1, -1
+        poses, waypoints = self._spread_out(rover, poses)
+        for start, rows, columns in self._cells_below(rover, poses):
+            on_map = (rows >= 0) & (rows < ny) & (columns >= 0) & (columns < nx)
+            i, j = np.clip(rows, 0, ny - 1), np.clip(columns, 0, nx - 1)
+            kinds = np.where(on_map, self.kinds[i, j], UNSEEN)
+            swept[i[on_map], j[on_map]] = True
+            outside = np.column_stack([rows[~on_map], columns[~on_map]])
+            off_map += len(np.unique(outside, axis=0))
+            if first < 0:
+                first = _first(start, kinds != SEEN)
+            if beyond < 0:
+                beyond = _first(start, kinds == UNSEEN)
+        counts = np.bincount(self.kinds[swept], minlength=3)
+        total = max(int(counts.sum()) + off_map, 1)
+        assumed, unseen = int(counts[ASSUMED]), int(counts[UNSEEN]) + off_map
+        first, beyond = (-1 if k < 0 else int(waypoints[k]) for k in (first, beyond))
+        return BlindShare((assumed + unseen) / total, assumed / total, first, beyond)
+
+    def _spread_out(
+        self, rover: Rover, poses: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Return the poses at which the belly has moved on by a cell, and their indices."""
+        half = max(np.hypot(x, y) for x in rover.belly.x for y in rover.belly.y)
+        steps = np.diff(poses, axis=0)
+        turns = np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*steps[:, :2].T) + half * turns)])
+        cells = np.floor(way / self.terrain.resolution)
+        kept = np.concatenate([[True], np.diff(cells) > 0])
+        kept[-1] = True
+        return poses[kept], np.flatnonzero(kept)
+
+    def _cells_below(
+        self, rover: Rover, poses: NDArray[np.float64]
+    ) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.intp]]]:
+        """Yield first pose, and rows and columns (k, m) of the cells below the belly there."""
+        terrain, belly = self.terrain, rover.belly
+        step = 0.7 * terrain.resolution  # no cell is narrower than that across its diagonal
+        along, across = (
+            np.linspace(low, high, max(2, int(np.ceil((high - low) / step)) + 1))
+            for low, high in (belly.x, belly.y)
+        )
+        u, v = (axis.ravel() for axis in np.meshgrid(along, across))
+        count = max(1, CHUNK // len(u))
+        for start in range(0, len(poses), count):
+            x, y, yaw = poses[start : start + count, :, None].transpose(1, 0, 2)
+            c, s = np.cos(yaw), np.sin(yaw)
+            columns = (x + c * u - s * v - terrain.origin[0]) / terrain.resolution
+            rows = (y + s * u + c * v - terrain.origin[1]) / terrain.resolution
+            yield start, np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
+
+
+def _first(start: int, blind: NDArray[np.bool_]) -> int:
+    """Return start plus the first row (k, m) with a True, -1 if there is none."""
+    found = np.flatnonzero(blind.any(axis=1))
+    return start + int(found[0]) if len(found) else -1
+
+
+def seen_ground(received: Terrain, sources: CellSources | None) -> SeenGround:
+    """Return what was seen of a map.
+
+    Args:
+        received: The map without interpolated gaps.
+        sources: Where its cells come from; None: every known cell was seen.
+    """
+    kinds = np.where(np.isnan(received.elevation), UNSEEN, SEEN).astype(np.uint8)
+    if sources is not None:
+        kinds[(sources.source == FOOTPRINT) & (kinds == SEEN)] = ASSUMED
+    return SeenGround(received, kinds)

@@ -1,0 +1,175 @@
+"""The ground under a standing rover: six contacts from measured angles, and the surface between.
+
+A front camera never sees where the rover stands, but the rover does: where the attitude, the
+suspension and the place of the body are measured, so are the six points on which its wheels stand.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.prediction.evaluation import new_work
+from rover_physics.rover.linkage import pack_linkage, place
+from rover_physics.rover.manipulator import body_mass_and_com
+from rover_physics.rover.model import Rover
+from rover_planner.worlds.maps.cells import CellBox, CellGrid, Patch
+
+CONTACT_REACH = 0.25
+"""Distance along a wheel's plane from its contact up to which the ground is measured [radii]."""
+EDGE_CELLS = 1.5
+"""Width beyond the wheels' outline that interpolation between cells needs [cells]."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Measured pose and suspension of a rover that stands or creeps."""
+
+    x: float
+    """Body origin, map frame [m]."""
+    y: float
+    """[m]"""
+    z: float
+    """[m]"""
+    roll: float
+    """[rad]"""
+    pitch: float
+    """[rad]"""
+    yaw: float
+    """[rad]"""
+    suspension: Mapping[str, float]
+    """Angles [rad] of all SUSPENSION_JOINTS by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundBeneath:
+    """The ground under a rover, from the contacts of its wheels.
+
+    Between the contacts of a side the surface is linear along the rover, between the sides it is
+    linear across. Beyond the wheels it goes on with the mean slope of each side.
+    """
+
+    pose: tuple[float, float, float]
+    """x, y [m] and yaw [rad] of the body, map frame."""
+    contacts: Floats
+    """(6, 3) points on which the wheels stand [m], map frame."""
+    outline: tuple[float, float, float, float]
+    """Smallest and largest x and y of the wheels seen from above [m], body axes turned by yaw."""
+    half_width: float
+    """Half of a wheel's width [m]."""
+    reach: float
+    """Distance along the wheel from its contact up to which the ground is measured [m]."""
+
+    def patch(self, grid: CellGrid, margin: float, std: float) -> tuple[Patch, NDArray[np.bool_]]:
+        """Return the ground on the cells of a grid, and True for the cells where wheels stand.
+
+        Heights are NaN beyond the outline.
+
+        Args:
+            grid: The cells.
+            margin: Width around the wheels' outline to which the ground is continued [m].
+            std: Standard deviation of the heights [m].
+        """
+        beyond = margin + EDGE_CELLS * grid.resolution
+        x0, x1, y0, y1 = self.outline
+        corners_x = np.array([x0 - beyond, x1 + beyond, x0 - beyond, x1 + beyond])
+        corners_y = np.array([y0 - beyond, y0 - beyond, y1 + beyond, y1 + beyond])
+        c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
+        column, row = grid.coordinates(
+            self.pose[0] + c * corners_x - s * corners_y,
+            self.pose[1] + s * corners_x + c * corners_y,
+        )
+        low_row, low_column = int(np.floor(row.min())), int(np.floor(column.min()))
+        box = CellBox(
+            low_row,
+            low_column,
+            int(np.ceil(row.max())) - low_row + 1,
+            int(np.ceil(column.max())) - low_column + 1,
+        )
+        x = grid.anchor[0] + grid.resolution * (low_column + np.arange(box.columns, dtype=float))
+        y = grid.anchor[1] + grid.resolution * (low_row + np.arange(box.rows, dtype=float))
+        along, across = self._to_body(x[None, :], y[:, None])
+        inside = (along >= x0 - beyond) & (along <= x1 + beyond)
+        inside &= (across >= y0 - beyond) & (across <= y1 + beyond)
+        heights = np.where(inside, self._height(along, across), np.nan)
+        is_contact = inside & self._is_contact(along, across)
+        layers = {"elevation": heights, "elevation_std": np.where(inside, std, np.nan)}
+        return Patch(box, layers), is_contact
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the heights of the surface [m] at points [m], map frame."""
+        return self._height(*self._to_body(np.asarray(x, float), np.asarray(y, float)))
+
+    def _to_body(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        dx, dy = x - self.pose[0], y - self.pose[1]
+        c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
+        return c * dx + s * dy, c * dy - s * dx
+
+    def _height(self, along: Floats, across: Floats) -> Floats:
+        sides = []
+        for side in (slice(0, 3), slice(3, 6)):
+            ahead, aside = self._to_body(self.contacts[side, 0], self.contacts[side, 1])
+            z = self.contacts[side, 2]
+            slope = (z[2] - z[0]) / (ahead[2] - ahead[0])
+            beyond = np.minimum(along - ahead[0], 0.0) + np.maximum(along - ahead[2], 0.0)
+            sides.append((np.interp(along, ahead, z) + slope * beyond, aside.mean()))
+        (right, y_right), (left, y_left) = sides
+        heights: Floats = right + (left - right) * (across - y_right) / (y_left - y_right)
+        return heights
+
+    def _is_contact(self, along: Floats, across: Floats) -> NDArray[np.bool_]:
+        ahead, aside = self._to_body(self.contacts[:, 0], self.contacts[:, 1])
+        near = np.zeros(np.broadcast_shapes(along.shape, across.shape), bool)
+        for x, y in zip(ahead, aside, strict=True):
+            near |= (np.abs(along - x) <= self.reach) & (np.abs(across - y) <= self.half_width)
+        return near
+
+
+def find_ground_beneath(rover: Rover, standing: Standing) -> GroundBeneath:
+    """Find the ground under a rover from its measured pose and suspension.
+
+    Each wheel is taken to touch ground of the slope of the plane through the wheels' centres; its
+    steering angle is neglected.
+
+    Args:
+        rover: The rover.
+        standing: What was measured.
+    """
+    work = new_work()
+    angles = [standing.suspension[name] for name in SUSPENSION_JOINTS]
+    # The differential mirrors the rockers; the mean of both measurements is used.
+    rocker = 0.5 * (angles[0] - angles[1])
+    q = np.array([standing.z, standing.roll, standing.pitch, rocker, angles[2], angles[3]])
+    pose = np.array([standing.x, standing.y, standing.yaw])
+    placement = work.placement
+    place(pack_linkage(rover, *body_mass_and_com(rover)), pose, q, placement)
+    centres = np.array(placement.centres)
+    normal = _normal_of(centres)
+    axle = np.array(placement.R)[:, 1]
+    down = normal - (normal @ axle) * axle
+    contacts = centres - rover.wheel.radius * down / np.linalg.norm(down)
+    x, y = centres[:, 0] - standing.x, centres[:, 1] - standing.y
+    c, s = np.cos(standing.yaw), np.sin(standing.yaw)
+    along, across = c * x + s * y, c * y - s * x
+    half = 0.5 * rover.wheel.width
+    radius = rover.wheel.radius
+    outline = (
+        float(along.min() - radius),
+        float(along.max() + radius),
+        float(across.min() - half),
+        float(across.max() + half),
+    )
+    place_of = standing.x, standing.y, standing.yaw
+    return GroundBeneath(place_of, contacts, outline, half, CONTACT_REACH * radius)
+
+
+def _normal_of(points: Floats) -> Floats:
+    """Return the upward normal (3,) of the plane that fits points (n, 3) best."""
+    middle = points.mean(axis=0)
+    slopes = np.linalg.lstsq(points[:, :2] - middle[:2], points[:, 2] - middle[2], rcond=None)[0]
+    normal = np.array([-slopes[0], -slopes[1], 1.0])
+    return normal / np.linalg.norm(normal)

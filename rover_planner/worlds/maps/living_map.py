@@ -1,0 +1,324 @@
+"""A map that lives: local maps merge into a loaded one cell by cell, in a window.
+
+The window grows with what is seen, or rolls with the rover. Heights that a newer map does not have
+stay. Each cell knows its source and its time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rover_physics.numerics.read_only import seal_array
+from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
+from rover_planner.errors import PlanningError
+from rover_planner.worlds.maps.cells import CellBox, CellGrid, Layer, Patch, grid_of, lay_onto
+from rover_planner.worlds.maps.layers import Window, empty_window
+from rover_planner.worlds.maps.sources import (
+    CONTACT,
+    FIRST_NAMES,
+    FOOTPRINT,
+    LOADED,
+    UNKNOWN,
+    CellSources,
+)
+
+NEWEST, SUREST = "newest", "surest"
+MERGE_RULES = (NEWEST, SUREST)
+"""Which of two heights of a cell counts: the newer one, or the one with the smaller deviation."""
+GROWTH = 32
+"""Cells by which a window grows at least, so that it does not grow with each map."""
+ROLL = 8
+"""A window of n cells rolls when the rover is n / ROLL cells from its middle."""
+NEAR = 8
+"""A rover is far from a map if a window around both has more than NEAR times their cells."""
+FINER = 0.75
+"""Relative cell size from which a first local map replaces the cells of a loaded map."""
+
+
+@dataclass(frozen=True)
+class MergeRules:
+    """How maps merge."""
+
+    rule: str = NEWEST
+    """One of MERGE_RULES."""
+    ageing: float = 0.0
+    """Growth of a height's standard deviation with its age [m/s]; for SUREST."""
+    loaded_std: float = 0.0
+    """Standard deviation of the heights of a loaded map that has none [m]; 0 is exact."""
+    window: float = 0.0
+    """Side of the window around the rover [m]; 0 covers the loaded map and all local ones."""
+    max_cells: int = MAX_CELLS
+    """Largest window [cells]."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapSnapshot:
+    """A living map at one time."""
+
+    terrain: Terrain
+    """The ground."""
+    sources: CellSources
+    """Source and time of its cells."""
+
+
+class LivingMap:
+    """Merges maps; each change makes new arrays, so earlier snapshots stay as they are."""
+
+    def __init__(self, rules: MergeRules | None = None):
+        self.rules = rules or MergeRules()
+        """How maps merge from now on."""
+        self._names = list(FIRST_NAMES)
+        self._last: dict[str, float] = {}
+        self._loaded: Terrain | None = None
+        self._loaded_time = 0.0
+        self._grid: CellGrid | None = None
+        self._window: Window | None = None
+        self._whole: Terrain | None = None
+
+    @property
+    def has_loaded(self) -> bool:
+        """Whether there is a loaded map."""
+        return self._loaded is not None
+
+    @property
+    def has_cells(self) -> bool:
+        """Whether there is any map."""
+        return self._window is not None
+
+    def load(self, terrain: Terrain, time: float) -> None:
+        """Start over with a loaded map; time [s] is that of its loading."""
+        self._clear(terrain)
+        self._loaded, self._loaded_time = terrain, time
+        patch = lay_onto(terrain, grid_of(terrain))
+        self._window = self._with_loaded(empty_window(patch.box))
+        self._whole = terrain if self._std_to_add() == 0.0 else None
+
+    def replace(self, terrain: Terrain, source: str, time: float) -> None:
+        """Start over with a local map alone."""
+        self._clear(terrain)
+        patch = lay_onto(terrain, grid_of(terrain))
+        take = np.isfinite(terrain.elevation)
+        window = empty_window(patch.box)
+        self._window = window.written(patch, take, self._index_of(source), time)
+        self._whole = terrain
+
+    def merge(
+        self,
+        terrain: Terrain,
+        source: str,
+        time: float,
+        centre: tuple[float, float] | None = None,
+    ) -> None:
+        """Merge a local map.
+
+        Args:
+            terrain: The map, in the frame of the others.
+            source: Its topic.
+            time: Its stamp [s]. A source whose stamps go back has a new clock, and no cell counts
+                as newer than it then.
+            centre: Place x, y [m] of the rover, for a rolling window; None: the middle of the map.
+
+        Raises:
+            PlanningError: The window would be too large.
+        """
+        self._choose_grid(terrain)
+        assert self._grid is not None
+        patch = lay_onto(terrain, self._grid)
+        if centre is None:
+            x0, x1, y0, y1 = terrain.bounds
+            centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        window = self._room_for(patch.box, centre)
+        if time < self._last.get(source, time):
+            layers = window.layers | {"time": np.minimum(window.layers["time"], time)}
+            window = Window(window.box, layers)
+        self._last[source] = time
+        take = self._wins(window, patch, time)
+        self._window = window.written(patch, take, self._index_of(source), time)
+        self._whole = None
+
+    def fill(self, patch: Patch, is_contact: Layer, time: float) -> bool:
+        """Fill cells under the rover; return whether any changed.
+
+        Unknown cells take the heights of the patch. Cells that were only assumed give way to
+        contacts.
+
+        Args:
+            patch: Heights on `grid`, NaN where nothing is to be filled. A layer elevation_std
+                is used if the map has one.
+            is_contact: (rows, columns) of the patch: True where a wheel stands.
+            time: Time of the measurement [s].
+        """
+        if self._window is None:
+            return False
+        if not self._is_near(patch.box):
+            return False
+        window = self._room_for(patch.box, self._centre_of(patch.box))
+        to, own = patch.box.within(window.box), window.box.within(patch.box)
+        known = np.isfinite(patch.layers["elevation"][own])
+        old, contact = window.layers["source"][to], is_contact[own]
+        beneath = known & contact & ((old == UNKNOWN) | (old == FOOTPRINT))
+        around = known & ~contact & (old == UNKNOWN)
+        if not (beneath.any() or around.any()):
+            return False
+        if "elevation_std" not in window.layers:
+            layers = {k: v for k, v in patch.layers.items() if k != "elevation_std"}
+            patch = Patch(patch.box, layers)
+        for take, source in ((beneath, CONTACT), (around, FOOTPRINT)):
+            window = window.written(patch, take, source, time)
+        self._window, self._whole = window, None
+        return True
+
+    @property
+    def grid(self) -> CellGrid | None:
+        """The cells; None before the first map."""
+        return self._grid
+
+    def snapshot(self) -> MapSnapshot | None:
+        """Return the map as it is now; None before the first one.
+
+        Raises:
+            TerrainError: No cell of the window is known.
+        """
+        if self._window is None or self._grid is None:
+            return None
+        box, layers = self._window.box, self._window.layers
+        for layer in layers.values():
+            seal_array(layer)
+        if self._whole is None:
+            x, y = self._grid.anchor
+            step = self._grid.resolution
+            soils = () if self._loaded is None else self._loaded.soil_names
+            self._whole = Terrain(
+                layers["elevation"],
+                step,
+                (x + step * box.column, y + step * box.row),
+                layers.get("friction"),
+                layers.get("soil"),
+                soils if "soil" in layers else (),
+                layers.get("elevation_std"),
+            )
+        sources = CellSources(layers["source"], layers["time"], tuple(self._names))
+        return MapSnapshot(self._whole, sources)
+
+    def _clear(self, terrain: Terrain) -> None:
+        self._last.clear()
+        self._loaded, self._window, self._whole = None, None, None
+        self._grid = grid_of(terrain)
+
+    def _index_of(self, source: str) -> int:
+        if source not in self._names:
+            self._names.append(source)
+        return self._names.index(source)
+
+    def _std_to_add(self) -> float:
+        has_std = self._loaded is None or self._loaded.elevation_std is not None
+        return 0.0 if has_std else self.rules.loaded_std
+
+    def _choose_grid(self, terrain: Terrain) -> None:
+        """Set the cells: those of the first map, or of a first local one that is finer."""
+        is_finer = (
+            self._grid is not None
+            and self._loaded is not None
+            and not self._last
+            and terrain.resolution < FINER * self._grid.resolution
+        )
+        if self._grid is None or is_finer:
+            self._grid, self._window = grid_of(terrain), None
+
+    def _room_for(self, box: CellBox, centre: tuple[float, float]) -> Window:
+        """Return the window with room for a box, or around a place of the rover [m]."""
+        old = self._window
+        wanted = self._wanted_box(box, centre)
+        if wanted.cells > self.rules.max_cells:
+            raise PlanningError(
+                f"the map would have {wanted.rows} x {wanted.columns} cells; max_map_cells is "
+                f"{self.rules.max_cells}: set map_window to the side of a window around the rover"
+            )
+        if old is not None and old.box == wanted:
+            return old
+        moved = empty_window(wanted) if old is None else old.moved_to(wanted)
+        return moved if self._loaded is None else self._with_loaded(moved)
+
+    def _wanted_box(self, box: CellBox, centre: tuple[float, float]) -> CellBox:
+        assert self._grid is not None
+        old = None if self._window is None else self._window.box
+        if self.rules.window > 0.0:
+            n = max(2, round(self.rules.window / self._grid.resolution))
+            column, row = (round(value) - n // 2 for value in self._grid.coordinates(*centre))
+            is_kept = (
+                old is not None
+                and (old.rows, old.columns) == (n, n)
+                and max(abs(old.row - row), abs(old.column - column)) <= n // ROLL
+            )
+            return old if is_kept and old is not None else CellBox(row, column, n, n)
+        if old is None:
+            loaded = self._loaded
+            return box if loaded is None else lay_onto(loaded, self._grid).box.union(box)
+        if old.contains(box):
+            return old
+        union = old.union(box)
+        low_row = GROWTH if union.row < old.row else 0
+        low_column = GROWTH if union.column < old.column else 0
+        high_row = GROWTH if union.row + union.rows > old.row + old.rows else 0
+        high_column = GROWTH if union.column + union.columns > old.column + old.columns else 0
+        return CellBox(
+            union.row - low_row,
+            union.column - low_column,
+            union.rows + low_row + high_row,
+            union.columns + low_column + high_column,
+        )
+
+    def _with_loaded(self, window: Window) -> Window:
+        """Return a window whose unknown cells are those of the loaded map."""
+        assert self._loaded is not None and self._grid is not None
+        patch = lay_onto(self._loaded, self._grid)
+        std = self._std_to_add()
+        if std > 0.0:
+            known = np.isfinite(patch.layers["elevation"])
+            layers = patch.layers | {"elevation_std": np.where(known, std, np.nan)}
+            patch = Patch(patch.box, layers)
+        to, own = patch.box.within(window.box), window.box.within(patch.box)
+        empty = window.layers["source"][to] == UNKNOWN
+        take = np.isfinite(patch.layers["elevation"][own]) & empty
+        window = window.written(patch, take, LOADED, self._loaded_time)
+        # Friction and soil of a loaded map hold for cells whose heights it does not have, too.
+        for name in ("friction", "soil"):
+            if name in patch.layers:
+                window.layers[name][to][empty] = patch.layers[name][own][empty]
+        return window
+
+    def _wins(self, window: Window, patch: Patch, time: float) -> Layer:
+        """Return True for the cells of a patch within the window that replace the old ones."""
+        to, own = patch.box.within(window.box), window.box.within(patch.box)
+        known = np.isfinite(patch.layers["elevation"][own])
+        source, since = window.layers["source"][to], window.layers["time"][to]
+        is_given = (source == UNKNOWN) | (source == CONTACT) | (source == FOOTPRINT)
+        if self.rules.rule == NEWEST:
+            return known & (is_given | (source == LOADED) | (since <= time))
+        old = window.layers.get("elevation_std")
+        old = np.zeros(known.shape) if old is None else old[to]
+        new = patch.layers.get("elevation_std")
+        new = np.zeros(known.shape) if new is None else new[own]
+        age = np.where(np.isfinite(since), np.maximum(time - since, 0.0), 0.0)
+        with np.errstate(invalid="ignore"):
+            surer = new <= np.hypot(old, self.rules.ageing * age)
+        return known & (is_given | surer)
+
+    def _is_near(self, box: CellBox) -> bool:
+        """Return whether a window that grows to a box stays of the size of both."""
+        if self.rules.window > 0.0 or self._window is None:
+            return True
+        old = self._window.box
+        grown = self._wanted_box(box, self._centre_of(box)).cells
+        most = NEAR * (old.cells + box.cells) + GROWTH**2
+        return grown <= (old.cells if grown == old.cells else min(most, self.rules.max_cells))
+
+    def _centre_of(self, box: CellBox) -> tuple[float, float]:
+        assert self._grid is not None
+        x, y = self._grid.anchor
+        step = self._grid.resolution
+        return (
+            x + step * (box.column + 0.5 * (box.columns - 1)),
+            y + step * (box.row + 0.5 * (box.rows - 1)),
+        )

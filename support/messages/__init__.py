@@ -1,0 +1,1 @@
+"""Messages for tests, and message packages that PyPI lacks."""

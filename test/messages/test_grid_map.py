@@ -1,0 +1,174 @@
+"""GridMap messages become terrains cell by cell, wherever their circular buffer starts."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from msg_adapters.errors import MessageError
+from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
+from rover_physics.errors import TerrainError
+from support.messages.grid_maps import grid_map_of, move_buffer, store_by_rows
+
+RNG = np.random.default_rng(3)
+HEIGHTS = RNG.normal(0.0, 0.3, (7, 5)).astype(np.float32)
+HEIGHTS[2, 3] = HEIGHTS[0, 1] = np.nan
+
+
+def assert_same(one, other):
+    for name in ("elevation", "friction", "elevation_std"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert (a is None) == (b is None)
+        if a is not None:
+            assert a.tobytes() == b.tobytes()
+    assert (one.resolution, one.origin) == (other.resolution, other.origin)
+
+
+def test_heights_ascend_along_x_and_y_from_the_cell_of_smallest_x_and_y():
+    message = grid_map_of({"elevation": HEIGHTS}, 0.5, centre=(10.0, -4.0))
+    terrain = terrain_from_grid_map(message)
+    np.testing.assert_array_equal(terrain.elevation, HEIGHTS)
+    # 5 columns along x and 7 rows along y, around the centre
+    assert terrain.origin == (10.0 - 1.0, -4.0 - 1.5) and terrain.resolution == 0.5
+    assert terrain.friction is None and terrain.elevation_std is None
+
+
+def test_the_first_stored_value_is_the_cell_of_largest_x_and_y_and_the_next_runs_along_minus_x():
+    message = grid_map_of({"elevation": HEIGHTS}, 0.5)
+    data = message.data[0].data
+    assert data[0] == HEIGHTS[-1, -1] and data[1] == HEIGHTS[-1, -2]
+
+
+@given(row=st.integers(0, 4), column=st.integers(0, 6), by_rows=st.booleans())
+def test_a_moved_buffer_start_gives_the_same_terrain_to_the_bit(row, column, by_rows):
+    layers = {"elevation": HEIGHTS, "variance": HEIGHTS**2, "friction": 0.5 + 0.0 * HEIGHTS}
+    unmoved = grid_map_of(layers, 0.05, centre=(1.15, -0.35))
+    moved = move_buffer(unmoved, row, column)
+    if by_rows:
+        moved = store_by_rows(moved)
+    assert (row, column) == (0, 0) or list(moved.data[0].data) != list(unmoved.data[0].data)
+    assert_same(terrain_from_grid_map(moved), terrain_from_grid_map(unmoved))
+
+
+def test_variance_becomes_a_standard_deviation_and_friction_stays():
+    variance = np.full((7, 5), 0.0004, np.float32)
+    friction = np.full((7, 5), 0.6, np.float32)
+    friction[0, 0] = np.inf
+    message = grid_map_of({"h": HEIGHTS, "s2": variance, "mu": friction, "elevation": variance})
+    terrain = terrain_from_grid_map(message, GridMapLayers("h", "s2", "mu"))
+    known = np.isfinite(HEIGHTS)
+    np.testing.assert_allclose(terrain.elevation_std[known], 0.02, rtol=1e-6)
+    assert np.isnan(terrain.elevation_std[~known]).all()
+    assert np.isnan(terrain.friction[0, 0]) and terrain.friction[1, 1] == np.float32(0.6)
+
+
+def test_a_cell_that_a_basic_layer_or_the_variance_lacks_is_unknown():
+    seen = np.ones((7, 5), np.float32)
+    seen[4, 4] = np.nan
+    variance = np.ones((7, 5), np.float32)
+    variance[5, 0] = np.inf
+    layers = {"elevation": HEIGHTS, "seen": seen, "variance": variance}
+    terrain = terrain_from_grid_map(grid_map_of(layers, basic=("elevation", "seen")))
+    expected = np.isnan(HEIGHTS)
+    expected[4, 4] = expected[5, 0] = True
+    np.testing.assert_array_equal(np.isnan(terrain.elevation), expected)
+
+
+def test_an_orientation_of_zeros_is_not_set_and_taken_as_unturned():
+    message = grid_map_of({"elevation": HEIGHTS})
+    message.info.pose.orientation.w = 0.0
+    np.testing.assert_array_equal(terrain_from_grid_map(message).elevation, HEIGHTS)
+
+
+def _set(path, value):
+    def change(message):
+        *inner, last = path.split(".")
+        part = message
+        for name in inner:
+            part = part[int(name)] if name.isdigit() else getattr(part, name)
+        setattr(part, last, value)
+
+    return change
+
+
+def _turn(message):
+    message.info.pose.orientation = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (_turn, "grid map is turned"),
+        (_set("layers", ["height"]), "no layer 'elevation'; it has height: set elevation_layer"),
+        (_set("layers", ["elevation", "elevation"]), "2 layers and 1 arrays"),
+        (_set("basic_layers", ["seen"]), "basic layer 'seen'"),
+        (_set("info.length_x", 0.26), "length_x 0.26"),
+        (_set("info.length_y", float("nan")), "length_y nan"),
+        (_set("info.resolution", 0.0), "resolution 0.0"),
+        (_set("outer_start_index", 5), "starts at row 5"),
+        (_set("data.0.data", HEIGHTS.ravel()[:-1]), "34 values"),
+        (_set("data.0.layout.data_offset", 2), "37"),
+        (_set("data.0.layout.dim.0.label", "rows"), "dimensions ['rows', 'row_index']"),
+        (_set("data.0.layout.dim.0.size", 5), "sizes [5, 5]"),
+        (_set("data.0.data", np.full(35, np.nan, np.float32)), "none of the grid map's 35"),
+    ],
+)
+def test_a_bad_grid_map_is_refused_by_name(change, text):
+    message = grid_map_of({"elevation": HEIGHTS}, 0.05)
+    change(message)
+    with pytest.raises(MessageError) as error:
+        terrain_from_grid_map(message)
+    assert text in str(error.value)
+
+
+def test_a_negative_variance_is_refused():
+    message = grid_map_of({"elevation": HEIGHTS, "variance": np.full((7, 5), -1.0)})
+    with pytest.raises(MessageError, match="-1 in layer 'variance'"):
+        terrain_from_grid_map(message)
+
+
+def test_a_map_far_too_large_is_refused_before_anything_is_read():
+    message = grid_map_of({"elevation": HEIGHTS}, 0.05)
+    message.info.length_x = message.info.length_y = 1e6
+    with pytest.raises(MessageError, match="at most 25000000"):
+        terrain_from_grid_map(message)
+
+
+NUMBERS = st.one_of(
+    st.floats(), st.integers(-3, 70_000), st.sampled_from([1e-300, 1e300, 1e19, 0.05, 2**31])
+)
+HOSTILE = {
+    "info.resolution": NUMBERS,
+    "info.length_x": NUMBERS,
+    "info.length_y": NUMBERS,
+    "info.pose.position.x": NUMBERS,
+    "info.pose.orientation.w": NUMBERS,
+    "outer_start_index": st.integers(0, 65_535),
+    "inner_start_index": st.integers(0, 65_535),
+    "layers": st.lists(st.sampled_from(["elevation", "variance", "", "x" * 9000]), max_size=4),
+    "basic_layers": st.lists(st.sampled_from(["elevation", "nothing"]), max_size=3),
+    "data": st.just([]),
+    "data.0.layout.data_offset": st.integers(0, 2**32 - 1),
+    "data.0.layout.dim": st.just([]),
+    "data.0.layout.dim.0.size": st.integers(0, 2**32 - 1),
+    "data.0.layout.dim.1.label": st.text(max_size=20),
+    "data.0.data": st.lists(st.floats(width=32), max_size=40).map(np.float32),
+}
+
+
+@given(data=st.data(), names=st.lists(st.sampled_from(sorted(HOSTILE)), min_size=1, max_size=3))
+def test_hostile_grid_maps_are_refused_or_read_and_nothing_else(data, names):
+    message = grid_map_of({"elevation": HEIGHTS, "variance": HEIGHTS**2}, 0.05)
+    for name in names:
+        if not (name.startswith("data.") and not message.data):
+            dims = message.data[0].layout.dim if message.data else []
+            if dims or "dim." not in name:
+                _set(name, data.draw(HOSTILE[name]))(message)
+    try:
+        terrain = terrain_from_grid_map(message)
+    except (MessageError, TerrainError) as error:
+        assert 0 < len(str(error)) < 10_000
+        return
+    assert np.isfinite(terrain.elevation).any()

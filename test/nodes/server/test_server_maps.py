@@ -1,0 +1,255 @@
+"""A traverse server merges maps of both kinds, and fills the ground on which the rover stands."""
+
+import importlib
+import sys
+import time
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Quaternion
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, JointState, PointCloud2
+from std_msgs.msg import Float32MultiArray, MultiArrayDimension
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.paths import stamped_pose
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.nodes.maps import map_topics
+from rover_planner.ros.qos import map_qos
+from rover_planner.worlds.maps.map_keeper import MapKeeper
+from support.grounds import make_terrain, wall_at, waves
+from support.messages.grid_maps import grid_map_of, move_buffer
+from support.messages.interfaces import GRID_MAP_MSGS, build_messages
+from support.planner_client import GOAL, SERVER, START, ask, verdict_of
+from support.ros_fixtures import wait_until
+
+PRIOR = make_terrain(waves)
+
+
+@pytest.fixture(scope="module")
+def grid_map_msgs(tmp_path_factory):
+    """Return grid_map_msgs.msg, built for this test where it is not installed."""
+    if map_topics.grid_map_type() is not None:
+        yield importlib.import_module("grid_map_msgs.msg")
+        return
+    folder = tmp_path_factory.mktemp("messages")
+    uses = ("std_msgs", "geometry_msgs", "builtin_interfaces")
+    build_messages(folder, "grid_map_msgs", GRID_MAP_MSGS, uses)
+    sys.path.insert(0, str(folder))
+    importlib.invalidate_caches()
+    yield importlib.import_module("grid_map_msgs.msg")
+    sys.path.remove(str(folder))
+    for name in [name for name in sys.modules if name.partition(".")[0] == "grid_map_msgs"]:
+        del sys.modules[name]
+
+
+def to_message(kind, plain, frame="map"):
+    """Return a GridMap of a stand-in with the same fields."""
+    message = kind(layers=plain.layers, basic_layers=plain.basic_layers)
+    message.header.frame_id = frame
+    for name in ("resolution", "length_x", "length_y"):
+        setattr(message.info, name, getattr(plain.info, name))
+    for name in "xy":
+        setattr(message.info.pose.position, name, getattr(plain.info.pose.position, name))
+    for array in plain.data:
+        layer = Float32MultiArray()
+        layer.layout.dim = [
+            MultiArrayDimension(label=dim.label, size=dim.size, stride=dim.stride)
+            for dim in array.layout.dim
+        ]
+        layer.data = np.asarray(array.data, np.float32).tolist()
+        message.data.append(layer)
+    message.outer_start_index = plain.outer_start_index
+    message.inner_start_index = plain.inner_start_index
+    return message
+
+
+def test_a_grid_map_with_a_moved_buffer_is_the_map_over_dds(grid_map_msgs, start_server, client):
+    server = start_server()
+    publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
+    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
+    plain = grid_map_of({"elevation": PRIOR.elevation}, PRIOR.resolution)
+    publisher.publish(to_message(grid_map_msgs.GridMap, move_buffer(plain, 17, 130)))
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    np.testing.assert_array_equal(server.service.terrain.elevation, PRIOR.elevation)
+    assert server.service.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
+    known = server.service.known_map
+    assert (known.source, known.frame) == ("elevation_map", "map")
+    _, verdict, _ = ask(client)
+    assert verdict["traversable"] == "true" and verdict["blind_share"] == "0.0"
+    # A map that cannot be used is refused by the name of its topic, and the last one stays.
+    client.logs.clear()
+    turned = to_message(grid_map_msgs.GridMap, plain)
+    turned.info.pose.orientation.z, turned.info.pose.orientation.w = 0.1, 0.995
+    publisher.publish(turned)
+    client.wait_for_log("elevation_map refused, the last good map stays: grid map is turned")
+
+
+def test_without_grid_map_msgs_the_server_has_no_such_topic(start_server, monkeypatch):
+    monkeypatch.setattr(map_topics, "grid_map_type", lambda: None)
+    server = start_server()
+    topics = {name for name, _ in server.get_topic_names_and_types()}
+    assert "/elevation_cloud" in topics and "/elevation_map" not in topics
+
+
+def local_map(column, row, height=0.0, cells=20):
+    origin = PRIOR.origin[0] + 0.05 * column, PRIOR.origin[1] + 0.05 * row
+    return Terrain(np.full((cells, cells), height), 0.05, origin)
+
+
+def test_a_loaded_map_survives_100_local_updates(server, client, tmp_path):
+    file = tmp_path / "prior.npz"
+    save_terrain(file, PRIOR)
+    assert client.load_map(file).result == 0
+    rng = np.random.default_rng(2)
+    seen = np.zeros(PRIOR.elevation.shape, bool)
+    for k in range(100):
+        row, column = rng.integers(0, 60, 2)
+        seen[row : row + 20, column : column + 20] = True
+        before = server.service.known_map
+        # Float32 holds the heights of both exactly.
+        cloud = terrain_to_point_cloud(local_map(column, row, 0.5 + k), "map")
+        client.send_cloud(cloud)
+        wait_until(lambda b=before: server.service.known_map is not b, "the map")
+    terrain = server.service.terrain
+    assert terrain.origin == PRIOR.origin
+    np.testing.assert_array_equal(terrain.elevation[~seen], PRIOR.elevation[~seen])
+    assert (terrain.elevation[seen] >= 0.5).all() and 0.1 < seen.mean() < 0.5
+    cells = server.service.known_map.cells
+    assert cells.count() == {
+        "unknown": 0,
+        "loaded": int((~seen).sum()),
+        "contact": 0,
+        "footprint": 0,
+        "elevation_cloud": int(seen.sum()),
+    }
+
+
+def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, tmp_path):
+    file = tmp_path / "prior.npz"
+    save_terrain(file, PRIOR)
+    assert client.load_map(file).result == 0
+    client.send_terrain(local_map(10, 10, 0.5))
+    heard = []
+    client.create_subscription(PointCloud2, f"{SERVER}/map", heard.append, map_qos())
+    wait_until(lambda: heard, "the map")
+    cloud = heard[-1]
+    names = [field.name for field in cloud.fields]
+    assert names == ["x", "y", "z", "source", "age"] and cloud.header.frame_id == "map"
+    values = np.frombuffer(cloud.data, "<f4").reshape(cloud.height, cloud.width, 5)
+    merged = server.service.terrain.elevation
+    np.testing.assert_array_equal(values[..., 2], merged.astype(np.float32))
+    assert (values[10:30, 10:30, 3] == 4).all() and (values[31:, :, 3] == 1).all()
+    assert values[..., 4].min() >= 0.0 and values[..., 4].max() < 60.0
+
+
+def test_without_a_loaded_map_a_cloud_replaces_the_last_one(server, client):
+    client.send_terrain(PRIOR)
+    client.send_terrain(local_map(0, 0))
+    assert server.service.terrain.elevation.shape == (20, 20)
+    assert client.set_parameter("map_updates", "merge")[0]
+    client.send_terrain(local_map(60, 60))
+    assert server.service.terrain.elevation.shape > (20, 20)
+
+
+def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
+    start_server, client, tmp_path, monkeypatch
+):
+    file = tmp_path / "prior.npz"
+    save_terrain(file, PRIOR)
+    server = start_server(terrain_file=str(file))
+    before = server.service.known_map.fingerprint
+    merge, began = MapKeeper.take, []
+
+    def take_slowly(keeper, *given):
+        began.append(time.monotonic())
+        time.sleep(1.0)
+        return merge(keeper, *given)
+
+    monkeypatch.setattr(MapKeeper, "take", take_slowly)
+    waits = []
+    wait = server.desk._maps.wait
+
+    def timed_wait(*given):
+        start = time.monotonic()
+        wait(*given)
+        waits.append(time.monotonic() - start)
+
+    monkeypatch.setattr(server.desk._maps, "wait", timed_wait)
+    client.send_cloud(terrain_to_point_cloud(make_terrain(wall_at(0.5)), "map"))
+    wait_until(lambda: began, "the map")
+    _, results = client.next_results(lambda: client.can_traverse(START, GOAL))
+    assert verdict_of(results)["map_hash"] == before
+    assert 0.01 < waits[0] < 0.3  # 15 ms by the clock; a busy machine wakes threads late
+    wait_until(lambda: server.service.known_map.fingerprint != before, "the merged map")
+    assert client.can_traverse(START, GOAL).poses == []
+
+
+def send_standing(client, pose, angles=(0.0, 0.0, 0.0, 0.0)):
+    """Publish odometry and suspension of a rover that stands level on ground of height 0."""
+    odometry = Odometry(child_frame_id="base_link")
+    odometry.header.frame_id = "map"
+    odometry.pose.pose = stamped_pose(pose, "map").pose
+    odometry.pose.pose.position.z = 0.3  # of the body's origin of lsr1 above level ground
+    client._joints.publish(JointState(name=list(SUSPENSION_JOINTS), position=list(angles)))
+    client._odometry.publish(odometry)
+
+
+def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client):
+    start_server(planner="fan", footprint_margin=0.1)
+    ahead = make_terrain(lambda x, y: np.where(x < 0.0, np.nan, 0.0 * x))
+    client.send_terrain(ahead)
+    start, goal = (-0.45, 0.0, 0.0), (2.0, 0.0, 0.0)
+    _, verdict, _ = ask(client, start, goal)
+    assert verdict["code"] == "unknown_ground"
+
+    def is_filled():
+        send_standing(client, start)
+        time.sleep(0.1)
+        return any("ground under the rover filled" in line for line in client.logs)
+
+    wait_until(is_filled, "the filled ground")
+    _, verdict, _ = ask(client, start, goal)
+    assert verdict["traversable"] == "true"
+    assert 0.0 < float(verdict["footprint_share"]) == float(verdict["blind_share"]) < 0.5
+    assert client.set_parameter("blind_ground", "refuse")[0]
+    _, verdict, _ = ask(client, start, goal)
+    assert verdict["code"] == "blind_ground" and verdict["first_failure"] == "0"
+
+
+def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu(start_server, client):
+    server = start_server(imu_attitude=True)
+    publisher = client.create_publisher(Imu, "imu", 1)
+    send_standing(client, (0.0, 0.0, 0.3))
+    wait_until(lambda: server.service.standing() is not None, "the odometry")
+    turned = xyzw_from_rpy(0.1, -0.2, 1.0)
+    x, y, z, w = turned.tolist()
+    message = Imu(orientation=Quaternion(x=x, y=y, z=z, w=w))
+
+    def is_tilted():
+        publisher.publish(message)
+        send_standing(client, (0.0, 0.0, 0.3))
+        time.sleep(0.05)
+        now = server.service.standing()
+        return now is not None and now.roll != 0.0 and now
+
+    now = wait_until(is_tilted, "the tilt")
+    assert (now.roll, now.pitch, now.yaw) == pytest.approx((0.1, -0.2, 0.3))
+
+
+def test_friction_and_deviation_of_a_grid_map_are_used(grid_map_msgs, start_server, client):
+    server = start_server(elevation_layer="height", variance_layer="none", friction_layer="mu")
+    publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
+    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
+    layers = {
+        "height": PRIOR.elevation,
+        "variance": np.full(PRIOR.elevation.shape, 4.0),
+        "mu": np.full(PRIOR.elevation.shape, 0.01),
+    }
+    publisher.publish(to_message(grid_map_msgs.GridMap, grid_map_of(layers, PRIOR.resolution)))
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    assert server.service.terrain.elevation_std is None
+    _, verdict, _ = ask(client)
+    assert verdict["code"] == "friction"

@@ -1,0 +1,75 @@
+"""The share of never seen ground under the belly is counted along a path, cell by cell."""
+
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.worlds.maps.blind_ground import (
+    ALLOW,
+    ALLOW_FOOTPRINT,
+    REFUSE,
+    SEEN,
+    UNSEEN,
+    SeenGround,
+    seen_ground,
+)
+from rover_planner.worlds.maps.sources import FOOTPRINT, CellSources
+
+LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
+PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])
+
+
+def ground(shape=(81, 161)):
+    return Terrain(np.zeros(shape), 0.05, (-2.0, -2.0))
+
+
+def with_holes(x_low, x_high, value=np.nan):
+    elevation = np.zeros((81, 161))
+    x = -2.0 + 0.05 * np.arange(161)
+    elevation[:, (x >= x_low) & (x < x_high)] = value
+    return Terrain(elevation, 0.05, (-2.0, -2.0))
+
+
+def test_on_seen_ground_nothing_is_blind():
+    share = seen_ground(ground(), None).share(LSR1, PATH)
+    assert share.blind_share == 0.0 and share.first == -1
+    assert share.first_refused(REFUSE) == -1
+
+
+def test_the_share_is_that_of_the_cells_under_the_belly():
+    share = seen_ground(with_holes(1.0, 1.5), None).share(LSR1, PATH)
+    # The belly sweeps x from -0.3 to 2.28 m: 53 columns of cells, of which 10 are unknown.
+    assert share.blind_share == pytest.approx(10 / 53, abs=0.01)
+    assert share.footprint_share == 0.0
+    assert PATH[share.first, 0] == pytest.approx(0.7, abs=0.04)
+
+
+def test_the_start_footprint_is_told_apart():
+    terrain = ground()
+    source = np.full((81, 161), 4, np.uint8)
+    x = -2.0 + 0.05 * np.arange(161)
+    source[:, x < 0.5] = FOOTPRINT
+    sources = CellSources(source, np.zeros(source.shape))
+    share = seen_ground(terrain, sources).share(LSR1, PATH)
+    assert share.blind_share == share.footprint_share == pytest.approx(16 / 53, abs=0.02)
+    assert share.first == 0 and share.first_beyond_footprint == -1
+    assert [share.first_refused(rule) for rule in (ALLOW, ALLOW_FOOTPRINT, REFUSE)] == [-1, -1, 0]
+
+
+def test_ground_off_the_map_was_not_seen():
+    kinds = np.full((81, 161), SEEN, np.uint8)
+    far = PATH + np.array([5.0, 0.0, 0.0])
+    share = SeenGround(ground(), kinds).share(LSR1, far)
+    assert share.first == share.first_beyond_footprint
+    assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
+    assert 0.0 < share.blind_share < 1.0
+
+
+def test_a_long_path_counts_each_cell_once():
+    kinds = np.full((81, 161), SEEN, np.uint8)
+    kinds[:, 60] = UNSEEN
+    seen = SeenGround(ground(), kinds)
+    often = np.vstack([PATH] * 30)
+    whole, once = seen.share(LSR1, often), seen.share(LSR1, PATH)
+    assert whole.blind_share == once.blind_share > 0.0 and whole.first == once.first

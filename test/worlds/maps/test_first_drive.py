@@ -1,0 +1,115 @@
+"""A rover whose camera sees ahead only starts from where it stands and reaches its goal."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.terrain.grid import Terrain
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
+from rover_planner.planning.answering.service_settings import (
+    keeper_settings,
+    load_service_settings,
+)
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.simulator.simulation import Simulation, load_simulation_settings
+from rover_planner.worlds.maps.map_keeper import MERGE, MapKeeper
+from support.grounds import make_terrain, waves
+from support.messages.standing import standing_of
+
+CAMERA = {"sensor_field_of_view": math.radians(60.0), "sensor_least_range": 0.5}
+"""A camera that sees 60 degrees ahead, from 0.5 m on."""
+START, GOAL = (-2.0, 0.0, 0.0), (0.5, 0.2, 0.0)
+MARGIN = 0.2
+"""Margin of the start footprint that reaches from the wheels to where the camera sees [m]."""
+
+
+class Drive:
+    """A simulated rover with a camera, and a server that knows no more than it measures."""
+
+    def __init__(self, ground: Terrain, **parameters):
+        simulated = RoverSimulatorParameters(start_x=START[0], start_y=START[1], **CAMERA)
+        settings = replace(load_simulation_settings(simulated), terrain=ground)
+        self.simulation = Simulation(settings)
+        asked = TraverseServerParameters(map_updates=MERGE, planner=FAN, **parameters)
+        self.service = TraverseService(load_service_settings(asked))
+        self.keeper = MapKeeper(settings.rover, keeper_settings(asked))
+        self.time = 0.0
+
+    def look(self) -> None:
+        """Give the server the map that the camera sees now."""
+        standing = standing_of(self.simulation.plant.state())
+        now = self.keeper.take(self.simulation.look(), "elevation_cloud", self.time, standing)
+        self.service.take_terrain(now.terrain, "elevation_cloud", None, now.sources)
+
+    def go(self, seconds: float) -> str:
+        """Drive for a while; return why the rover stopped, empty if it did not."""
+        for _ in range(round(seconds / 0.1)):
+            self.time += 0.1
+            state = self.simulation.advance(self.time, 0.1)
+            if state.stopped:
+                return state.stopped
+        return ""
+
+
+@pytest.mark.parametrize("ground", [waves, lambda x, y: 0.08 * x + 0.03 * y])
+def test_the_first_drive_is_accepted_and_reaches_its_goal(ground):
+    drive = Drive(make_terrain(ground), footprint_margin=MARGIN)
+    drive.look()
+    first = drive.service.answer(START, GOAL)
+    assert first.traversable, first.reason
+    report = first.report
+    assert 0.1 < report.ground.footprint_share <= report.ground.blind_share < 0.5
+    path = first.candidate.poses
+    drive.simulation.take_path(path)
+    while drive.simulation.follows_path:
+        assert drive.go(1.0) == ""
+        assert drive.time < 200.0
+        drive.look()
+        # What was seen stays: the path is still passable where the camera does not look.
+        drive.service.take_path(path)
+        assert drive.service.check_last_path().traversable
+    assert np.hypot(*(drive.simulation.plant.pose() - GOAL)[:2]) < 0.1
+    names = drive.service.known_map.cells.count()
+    assert names["elevation_cloud"] > 0 and names["footprint"] > 0 and names["contact"] > 0
+
+
+def test_without_the_footprint_the_start_is_unknown_ground():
+    for parameters in ({"fill_under_rover": False}, {"footprint_margin": 0.0}):
+        drive = Drive(make_terrain(waves), **parameters)
+        drive.look()
+        assert drive.service.answer(START, GOAL).code == "unknown_ground"
+
+
+def test_blind_ground_is_refused_where_the_parameter_says_so():
+    drive = Drive(make_terrain(waves), footprint_margin=MARGIN, blind_ground="refuse")
+    drive.look()
+    refused = drive.service.answer(START, GOAL)
+    assert refused.code == "blind_ground" and not refused.traversable
+    report = refused.report
+    assert "never seen" in report.reason and report.first_failure == 0
+    assert report.classes.traversability_class == "passable"
+    share = report.ground.blind_share
+    assert f"{100.0 * share:.1f} %" in report.reason
+
+    allowed = Drive(make_terrain(waves), footprint_margin=MARGIN, blind_ground="allow_footprint")
+    allowed.look()
+    assert allowed.service.answer(START, GOAL).traversable
+
+
+def test_ground_beyond_the_start_is_not_assumed_again():
+    drive = Drive(make_terrain(waves), footprint_margin=MARGIN)
+    drive.look()
+    filled = drive.service.known_map.cells.count()["footprint"]
+    drive.simulation.take_speeds(0.0, 0.15, 0.0)
+    for k in range(20):
+        drive.simulation.take_speeds(0.0, 0.15, drive.time)
+        assert drive.go(0.4) == ""
+        if k % 5 == 4:
+            drive.look()
+    assert abs(drive.simulation.plant.pose()[2]) > 0.5
+    cells = drive.service.known_map.cells
+    # Turned on the spot, wheels stand on cells that were assumed; only the outline is new.
+    assert cells.count()["footprint"] < 1.6 * filled

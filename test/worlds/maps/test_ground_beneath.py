@@ -1,0 +1,142 @@
+"""Measured angles and pose give the six contacts, and with them the ground under the rover."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.worlds.maps.ground_beneath import Standing, find_ground_beneath
+from rover_planner.worlds.maps.living_map import LivingMap
+from rover_planner.worlds.maps.sources import CONTACT, FOOTPRINT, LOADED
+from support.grounds import make_terrain, rocky, waves
+
+ROVERS = {name: load_rover(name) for name in ("lsr1", "m2020")}
+SLOPE = make_terrain(lambda x, y: 0.2 * x - 0.15 * y + 3.0)
+
+
+def standing_at(rover, terrain, pose):
+    """Return what a rover that stands at a pose measures, from the model."""
+    there = sweep_path(rover, terrain, np.array([pose]))
+    assert there.settled[0]
+    angles = (*there.rocker_angle[0], *there.bogie_angle[0])
+    return Standing(
+        *there.position[0].tolist(),
+        float(there.roll[0]),
+        float(there.pitch[0]),
+        pose[2],
+        dict(zip(SUSPENSION_JOINTS, map(float, angles), strict=True)),
+    ), there
+
+
+@pytest.mark.parametrize("name", ROVERS)
+@pytest.mark.parametrize("yaw", [0.0, 1.1, -2.5])
+def test_the_contacts_of_a_settled_rover_lie_on_the_ground(name, yaw):
+    for ground, tolerance in ((SLOPE, 1e-4), (make_terrain(waves), 0.005)):
+        standing, there = standing_at(ROVERS[name], ground, (0.2, -0.3, yaw))
+        contacts = find_ground_beneath(ROVERS[name], standing).contacts
+        on_ground = ground.elevation_at(contacts[:, 0], contacts[:, 1])
+        # A wheel that leans touches with its edge, by half its width times the slope.
+        edge = 0.5 * ROVERS[name].wheel.width * 0.25
+        np.testing.assert_allclose(contacts[:, 2], on_ground, atol=tolerance + edge)
+        assert np.abs(contacts - there.contact_points[0]).max() < ROVERS[name].wheel.radius
+
+
+def blind_behind(ground, x, shape=None):
+    """Return a ground that is unknown up to x."""
+    elevation = ground.elevation.copy()
+    columns = ground.origin[0] + ground.resolution * np.arange(elevation.shape[1])
+    elevation[:, columns < x] = np.nan
+    return replace(ground, elevation=elevation)
+
+
+def fill(living, rover, standing, margin=0.0, std=0.02):
+    patch, is_contact = find_ground_beneath(rover, standing).patch(living.grid, margin, std)
+    return living.fill(patch, is_contact, 5.0)
+
+
+def filled(ground, margin=0.0, pose=(0.0, 0.0, 0.3)):
+    standing, _ = standing_at(ROVERS["lsr1"], ground, pose)
+    living = LivingMap()
+    living.replace(blind_behind(ground, 0.8), "elevation_cloud", 1.0)
+    assert fill(living, ROVERS["lsr1"], standing, margin)
+    return living
+
+
+def test_a_rover_on_ground_it_never_saw_settles_where_it_stands():
+    ground = make_terrain(rocky)
+    standing, true = standing_at(ROVERS["lsr1"], ground, (0.0, 0.0, 0.3))
+    terrain = filled(ground).snapshot().terrain
+    there = sweep_path(ROVERS["lsr1"], terrain, np.array([(0.0, 0.0, 0.3)]))
+    assert there.settled[0]
+    np.testing.assert_allclose(there.position[0], true.position[0], atol=0.01)
+    for name in ("roll", "pitch", "rocker_angle", "bogie_angle"):
+        np.testing.assert_allclose(getattr(there, name)[0], getattr(true, name)[0], atol=0.03)
+
+
+def test_filled_cells_say_so_and_seen_ones_stay():
+    now = filled(SLOPE).snapshot()
+    blind = blind_behind(SLOPE, 0.8).elevation
+    is_filled = np.isnan(blind) & np.isfinite(now.terrain.elevation)
+    assert set(np.unique(now.sources.source[is_filled])) == {CONTACT, FOOTPRINT}
+    assert (now.sources.time[is_filled] == 5.0).all()
+    seen = np.isfinite(blind)
+    np.testing.assert_array_equal(now.terrain.elevation[seen], blind[seen])
+    np.testing.assert_allclose(
+        now.terrain.elevation[is_filled], SLOPE.elevation[is_filled], atol=0.012
+    )
+    contacts = (now.sources.source == CONTACT).sum()
+    assert 6 <= contacts < 0.3 * is_filled.sum()
+
+
+def test_the_margin_continues_the_ground_around_the_wheels():
+    areas = [
+        np.isfinite(filled(SLOPE, margin, (-1.0, 0.0, 0.3)).snapshot().terrain.elevation).sum()
+        * 0.05**2
+        for margin in (0.0, 0.2)
+    ]
+    # The wheels' outline of lsr1 is 1.0 m x 0.7 m; interpolation needs 1.5 cells around it.
+    assert areas[1] - areas[0] == pytest.approx(1.55 * 1.25 - 1.15 * 0.85, rel=0.05)
+
+
+def test_a_map_that_begins_ahead_of_the_rover_grows_to_where_it_stands():
+    ahead = Terrain(np.zeros((40, 40)), 0.05, (0.6, -1.0))
+    standing, _ = standing_at(ROVERS["lsr1"], make_terrain(lambda x, y: 0.0 * x), (0.0, 0.0, 0.0))
+    living = LivingMap()
+    living.replace(ahead, "elevation_cloud", 1.0)
+    assert fill(living, ROVERS["lsr1"], standing)
+    terrain = living.snapshot().terrain
+    assert terrain.contains(-0.5, 0.0) and terrain.elevation_at(0.0, 0.0) == pytest.approx(0.0)
+
+
+def test_nothing_is_filled_where_the_ground_is_known():
+    living = LivingMap()
+    living.load(SLOPE, 0.0)
+    standing, _ = standing_at(ROVERS["lsr1"], SLOPE, (0.0, 0.0, 0.3))
+    assert not fill(living, ROVERS["lsr1"], standing)
+    now = living.snapshot()
+    assert now.terrain is SLOPE and (now.sources.source == LOADED).all()
+
+
+def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():
+    living = filled(SLOPE, margin=0.5)
+    first = living.snapshot()
+    standing, _ = standing_at(ROVERS["lsr1"], SLOPE, (0.02, 0.1, 0.3))
+    assert fill(living, ROVERS["lsr1"], standing)
+    second = living.snapshot()
+    turned = (first.sources.source == FOOTPRINT) & (second.sources.source == CONTACT)
+    assert turned.any()
+    assert not ((first.sources.source == CONTACT) & (second.sources.source != CONTACT)).any()
+    living.merge(SLOPE, "elevation_cloud", 2.0)
+    np.testing.assert_array_equal(living.snapshot().terrain.elevation, SLOPE.elevation)
+
+
+def test_filled_heights_are_uncertain_on_an_uncertain_map_only():
+    assert filled(SLOPE).snapshot().terrain.elevation_std is None
+    uncertain = replace(SLOPE, elevation_std=np.full(SLOPE.elevation.shape, 0.001))
+    std = filled(uncertain).snapshot()
+    is_filled = np.isin(std.sources.source, (CONTACT, FOOTPRINT))
+    assert (std.terrain.elevation_std[is_filled] == 0.02).all()

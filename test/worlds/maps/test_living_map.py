@@ -1,0 +1,225 @@
+"""Local maps merge into a loaded one cell by cell, and nothing that was known is lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.worlds.maps.living_map import SUREST, LivingMap, MergeRules
+from rover_planner.worlds.maps.sources import LOADED, UNKNOWN
+from support.grounds import make_terrain, waves
+
+TOPIC = "elevation_cloud"
+PRIOR = make_terrain(waves)
+
+
+def local_map(origin, height=0.0, shape=(20, 20), resolution=0.05, std=None):
+    elevation = np.full(shape, height)
+    deviations = None if std is None else np.full(shape, std)
+    return Terrain(elevation, resolution, origin, elevation_std=deviations)
+
+
+def cell(living, x, y):
+    """Return height, name of source and time of the cell nearest to a point."""
+    now = living.snapshot()
+    terrain, sources = now.terrain, now.sources
+    j = round((x - terrain.origin[0]) / terrain.resolution)
+    i = round((y - terrain.origin[1]) / terrain.resolution)
+    name = sources.names[sources.source[i, j]]
+    return terrain.elevation[i, j], name, sources.time[i, j]
+
+
+def test_a_loaded_map_alone_is_the_terrain_itself():
+    living = LivingMap()
+    living.load(PRIOR, 5.0)
+    now = living.snapshot()
+    assert now.terrain is PRIOR
+    assert (now.sources.source == LOADED).all() and (now.sources.time == 5.0).all()
+
+
+def test_a_loaded_map_survives_100_local_updates_to_the_bit():
+    living = LivingMap()
+    living.load(PRIOR, 0.0)
+    rng = np.random.default_rng(1)
+    seen = np.zeros(PRIOR.elevation.shape, bool)
+    for k in range(100):
+        i, j = rng.integers(20, 120, 2)
+        seen[i : i + 20, j : j + 20] = True
+        origin = PRIOR.origin[0] + 0.05 * j, PRIOR.origin[1] + 0.05 * i
+        living.merge(local_map(origin, height=1.0), TOPIC, 1.0 + k)
+    merged = living.snapshot().terrain
+    assert 0.1 < seen.mean() < 0.9
+    assert merged.origin == PRIOR.origin and merged.resolution == PRIOR.resolution
+    np.testing.assert_array_equal(merged.elevation, np.where(seen, 1.0, PRIOR.elevation))
+    assert merged.elevation_std is None
+
+
+def test_each_cell_knows_its_source_and_time():
+    living = LivingMap()
+    living.load(PRIOR, 7.0)
+    living.merge(local_map((0.0, 0.0), 0.3), "elevation_map", 20.5)
+    assert cell(living, 0.5, 0.5) == (0.3, "elevation_map", 20.5)
+    assert cell(living, -0.5, -0.5)[1:] == ("loaded", 7.0)
+    counts = living.snapshot().sources.count()
+    assert counts["elevation_map"] == 400 and counts["loaded"] == PRIOR.elevation.size - 400
+
+
+def test_what_a_newer_map_does_not_see_stays():
+    living = LivingMap()
+    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1.0)
+    blind = np.full((20, 20), 0.2)
+    blind[:, :10] = np.nan
+    living.merge(Terrain(blind, 0.05, (0.0, 0.0)), TOPIC, 2.0)
+    assert cell(living, 0.1, 0.5) == (0.1, TOPIC, 1.0)
+    assert cell(living, 0.9, 0.5) == (0.2, TOPIC, 2.0)
+
+
+def test_the_newer_height_wins_whichever_arrives_last():
+    living = LivingMap()
+    living.merge(local_map((0.0, 0.0), 0.1), "front", 10.0)
+    living.merge(local_map((0.0, 0.0), 0.2), "rear", 9.0)
+    assert cell(living, 0.5, 0.5) == (0.1, "front", 10.0)
+    living.merge(local_map((0.0, 0.0), 0.3), "rear", 11.0)
+    assert cell(living, 0.5, 0.5) == (0.3, "rear", 11.0)
+
+
+def test_a_source_whose_clock_goes_back_is_still_heard():
+    living = LivingMap()
+    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1e9)
+    living.merge(local_map((0.0, 0.0), 0.2), TOPIC, 3.0)
+    assert cell(living, 0.5, 0.5) == (0.2, TOPIC, 3.0)
+
+
+def test_the_surer_height_wins_until_it_has_aged():
+    living = LivingMap(MergeRules(SUREST, ageing=0.001))
+    living.merge(local_map((0.0, 0.0), 0.1, std=0.01), TOPIC, 0.0)
+    living.merge(local_map((0.0, 0.0), 0.2, std=0.03), TOPIC, 10.0)
+    assert cell(living, 0.5, 0.5)[0] == 0.1
+    living.merge(local_map((0.0, 0.0), 0.3, std=0.03), TOPIC, 40.0)
+    assert cell(living, 0.5, 0.5)[0] == 0.3
+    living.merge(local_map((0.0, 0.0), 0.4, std=0.002), TOPIC, 41.0)
+    assert cell(living, 0.5, 0.5)[0] == 0.4
+    np.testing.assert_array_equal(living.snapshot().terrain.elevation_std, 0.002)
+
+
+def test_a_loaded_map_without_deviations_gets_those_of_the_rules():
+    living = LivingMap(MergeRules(SUREST, loaded_std=0.5))
+    living.load(PRIOR, 0.0)
+    living.merge(local_map((0.0, 0.0), 0.3, std=0.02), TOPIC, 1.0)
+    std = living.snapshot().terrain.elevation_std
+    assert cell(living, 0.5, 0.5)[0] == 0.3
+    assert set(np.unique(std)) == {0.02, 0.5}
+
+
+def test_exact_heights_stay_exact_beside_uncertain_ones():
+    living = LivingMap()
+    living.load(PRIOR, 0.0)
+    living.merge(local_map((0.0, 0.0), 0.3, std=0.02), TOPIC, 1.0)
+    assert set(np.unique(living.snapshot().terrain.elevation_std)) == {0.0, 0.02}
+
+
+def test_earlier_snapshots_do_not_change():
+    living = LivingMap()
+    living.load(PRIOR, 0.0)
+    living.merge(local_map((0.0, 0.0), 0.3), TOPIC, 1.0)
+    before = living.snapshot()
+    heights, times = before.terrain.elevation.copy(), before.sources.time.copy()
+    living.merge(local_map((0.5, 0.0), 0.7), TOPIC, 2.0)
+    np.testing.assert_array_equal(before.terrain.elevation, heights)
+    np.testing.assert_array_equal(before.sources.time, times)
+    assert living.snapshot().terrain.elevation is not before.terrain.elevation
+
+
+def test_a_map_grows_with_what_is_seen_and_keeps_its_cells():
+    living = LivingMap()
+    first = local_map((0.0, 0.0), 0.1)
+    living.merge(first, TOPIC, 0.0)
+    assert living.snapshot().terrain.bounds == first.bounds
+    living.merge(local_map((3.0, -2.0), 0.2), TOPIC, 1.0)
+    assert cell(living, 0.5, 0.5)[0] == 0.1 and cell(living, 3.5, -1.5)[0] == 0.2
+    assert np.isnan(cell(living, 2.0, 0.0)[0])
+    x, y = np.subtract(living.snapshot().terrain.origin, first.origin) / 0.05
+    assert abs(x - round(x)) < 1e-9 and abs(y - round(y)) < 1e-9
+
+
+def test_a_window_rolls_with_the_rover_and_takes_the_loaded_map_anew():
+    living = LivingMap(MergeRules(window=2.0))
+    living.load(PRIOR, 0.0)
+    for k in range(40):
+        place = -2.0 + 0.1 * k, 0.0
+        living.merge(local_map((place[0] - 0.5, -0.5), 1.0), TOPIC, 1.0 + k, place)
+        terrain = living.snapshot().terrain
+        assert terrain.elevation.shape == (40, 40)
+        x0, x1, y0, y1 = terrain.bounds
+        assert x0 + 0.5 < place[0] < x1 - 0.5 and y0 + 0.5 < place[1] < y1 - 0.5
+    place = -2.0, 0.0
+    # Back at the start, what left the window is the loaded map again.
+    living.merge(local_map((-2.1, -0.1), 2.0, (4, 4)), TOPIC, 99.0, place)
+    height, source, _ = cell(living, -2.5, 0.3)
+    assert source == "loaded"
+    assert height == pytest.approx(float(PRIOR.elevation_at(-2.5, 0.3)), abs=1e-6)
+
+
+def test_a_window_that_is_too_large_is_refused_and_the_map_stays():
+    living = LivingMap(MergeRules(max_cells=10_000))
+    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 0.0)
+    with pytest.raises(PlanningError, match="set map_window"):
+        living.merge(local_map((100.0, 100.0), 0.2), TOPIC, 1.0)
+    assert cell(living, 0.5, 0.5)[0] == 0.1
+
+
+def test_cells_between_those_of_the_loaded_map_are_interpolated():
+    plane = make_terrain(lambda x, y: 0.3 * x - 0.2 * y)
+    living = LivingMap()
+    living.load(PRIOR, 0.0)
+    shifted = replace(plane, origin=(plane.origin[0] + 0.02, plane.origin[1] + 0.02))
+    living.merge(shifted, TOPIC, 1.0)
+    height, source, _ = cell(living, 1.0, 1.0)
+    assert source == TOPIC
+    assert height == pytest.approx(0.3 * 0.98 - 0.2 * 0.98, abs=1e-6)
+
+
+def test_the_highest_of_several_finer_cells_counts():
+    living = LivingMap()
+    living.load(make_terrain(waves, 0.1), 0.0)
+    living.merge(local_map((-4.0, -4.0), 0.0, (40, 40), 0.1), TOPIC, 1.0)
+    fine = np.zeros((80, 80))
+    fine[41, 41] = 0.5
+    living.merge(Terrain(fine, 0.02, (0.0, 0.0)), TOPIC, 2.0)
+    assert living.snapshot().terrain.resolution == 0.1
+    assert cell(living, 0.8, 0.8)[0] == 0.5 and cell(living, 0.6, 0.8)[0] == 0.0
+
+
+def test_a_coarse_loaded_map_takes_the_cells_of_a_finer_first_local_map():
+    coarse = make_terrain(lambda x, y: 0.1 * x, 1.0)
+    living = LivingMap()
+    living.load(coarse, 0.0)
+    living.merge(local_map((0.0, 0.0), 0.7), TOPIC, 1.0)
+    assert living.snapshot().terrain.resolution == 0.05
+    assert cell(living, 0.5, 0.5)[0] == 0.7
+    assert cell(living, -2.5, 1.25)[0] == pytest.approx(-0.25, abs=1e-6)
+
+
+def test_soil_and_friction_of_the_loaded_map_stay():
+    soil = np.ones(PRIOR.elevation.shape, np.int32)
+    prior = replace(
+        PRIOR, soil=soil, soil_names=("dry_sand", "loam"), friction=np.full(soil.shape, 0.4)
+    )
+    living = LivingMap()
+    living.load(prior, 0.0)
+    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1.0)
+    terrain = living.snapshot().terrain
+    assert terrain.soil_names == prior.soil_names and (terrain.soil == 1).all()
+    np.testing.assert_array_equal(terrain.friction, 0.4)
+
+
+def test_replacing_keeps_nothing_and_the_terrain_itself():
+    living = LivingMap()
+    living.load(PRIOR, 0.0)
+    only = local_map((0.0, 0.0), 0.1)
+    living.replace(only, TOPIC, 1.0)
+    now = living.snapshot()
+    assert now.terrain is only and not living.has_loaded
+    assert UNKNOWN not in now.sources.source
