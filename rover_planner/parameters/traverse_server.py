@@ -89,8 +89,8 @@ class TraverseServerParameters(ParameterTable):
     )
     search_frontier: bool = parameter(
         False,
-        "Whether a goal on unknown ground is answered with a way that ends as near to it as known "
-        "ground allows; the verdict has goal_offset.",
+        "Whether a goal beyond the known ground is answered with a way that ends as near to it as "
+        "that allows; the verdict has goal_offset.",
     )
     plan_spacing: float = parameter(
         0.1,

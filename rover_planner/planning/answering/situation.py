@@ -129,7 +129,8 @@ class Situation:
             suspension = self._compare_suspension(planner.predict_standing)
             return replace(_judgement(planner, way, self._blind, suspension, search), way=answer)
         if answer.outcome in (START_REFUSED, GOAL_REFUSED) and refused is not None:
-            return refused
+            reason = f"{answer.reason}; the best candidate: {refused.reason}"
+            return replace(refused, reason=reason, way=answer)
         why = "; ".join(filter(None, (answer.reason, answer.warning)))
         if refused is None:
             return replace(refusal(answer.outcome, why), way=answer)

@@ -30,6 +30,8 @@ from rover_planner.planning.ways.smoothing import smooth
 from rover_planner.planning.ways.window import choose_window, cut_out
 
 FOUND, NO_WAY, OUT_OF_TIME = "found", "no_way", "out_of_time"
+BEYOND = ("unknown_ground", "off_map")
+"""Codes of goals that lie beyond the frontier of the known ground."""
 START_REFUSED, GOAL_REFUSED = "start_refused", "goal_refused"
 """Outcomes of a search."""
 
@@ -53,7 +55,7 @@ class LatticeSettings:
     """Distance of neighbouring nodes [m]; None: a quarter of the wheelbase."""
     frontier: bool = False
     """Whether a way may end at the frontier of the known ground, as near as possible to a goal
-    on unknown ground."""
+    beyond it."""
 
     def __post_init__(self) -> None:
         for name in ("budget", "cell"):
@@ -133,7 +135,8 @@ class _WaySearch:
     ):
         self._began = time.perf_counter()
         self._question, self._settings, self._on_progress = question, settings, on_progress
-        self._start, self._goal = _check_end("start", question), _check_end("goal", question)
+        self._start = _check_end("start", question, may_be_off_map=False)
+        self._goal = _check_end("goal", question, may_be_off_map=settings.frontier)
         self._judge = Judge(
             question.rover, question.terrain, question.options, question.joint_angles
         )
@@ -150,7 +153,7 @@ class _WaySearch:
         ):
             code, reason = self._judge.refuse(pose)
             is_frontier = self._settings.frontier and outcome == GOAL_REFUSED
-            self._to_frontier = is_frontier and code == "unknown_ground"
+            self._to_frontier = is_frontier and code in BEYOND
             if code and not self._to_frontier:
                 return self._answer(outcome, f"the rover cannot stand at the {name}: {reason}")
         search = self._prepare()
@@ -184,7 +187,7 @@ class _WaySearch:
         left = np.hypot(*(path.poses[-1] - self._goal)[:2])
         if not self._to_frontier:
             return ""
-        return f"the goal is on unknown ground; the way ends {left:.1f} m before it"
+        return f"the goal is beyond the known ground; the way ends {left:.1f} m before it"
 
     def _describe_extent(self) -> str:
         """Return what part of the map is searched, in words."""
@@ -297,14 +300,14 @@ class _WaySearch:
         return np.asarray(was_asked.reshape(*self._nodes.shape, HEADINGS).any(axis=2))
 
 
-def _check_end(name: str, question: WayQuestion) -> NDArray[np.float64]:
+def _check_end(name: str, question: WayQuestion, *, may_be_off_map: bool) -> NDArray[np.float64]:
     """Return the start or the goal (3,), checked."""
     pose = np.array(getattr(question, name), dtype=float)
     if pose.shape != (3,) or not np.isfinite(pose).all():
         raise PlanningError(
             f"{name} is {pose.tolist()}; it must be three finite numbers x, y, yaw"
         )
-    if not question.terrain.contains(pose[0], pose[1]):
+    if not (may_be_off_map or question.terrain.contains(pose[0], pose[1])):
         xmin, xmax, ymin, ymax = question.terrain.bounds
         raise PlanningError(
             f"{name} is at ({pose[0]:g}, {pose[1]:g}), off the map, which goes from x {xmin:g} to "

@@ -1,0 +1,100 @@
+"""The whole system drives around boulders that it sees only on the way, on both engines."""
+
+import numpy as np
+import pytest
+from rclpy.parameter import Parameter
+from scipy import ndimage
+
+from benchmarks.grounds import real_maps
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.nodes.mission.drive import DriveSettings, drive_to
+from rover_planner.nodes.mission_planner import MissionPlanner
+from rover_planner.nodes.rover_simulator import RoverSimulator
+from rover_planner.nodes.traction_controller import TractionController
+from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.ros_fixtures import RosRun, wait_until
+
+SERVER = {
+    "policy": "optimal",
+    "control_margin": 0.0,
+    "map_updates": "merge",
+    "search_frontier": True,
+    "search_budget": 4.0,
+    "time_budget": 60.0,
+}
+SPEED = 0.1
+
+
+@pytest.fixture
+def ros():
+    run = RosRun()
+    yield run
+    run.close()
+
+
+def boulder_field() -> tuple[Terrain, tuple, tuple]:
+    """Return a boulder field with start and goal: Otira's if it is there, else a made one."""
+    for name, terrain in real_maps().items():
+        if name.startswith("otira"):
+            return without_gaps(terrain), (25.402, 15.524, 0.297), (23.869, 14.883, -2.296)
+    made = make_mars_terrain(3, 8.0, rock_cover=0.2, crater_density=0.0)
+    return made, (1.0, 1.0, 0.0), (6.0, 6.0, 0.0)
+
+
+def without_gaps(terrain: Terrain) -> Terrain:
+    """Return a ground whose unknown cells have the height of the nearest known one."""
+    unknown = np.isnan(terrain.elevation)
+    nearest = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    return Terrain(terrain.elevation[tuple(nearest)], terrain.resolution, terrain.origin)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
+def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
+    terrain, start, goal = boulder_field()
+    save_terrain(tmp_path / "ground.npz", terrain)
+    options = PathQueryOptions(policy="optimal", control_margin=0.0)
+    fan = answer_path_query(load_rover("lsr1"), terrain, start, goal, options)
+    assert not fan.traversable
+
+    simulated = {
+        "terrain_file": str(tmp_path / "ground.npz"),
+        "start_x": start[0],
+        "start_y": start[1],
+        "start_yaw": start[2],
+        "engine": engine,
+        "sensor_range": 2.0,
+        "sensor_occlusion": False,
+        "map_rate": 1.0,
+        "follow_commands": True,
+        "speed": SPEED,
+    }
+    server = ros.spin(TraverseServer(context=ros.context, parameter_overrides=values(SERVER)))
+    controller = ros.spin(
+        TractionController(
+            context=ros.context, parameter_overrides=values({"enabled_at_start": True})
+        )
+    )
+    simulator = ros.spin(
+        RoverSimulator(context=ros.context, parameter_overrides=values(simulated))
+    )
+    planner = ros.spin(MissionPlanner(context=ros.context))
+    planner.wait_for_server()
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    known = np.isfinite(server.service.terrain.elevation).sum()
+    answer = planner.ask(simulator.simulation.plant.pose(), goal)
+    assert answer["traversable"], answer["reason"]
+    told = []
+    drive_to(planner, goal, answer["poses"], DriveSettings(timeout=400.0), told.append)
+    place = simulator.simulation.plant.pose()
+    assert np.hypot(*(place - goal)[:2]) < 0.25
+    assert np.isfinite(server.service.terrain.elevation).sum() > known
+    for node in (simulator, server, controller, planner):
+        assert ros.is_alive(node)
+
+
+def values(given):
+    return [Parameter(name, value=value) for name, value in given.items()]
