@@ -201,12 +201,12 @@ class MapTopics:
         self._is_from_topic = True
 
     def _fill_under_rover(self) -> None:
-        standing, known = self._service.standing(), self._service.known_map
-        if standing is None or known is None:
+        standing = self._service.standing()
+        if standing is None or self._service.known_map is None:
             return
         filled = self._keeper.fill(standing, self._now())
         if filled is not None:
-            self._keep(filled, known.source, known.stamp)
+            self._service.amend_map(filled.terrain, filled.sources)
             self._node.get_logger().info(
                 f"ground under the rover filled: {filled.sources.count()} cells by source"
             )

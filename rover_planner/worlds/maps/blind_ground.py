@@ -57,6 +57,8 @@ class SeenGround:
         The belly is the rectangle of the rover file, seen from above; ground off the map is
         UNSEEN.
         """
+        if self._is_seen_around(rover, poses):
+            return BlindShare(0.0, 0.0, -1, -1)
         ny, nx = self.kinds.shape
         swept = np.zeros((ny, nx), bool)
         off_map, first, beyond = 0, -1, -1
@@ -77,6 +79,19 @@ class SeenGround:
         assumed, unseen = int(counts[ASSUMED]), int(counts[UNSEEN]) + off_map
         first, beyond = (-1 if k < 0 else int(waypoints[k]) for k in (first, beyond))
         return BlindShare((assumed + unseen) / total, assumed / total, first, beyond)
+
+    def _is_seen_around(self, rover: Rover, poses: NDArray[np.float64]) -> bool:
+        """Return whether all ground around a path is on the map and was seen."""
+        half = max(np.hypot(x, y) for x in rover.belly.x for y in rover.belly.y)
+        low, high = poses[:, :2].min(axis=0) - half, poses[:, :2].max(axis=0) + half
+        origin, step = self.terrain.origin, self.terrain.resolution
+        first = np.floor((low - origin) / step).astype(int)
+        last = np.ceil((high - origin) / step).astype(int)
+        ny, nx = self.kinds.shape
+        if (first < 0).any() or last[0] >= nx or last[1] >= ny:
+            return False
+        box = self.kinds[first[1] : last[1] + 1, first[0] : last[0] + 1]
+        return not (box != SEEN).any()
 
     def _spread_out(
         self, rover: Rover, poses: NDArray[np.float64]

@@ -66,6 +66,14 @@ def test_ground_off_the_map_was_not_seen():
     assert 0.0 < share.blind_share < 1.0
 
 
+def test_ground_beside_the_belly_does_not_count():
+    kinds = np.full((81, 161), SEEN, np.uint8)
+    kinds[46:] = UNSEEN  # y of 0.3 m and more; the belly ends at 0.2 m
+    assert SeenGround(ground(), kinds).share(LSR1, PATH).blind_share == 0.0
+    kinds[44:] = UNSEEN
+    assert SeenGround(ground(), kinds).share(LSR1, PATH).blind_share > 0.0
+
+
 def test_a_long_path_counts_each_cell_once():
     kinds = np.full((81, 161), SEEN, np.uint8)
     kinds[:, 60] = UNSEEN
