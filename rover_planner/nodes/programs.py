@@ -57,11 +57,11 @@ def read_engine(
 PROGRAMS = {
     "traverse_server": Program(
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
-        "subscribes elevation_cloud, joint_states, odometry, ~/path, ~/tool_target, "
-        "~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, ~/load_map, ~/cancel; "
+        "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
+        "~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, ~/load_map, ~/cancel; "
         "publishes ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
-        "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/markers",
+        "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/map, ~/markers",
         read_nothing,
         specs_of(TraverseServerParameters),
     ),
