@@ -83,8 +83,9 @@ PROGRAMS = {
     ),
     "mission_planner": Program(
         "Query a traverse_server over ROS 2 for a list of goals.",
-        "calls traverse_server/can_traverse, traverse_server/check_path; subscribes traverse_server/verdict, "
-        "traverse_server/wheel_loads, traverse_server/slip_ratios, odometry; publishes "
+        "calls traverse_server/can_traverse, traverse_server/check_path; subscribes "
+        "traverse_server/verdict, traverse_server/wheel_loads, traverse_server/slip_ratios, "
+        "odometry; publishes "
         "elevation_cloud, path, traverse_server/path",
         read_mission,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "
