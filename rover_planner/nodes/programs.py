@@ -57,11 +57,12 @@ def read_engine(
 PROGRAMS = {
     "traverse_server": Program(
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
-        "subscribes elevation_cloud, joint_states, odometry, ~/path, ~/tool_target, "
-        "~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, ~/load_map, ~/cancel; "
-        "publishes ~/plan, ~/verdict, diagnostics, "
+        "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
+        "~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, "
+        "~/load_map, ~/cancel; publishes ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
-        "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/markers",
+        "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/search_progress, "
+        "~/map, ~/markers",
         read_nothing,
         specs_of(TraverseServerParameters),
     ),
@@ -82,9 +83,10 @@ PROGRAMS = {
     ),
     "mission_planner": Program(
         "Query a traverse_server over ROS 2 for a list of goals.",
-        "calls traverse_server/can_traverse; subscribes traverse_server/verdict, "
-        "traverse_server/wheel_loads, traverse_server/slip_ratios, odometry; publishes "
-        "elevation_cloud, path",
+        "calls traverse_server/can_traverse, traverse_server/check_path; subscribes "
+        "traverse_server/verdict, traverse_server/wheel_loads, traverse_server/slip_ratios, "
+        "odometry; publishes "
+        "elevation_cloud, path, traverse_server/path",
         read_mission,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "
         "question was refused before any path was judged, or the rover did not get there. 2: bad "

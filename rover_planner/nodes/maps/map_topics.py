@@ -91,7 +91,8 @@ class MapTopics:
         self._fills = parameters.fill_under_rover
         self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
         self._is_from_topic = False
-        self._topic, self._looked, self._told = CLOUD, -float("inf"), -float("inf")
+        self._topic, self._looked = CLOUD, -float("inf")
+        self._told, self._told_kind = -float("inf"), ("", False)
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self._keep(self._keeper.load(terrain, self._now(), None), parameters.terrain_file)
@@ -165,7 +166,7 @@ class MapTopics:
     def take_file(self, terrain: Terrain, file: str) -> None:
         """Take the terrain of a file; call it in the thread of the maps."""
         self._intake.forget()
-        self._is_from_topic, self._told = False, -float("inf")
+        self._is_from_topic = False
         self._take(self._keeper.load(terrain, self._now(), self._service.standing()), file, None)
 
     def look_under_rover(self) -> None:
@@ -200,12 +201,12 @@ class MapTopics:
         self._is_from_topic = True
 
     def _fill_under_rover(self) -> None:
-        standing, known = self._service.standing(), self._service.known_map
-        if standing is None or known is None:
+        standing = self._service.standing()
+        if standing is None or self._service.known_map is None:
             return
         filled = self._keeper.fill(standing, self._now())
         if filled is not None:
-            self._keep(filled, known.source, known.stamp)
+            self._service.amend_map(filled.terrain, filled.sources)
             self._node.get_logger().info(
                 f"ground under the rover filled: {filled.sources.count()} cells by source"
             )
@@ -216,8 +217,9 @@ class MapTopics:
         if is_new:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None
-            if not self._keeper.merges or now - self._told >= LOG_PERIOD:
-                self._told = now
+            kind = source, self._keeper.merges
+            if not kind[1] or kind != self._told_kind or now - self._told >= LOG_PERIOD:
+                self._told, self._told_kind = now, kind
                 self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
 
     def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:

@@ -65,6 +65,7 @@ class Judgement:
         try:
             whole = self._with_rest()
             _ = whole.changes() if whole._is_equal_and_traversable else whole.classes
+            _ = whole.ground
         except QuestionStoppedError:
             return replace(whole, classify=tuple, judge_rest=None)
         return whole
@@ -89,8 +90,12 @@ class Judgement:
         if self.candidate is None:
             return VerdictReport(False, self.code, self.reason)
         report = report_path(self.candidate, self.classes, self.suspension, self.search)
-        ground = None if self.find_ground is None else self.find_ground()
-        return replace(report, code=self.code, reason=self.reason, ground=ground)
+        return replace(report, code=self.code, reason=self.reason, ground=self.ground)
+
+    @cached_property
+    def ground(self) -> GroundReport | None:
+        """Never seen ground under the belly; None without a judged path. Computed on first use."""
+        return None if self.find_ground is None else self.find_ground()
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

@@ -99,6 +99,12 @@ class TraverseService:
         about = KnownMap(terrain, terrain, source, stamp, time.monotonic(), "", cells, frame)
         return self._keep_map(about)
 
+    def amend_map(self, terrain: Terrain, cells: CellSources) -> None:
+        """Keep a map with more known cells than the present one, of the same age."""
+        known = self._map
+        if known is not None:
+            self._keep_map(replace(known, received=terrain, cells=cells))
+
     def renew_map(self) -> None:
         """Note that the present map has arrived once more."""
         known = self._map

@@ -1,5 +1,6 @@
 """Ground under the belly that was never seen: its share of a path, and where it is met first."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ CODE = "blind_ground"
 """Code of the refusal."""
 SEEN, ASSUMED, UNSEEN = range(3)
 """What is known of a cell: measured, filled in as part of the start footprint, or nothing."""
+MOST = 300
+"""Largest number of points along a side of the belly."""
 CHUNK = 500_000
 """Points that are looked up at once."""
 
@@ -54,38 +57,66 @@ class SeenGround:
     def share(self, rover: Rover, poses: NDArray[np.float64]) -> BlindShare:
         """Return the blind share under the belly of a rover along poses (n, 3).
 
-        The belly is the rectangle of the rover file, seen from above; ground off the map is
-        UNSEEN.
+        The belly is the rectangle of the rover file, seen from above. The shares are those of
+        cells on the map; ground off the map counts for the first waypoints.
         """
+        if self._is_seen_around(rover, poses):
+            return BlindShare(0.0, 0.0, -1, -1)
         ny, nx = self.kinds.shape
         swept = np.zeros((ny, nx), bool)
-        off_map, first, beyond = 0, -1, -1
+        first, beyond = -1, -1
         poses, waypoints = self._spread_out(rover, poses)
+        near = self._is_near(rover, poses)
+        off_map = waypoints[~near][:1].tolist()
+        poses, waypoints = poses[near], waypoints[near]
         for start, rows, columns in self._cells_below(rover, poses):
             on_map = (rows >= 0) & (rows < ny) & (columns >= 0) & (columns < nx)
             i, j = np.clip(rows, 0, ny - 1), np.clip(columns, 0, nx - 1)
             kinds = np.where(on_map, self.kinds[i, j], UNSEEN)
             swept[i[on_map], j[on_map]] = True
-            outside = np.column_stack([rows[~on_map], columns[~on_map]])
-            off_map += len(np.unique(outside, axis=0))
             if first < 0:
                 first = _first(start, kinds != SEEN)
             if beyond < 0:
                 beyond = _first(start, kinds == UNSEEN)
         counts = np.bincount(self.kinds[swept], minlength=3)
-        total = max(int(counts.sum()) + off_map, 1)
-        assumed, unseen = int(counts[ASSUMED]), int(counts[UNSEEN]) + off_map
-        first, beyond = (-1 if k < 0 else int(waypoints[k]) for k in (first, beyond))
-        return BlindShare((assumed + unseen) / total, assumed / total, first, beyond)
+        if not counts.any():
+            return BlindShare(1.0, 0.0, 0, 0)
+        total, assumed = int(counts.sum()), int(counts[ASSUMED])
+        blind = (assumed + int(counts[UNSEEN])) / total
+        firsts = (
+            min([int(waypoints[k]) for k in (found,) if k >= 0] + off_map, default=-1)
+            for found in (first, beyond)
+        )
+        return BlindShare(blind, assumed / total, *firsts)
+
+    def _is_near(self, rover: Rover, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return (n,) True for the poses at which the belly may be over the map."""
+        reach = _reach(rover) + self.terrain.resolution
+        x0, x1, y0, y1 = self.terrain.bounds
+        x, y, _ = poses.T
+        return (x >= x0 - reach) & (x <= x1 + reach) & (y >= y0 - reach) & (y <= y1 + reach)
+
+    def _is_seen_around(self, rover: Rover, poses: NDArray[np.float64]) -> bool:
+        """Return whether all ground around a path is on the map and was seen."""
+        half = _reach(rover)
+        low, high = poses[:, :2].min(axis=0) - half, poses[:, :2].max(axis=0) + half
+        origin, step = self.terrain.origin, self.terrain.resolution
+        first = np.floor((low - origin) / step).astype(int)
+        last = np.ceil((high - origin) / step).astype(int)
+        ny, nx = self.kinds.shape
+        if (first < 0).any() or last[0] >= nx or last[1] >= ny:
+            return False
+        box = self.kinds[first[1] : last[1] + 1, first[0] : last[0] + 1]
+        return not (box != SEEN).any()
 
     def _spread_out(
         self, rover: Rover, poses: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         """Return the poses at which the belly has moved on by a cell, and their indices."""
-        half = max(np.hypot(x, y) for x in rover.belly.x for y in rover.belly.y)
         steps = np.diff(poses, axis=0)
         turns = np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*steps[:, :2].T) + half * turns)])
+        moved = np.hypot(*steps[:, :2].T) + _reach(rover) * turns
+        way = np.concatenate([[0.0], np.cumsum(moved)])
         cells = np.floor(way / self.terrain.resolution)
         kept = np.concatenate([[True], np.diff(cells) > 0])
         kept[-1] = True
@@ -98,7 +129,7 @@ class SeenGround:
         terrain, belly = self.terrain, rover.belly
         step = 0.7 * terrain.resolution  # no cell is narrower than that across its diagonal
         along, across = (
-            np.linspace(low, high, max(2, int(np.ceil((high - low) / step)) + 1))
+            np.linspace(low, high, min(max(2, math.ceil((high - low) / step) + 1), MOST))
             for low, high in (belly.x, belly.y)
         )
         u, v = (axis.ravel() for axis in np.meshgrid(along, across))
@@ -109,6 +140,11 @@ class SeenGround:
             columns = (x + c * u - s * v - terrain.origin[0]) / terrain.resolution
             rows = (y + s * u + c * v - terrain.origin[1]) / terrain.resolution
             yield start, np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
+
+
+def _reach(rover: Rover) -> float:
+    """Return the distance of the belly's farthest corner from the body origin [m]."""
+    return max(math.hypot(x, y) for x in rover.belly.x for y in rover.belly.y)
 
 
 def _first(start: int, blind: NDArray[np.bool_]) -> int:

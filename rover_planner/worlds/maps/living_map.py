@@ -70,6 +70,7 @@ class LivingMap:
         """How maps merge from now on."""
         self._names = list(FIRST_NAMES)
         self._last: dict[str, float] = {}
+        self._rolls = False
         self._loaded: Terrain | None = None
         self._loaded_time = 0.0
         self._grid: CellGrid | None = None
@@ -124,6 +125,7 @@ class LivingMap:
         """
         self._choose_grid(terrain)
         assert self._grid is not None
+        self._rolls = self.rules.window > 0.0
         patch = lay_onto(terrain, self._grid)
         if centre is None:
             x0, x1, y0, y1 = terrain.bounds
@@ -203,6 +205,7 @@ class LivingMap:
 
     def _clear(self, terrain: Terrain) -> None:
         self._last.clear()
+        self._rolls = False
         self._loaded, self._window, self._whole = None, None, None
         self._grid = grid_of(terrain)
 
@@ -243,7 +246,7 @@ class LivingMap:
     def _wanted_box(self, box: CellBox, centre: tuple[float, float]) -> CellBox:
         assert self._grid is not None
         old = None if self._window is None else self._window.box
-        if self.rules.window > 0.0:
+        if self._rolls:
             n = max(2, round(self.rules.window / self._grid.resolution))
             column, row = (round(value) - n // 2 for value in self._grid.coordinates(*centre))
             is_kept = (
@@ -307,7 +310,7 @@ class LivingMap:
 
     def _is_near(self, box: CellBox) -> bool:
         """Return whether a window that grows to a box stays of the size of both."""
-        if self.rules.window > 0.0 or self._window is None:
+        if self._rolls or self._window is None:
             return True
         old = self._window.box
         grown = self._wanted_box(box, self._centre_of(box)).cells

@@ -198,7 +198,7 @@ def send_standing(client, pose, angles=(0.0, 0.0, 0.0, 0.0)):
 
 
 def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client):
-    start_server(planner="fan", footprint_margin=0.1)
+    server = start_server(planner="fan", footprint_margin=0.1)
     ahead = make_terrain(lambda x, y: np.where(x < 0.0, np.nan, 0.0 * x))
     client.send_terrain(ahead)
     start, goal = (-0.45, 0.0, 0.0), (2.0, 0.0, 0.0)
@@ -210,7 +210,11 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
         time.sleep(0.1)
         return any("ground under the rover filled" in line for line in client.logs)
 
+    before = server.service.known_map
     wait_until(is_filled, "the filled ground")
+    after = server.service.known_map
+    assert (after.arrival, after.stamp) == (before.arrival, before.stamp)
+    assert after.fingerprint != before.fingerprint
     _, verdict, _ = ask(client, start, goal)
     assert verdict["traversable"] == "true"
     assert 0.0 < float(verdict["footprint_share"]) == float(verdict["blind_share"]) < 0.5

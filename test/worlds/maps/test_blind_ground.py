@@ -1,5 +1,7 @@
 """The share of never seen ground under the belly is counted along a path, cell by cell."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -63,7 +65,26 @@ def test_ground_off_the_map_was_not_seen():
     share = SeenGround(ground(), kinds).share(LSR1, far)
     assert share.first == share.first_beyond_footprint
     assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
-    assert 0.0 < share.blind_share < 1.0
+    assert share.blind_share == 0.0  # the shares are those of cells on the map
+    away = SeenGround(ground(), kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
+    assert (away.blind_share, away.first) == (1.0, 0)
+
+
+def test_a_long_path_off_the_map_takes_no_time():
+    x = np.arange(0.0, 20_000.0, 0.02)
+    path = np.column_stack([x, 0.0 * x, 0.0 * x])
+    began = time.process_time()
+    share = seen_ground(ground(), None).share(LSR1, path)
+    assert time.process_time() - began < 2.0
+    assert 5.6 < path[share.first, 0] + 0.3 < 6.2 + 0.6
+
+
+def test_ground_beside_the_belly_does_not_count():
+    kinds = np.full((81, 161), SEEN, np.uint8)
+    kinds[46:] = UNSEEN  # y of 0.3 m and more; the belly ends at 0.2 m
+    assert SeenGround(ground(), kinds).share(LSR1, PATH).blind_share == 0.0
+    kinds[44:] = UNSEEN
+    assert SeenGround(ground(), kinds).share(LSR1, PATH).blind_share > 0.0
 
 
 def test_a_long_path_counts_each_cell_once():

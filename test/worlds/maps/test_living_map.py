@@ -7,6 +7,7 @@ import pytest
 
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.worlds.maps.cells import lay_onto
 from rover_planner.worlds.maps.living_map import SUREST, LivingMap, MergeRules
 from rover_planner.worlds.maps.sources import LOADED, UNKNOWN
 from support.grounds import make_terrain, waves
@@ -160,6 +161,16 @@ def test_a_window_rolls_with_the_rover_and_takes_the_loaded_map_anew():
     height, source, _ = cell(living, -2.5, 0.3)
     assert source == "loaded"
     assert height == pytest.approx(float(PRIOR.elevation_at(-2.5, 0.3)), abs=1e-6)
+
+
+def test_a_loaded_map_stays_whole_until_the_first_local_map():
+    living = LivingMap(MergeRules(window=2.0))
+    living.load(PRIOR, 0.0)
+    patch = lay_onto(local_map((-4.5, 0.0), 0.1), living.grid)
+    assert living.fill(patch, np.zeros((20, 20), bool), 1.0)
+    terrain = living.snapshot().terrain
+    assert terrain.contains(*PRIOR.bounds[1::2]) and terrain.contains(-4.5, 0.0)
+    assert cell(living, -4.2, 0.5)[:2] == (0.1, "footprint")
 
 
 def test_a_window_that_is_too_large_is_refused_and_the_map_stays():
