@@ -11,6 +11,7 @@ from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
 from rover_planner.command.study import study
 from rover_planner.command.terrain import terrain
+from rover_planner.command.urdf import rover, urdf
 from rover_planner.command.view import view
 from rover_planner.command.warm_up import warm_up
 from rover_planner.shell.run_app import run_app
@@ -33,6 +34,8 @@ app.command(context_settings=NEGATIVE_ARGUMENTS)(reach)
 app.command()(study)
 app.command()(view)
 app.command()(terrain)
+app.command()(urdf)
+app.command()(rover)
 app.command()(demo)
 app.command()(figure4)
 app.command()(warm_up)

@@ -25,6 +25,7 @@ from support.ros_fixtures import domain_id
 NOT_RUN = {
     ("make",): "makes an environment and runs the tests; each target has tests of its own",
     ("pip",): "installs; test_lowest_versions installs in an environment of its own",
+    ("git", "clone"): "needs the network",
     ("ros2",): "PyPI does not have the ros2 command",
     ("rosdep",): "is for a robot that has ROS 2 from apt",
     ("source",): "is for a robot that has ROS 2 from apt",
