@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+import yaml
 from rclpy.parameter import Parameter
 
 from rover_planner.nodes import start
@@ -180,6 +181,19 @@ def test_a_parameter_that_does_not_exist_is_warned_of_once_with_the_nearest(name
 def test_parameters_that_exist_are_not_warned_of(name, ros, capfd):
     right = [Parameter("rover", value="m2020"), Parameter("use_sim_time", value=False)]
     ros.spin(NODES[name](context=ros.context, parameter_overrides=right))
+    assert "does not exist" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if PROGRAMS[name].parameters])
+def test_a_node_takes_its_parameter_file_in_a_namespace(name, ros, capfd):
+    file = REPOSITORY / "config" / "parameters" / f"{name}.yaml"
+    words = ["--ros-args", "--params-file", str(file), "-r", "__ns:=/one"]
+    words += ["-r", "diagnostics:=/diagnostics"]
+    node = ros.spin(NODES[name](context=ros.context, cli_args=words))
+    assert node.get_fully_qualified_name() == f"/one/{name}"
+    for key, value in yaml.safe_load(file.read_text())["/**"]["ros__parameters"].items():
+        assert node.get_parameter(key).value == value
+    wait_until(lambda: node.count_publishers("/diagnostics") == 1, "diagnostics")
     assert "does not exist" not in capfd.readouterr().err
 
 
