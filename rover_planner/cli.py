@@ -9,6 +9,7 @@ from rover_planner.command.figure4 import figure4
 from rover_planner.command.plan import plan, replay_plan
 from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
+from rover_planner.command.replay import replay
 from rover_planner.command.study import study
 from rover_planner.command.terrain import terrain
 from rover_planner.command.urdf import rover, urdf
@@ -34,6 +35,7 @@ app.command(context_settings=NEGATIVE_ARGUMENTS)(reach)
 app.command()(study)
 app.command()(view)
 app.command()(terrain)
+app.command()(replay)
 app.command()(urdf)
 app.command()(rover)
 app.command()(demo)

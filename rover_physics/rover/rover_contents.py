@@ -17,8 +17,8 @@ def rover_to_dict(rover: Rover) -> dict[str, Any]:
     return contents
 
 
-def write_rover(path: Path, rover: Rover, comment: str = "") -> None:
-    """Write a rover file; numbers are written in full, so it loads as the same rover.
+def save_rover(path: Path, rover: Rover, comment: str = "") -> None:
+    """Save a rover file; numbers are written in full, so it loads as the same rover.
 
     Args:
         path: The file; an existing one is overwritten.
@@ -28,11 +28,11 @@ def write_rover(path: Path, rover: Rover, comment: str = "") -> None:
     Raises:
         RoverFileError: It cannot be written.
     """
-    write_yaml(path, rover_to_dict(rover), comment)
+    save_yaml(path, rover_to_dict(rover), comment)
 
 
-def write_yaml(path: Path, contents: dict[str, Any], comment: str = "") -> None:
-    """Write contents as YAML, in their order; arguments and errors as for `write_rover`."""
+def save_yaml(path: Path, contents: dict[str, Any], comment: str = "") -> None:
+    """Write contents as YAML, in their order; arguments and errors as for `save_rover`."""
     head = "".join(f"# {line}\n" for line in comment.splitlines())
     text = yaml.safe_dump(contents, sort_keys=False, default_flow_style=None, width=99)
     with errors_of(path):

@@ -17,7 +17,7 @@ def urdf(
     ] = None,
 ) -> None:
     """Write a rover as URDF, with inertias, joint limits and collision cylinders."""
-    from rover_physics.rover.rover_contents import write_yaml
+    from rover_physics.rover.rover_contents import save_yaml
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.rover.urdf.joint_map import map_of
     from rover_physics.rover.urdf.write_urdf import write_urdf
@@ -26,7 +26,7 @@ def urdf(
     write_urdf(out, model)
     if joint_map is not None:
         comment = f"Joints of {model.name}'s URDF, and what the URDF does not tell."
-        write_yaml(joint_map, map_of(model), comment)
+        save_yaml(joint_map, map_of(model), comment)
     typer.echo(f"wrote {out}: {model.name}, {model.total_mass:.6g} kg")
 
 
@@ -45,7 +45,7 @@ def rover(
     ],
 ) -> None:
     """Write a rover file from a URDF and a joint map."""
-    from rover_physics.rover.rover_contents import write_rover
+    from rover_physics.rover.rover_contents import save_rover
     from rover_physics.rover.urdf.read_rover import rover_from_urdf
 
     read = rover_from_urdf(from_urdf, joint_map)
@@ -53,7 +53,7 @@ def rover(
         f"From {from_urdf.name} by {joint_map.name}. SI units. Positions: left side, body frame\n"
         "(x forward, y left, z up, origin midway between the rocker pivots), on flat ground."
     )
-    write_rover(out, read.rover, comment)
+    save_rover(out, read.rover, comment)
     typer.echo(
         f"wrote {out}: {read.rover.name}, {read.rover.total_mass:.6g} kg, left and right differ "
         f"by {1e3 * read.asymmetry:.3g} mm"

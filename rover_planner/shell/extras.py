@@ -8,6 +8,7 @@ from rover_planner.errors import PlanningError
 INSTALL = {
     "rclpy": "ROS 2 Jazzy: source it, or pip install 'rover_planner[ros]'",
     "matplotlib": "matplotlib: pip install 'rover_planner[plots]'",
+    "rosbags": "rosbags: pip install 'rover_planner[bags]'",
     "viser": "viser: pip install 'rover_planner[view]'",
 }
 """Name of each optional module's package, and how to install it."""

@@ -31,6 +31,7 @@ NOT_RUN = {
     ("source",): "is for a robot that has ROS 2 from apt",
     ("python3", "-m", "colcon"): "is for a robot that has ROS 2 from apt",
     ("python", "-m", "benchmarks"): "takes minutes; test_benchmarks runs each topic small",
+    ("rover_planner", "replay"): "needs a bag; test_replay records small ones",
     ("rover_planner", "view"): "serves a page until Ctrl-C; the tests in test/viewer serve it",
     ("rover_planner", "study"): "takes minutes; test_studies runs small ones",
 }

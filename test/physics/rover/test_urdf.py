@@ -11,7 +11,7 @@ import yaml
 
 from rover_physics.errors import RoverFileError
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict, write_rover, write_yaml
+from rover_physics.rover.rover_contents import rover_to_dict, save_rover, save_yaml
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.rover.urdf.joint_map import map_of
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
@@ -45,7 +45,7 @@ def written(rover: Rover, folder: Path) -> tuple[Path, Path]:
     """Write URDF and joint map of a rover."""
     urdf, joints = folder / "rover.urdf", folder / "joints.yaml"
     write_urdf(urdf, rover)
-    write_yaml(joints, map_of(rover))
+    save_yaml(joints, map_of(rover))
     return urdf, joints
 
 
@@ -60,7 +60,7 @@ def test_a_rover_comes_back_from_its_urdf(name, tmp_path):
 def test_a_written_rover_file_loads_as_the_same_rover(tmp_path):
     for name in preset_names():
         rover = load_rover(name)
-        write_rover(tmp_path / "rover.yaml", rover, "two\nlines")
+        save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
         assert load_rover(tmp_path / "rover.yaml") == rover
 
 
@@ -147,7 +147,7 @@ def read_foreign(folder: Path, text: str = "", **keys: Any) -> Rover:
     """Read the foreign rover with keys of its map changed; None leaves a key out."""
     (folder / "foreign.urdf").write_text(text or foreign_urdf())
     contents = {k: v for k, v in (foreign_map() | keys).items() if v is not None}
-    write_yaml(folder / "foreign.yaml", contents)
+    save_yaml(folder / "foreign.yaml", contents)
     return rover_from_urdf(folder / "foreign.urdf", folder / "foreign.yaml").rover
 
 
