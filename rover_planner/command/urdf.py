@@ -58,3 +58,9 @@ def rover(
         f"wrote {out}: {read.rover.name}, {read.rover.total_mass:.6g} kg, left and right differ "
         f"by {1e3 * read.asymmetry:.3g} mm"
     )
+    pitch, bogie = read.levelling.pitch, read.levelling.bogie
+    if pitch or bogie:
+        typer.echo(
+            "wheels were not level; on flat ground the URDF's axes have a pitch of "
+            f"{pitch:.4g} rad, its bogies an angle of {bogie:.4g} rad"
+        )

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rover_physics.errors import RoverFileError
 from rover_physics.files.validation import errors_of
@@ -14,6 +15,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_from_dict
 from rover_physics.rover.urdf.arm import read_arm
 from rover_physics.rover.urdf.joint_map import JointMap, load_joint_map
+from rover_physics.rover.urdf.levelling import Levelling, level_wheels
 from rover_physics.rover.urdf.robot import Joint, Robot, Solid, read_robot
 from rover_physics.rover.urdf.tree import Lump, Tree
 
@@ -23,6 +25,7 @@ MAX_ASYMMETRY = 0.01
 """Largest distance between a point of the left side and the mirrored one of the right side [m]."""
 DECIMALS = 12
 """Decimals of the numbers that are read, so that 0.1 in a URDF is 0.1 in a rover file."""
+NOT_LEVELLED = Levelling()
 MIRROR = np.array([1.0, -1.0, 1.0])
 
 
@@ -34,13 +37,16 @@ class ReadRover:
     """The rover."""
     asymmetry: float
     """Largest distance between points of the left side and mirrored ones of the right [m]."""
+    levelling: Levelling
+    """How the axes and the bogies of the URDF stand on level ground."""
 
 
 def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
     """Read a rover from a URDF file by a joint map.
 
     Geometry, masses, torques, speeds and joint limits are those of the URDF, both sides averaged;
-    keys under `rover` of the map take precedence.
+    keys under `rover` of the map take precedence. Wheels that are not level at the angles of the
+    map are brought onto level ground.
 
     Raises:
         RoverFileError: A file is unreadable or invalid, a joint of the map is missing or does not
@@ -48,7 +54,10 @@ def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
     """
     robot, joints = read_robot(urdf), load_joint_map(joint_map)
     with errors_of(joint_map):
-        reading = _Reading(robot, joints)
+        _Reading(robot, joints).check()
+        levelling = level_wheels(lambda angles: _Reading(robot, joints, angles).wheel_heights())
+        reading = _Reading(robot, joints, levelling)
+        reading.check()
         contents = _merge(_rounded(reading.contents()), joints.rover)
     try:
         rover = rover_from_dict(contents, str(urdf))
@@ -58,20 +67,24 @@ def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
         raise RoverFileError(
             f"{error}; the URDF does not tell it: write it under rover: in {joint_map}"
         ) from None
-    return ReadRover(rover, reading.asymmetry)
+    return ReadRover(rover, reading.asymmetry, levelling)
 
 
 class _Reading:
     """A URDF with its links placed in the body frame."""
 
-    def __init__(self, robot: Robot, joints: JointMap):
+    def __init__(self, robot: Robot, joints: JointMap, levelling: Levelling = NOT_LEVELLED):
         stowed = (
             {}
             if joints.arm is None
             else dict(zip(joints.arm.joints, joints.arm.stowed, strict=True))
         )
         self._robot, self._joints = robot, joints
-        self._tree = Tree(robot, joints.angles | stowed, self._find_body_frame(stowed))
+        self._angles = joints.angles | stowed
+        self._frame = joints.axes.rotation()
+        if levelling != NOT_LEVELLED:
+            self._level(levelling)
+        self._tree = Tree(robot, self._angles, self._find_body_frame())
         self.asymmetry = 0.0
         """Largest distance found so far between both sides [m]."""
         tree = self._tree
@@ -79,7 +92,6 @@ class _Reading:
         self._bogies = {side: tree.joint(joints.bogie[side]) for side in SIDES}
         self._wheels = {wheel: tree.joint(joints.wheels[wheel]) for wheel in WHEELS}
         self._steering = {name: tree.joint(joint) for name, joint in joints.steering.items()}
-        self._check()
 
     def contents(self) -> dict[str, Any]:
         """Return what the URDF tells of a rover file; keys that it does not tell are left out."""
@@ -96,22 +108,42 @@ class _Reading:
             found["manipulator"] = read_arm(self._tree, self._joints.arm)
         return found
 
-    def _find_body_frame(self, angles: dict[str, float]) -> Floats:
+    def wheel_heights(self) -> list[float]:
+        """Return the heights of rear, middle and front wheels, means of both sides [m]."""
+        return [
+            0.5 * sum(float(self._wheel_centre(f"{position}_{side}")[2]) for side in SIDES)
+            for position in WHEEL_POSITIONS
+        ]
+
+    def _level(self, levelling: Levelling) -> None:
+        """Turn the body frame and the bogies."""
+        tree = Tree(self._robot, self._angles, _pose(self._frame))
+        for name in self._joints.bogie.values():
+            axis = tree.axis(tree.joint(name))
+            turn = levelling.bogie if axis[1] > 0.0 else -levelling.bogie
+            self._angles[name] = self._angles.get(name, 0.0) + turn
+        self._frame = Rotation.from_euler("y", levelling.pitch).as_matrix() @ self._frame
+
+    def _find_body_frame(self) -> Floats:
         """Return the pose (4, 4) of the root link in the body frame."""
-        frame = np.eye(4)
-        frame[:3, :3] = self._joints.axes.rotation()
-        tree = Tree(self._robot, self._joints.angles | angles, frame)
+        frame = _pose(self._frame)
+        tree = Tree(self._robot, self._angles, frame)
         pivots = [tree.origin(tree.joint(self._joints.rocker[side])) for side in SIDES]
         frame[:3, 3] = -0.5 * (pivots[0] + pivots[1])
         return frame
 
-    def _check(self) -> None:
-        """Check that joints turn about y and hang on each other as those of a rover do."""
+    def check(self) -> None:
+        """Check that joints turn about y and hang on each other as those of a rover do.
+
+        A rocker may be fixed, as in models for simulators that have no differential.
+        """
         for kind, joints in (("rocker", self._rockers), ("bogie", self._bogies),
                              ("wheels", self._wheels)):  # fmt: skip
             for part, joint in joints.items():
                 key, name = f"{kind}.{part}", getattr(self._joints, kind)[part]
                 axis = self._tree.axis(joint)
+                if kind == "rocker" and joint.kind == "fixed":
+                    continue
                 if joint.kind not in ("revolute", "continuous"):
                     raise RoverFileError(f"{key}: joint {name} is {joint.kind}; it must turn")
                 if np.arccos(min(1.0, abs(axis[1]))) > MAX_TILT:
@@ -215,7 +247,7 @@ class _Reading:
     def _limits(self, joint: Joint) -> tuple[float, float]:
         """Return lowest and highest angle about body y, counted from flat ground [rad]."""
         name = next(name for name, other in self._robot.joints.items() if other is joint)
-        flat, limit = self._joints.angles.get(name, 0.0), joint.limit
+        flat, limit = self._angles.get(name, 0.0), joint.limit
         low, high = limit.lower - flat, limit.upper - flat
         return (low, high) if self._tree.axis(joint)[1] > 0.0 else (-high, -low)
 
@@ -287,11 +319,20 @@ class _Reading:
     def _belly(self) -> dict[str, Any]:
         """Return the underside of the lowest box of the body; nothing if there is none."""
         links = self._tree.rigid_group(self._rockers["right"].parent)
+        for rocker in self._rockers.values():
+            links -= self._tree.links_on(rocker)
         boxes = [_bounds(*box) for box in self._tree.solids(links, "box")]
         if not boxes:
             return {}
         low, high = min(boxes, key=lambda box: box[0][2])
         return {"z": low[2], "x": [low[0], high[0]], "y": [low[1], high[1]]}
+
+
+def _pose(rotation: Floats) -> Floats:
+    """Return a rotation (3, 3) as a pose (4, 4)."""
+    pose = np.eye(4)
+    pose[:3, :3] = rotation
+    return pose
 
 
 def _bounds(box: Solid, place: Floats) -> tuple[list[float], list[float]]:

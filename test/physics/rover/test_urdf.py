@@ -14,6 +14,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_contents import rover_to_dict, save_rover, save_yaml
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.rover.urdf.joint_map import map_of
+from rover_physics.rover.urdf.levelling import Levelling
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
 from rover_physics.rover.urdf.robot import parse_robot, read_robot
 from rover_physics.rover.urdf.tree import Tree
@@ -204,6 +205,49 @@ def test_angles_of_the_map_bring_the_rover_onto_flat_ground(tmp_path):
     assert again.suspension.rocker_limits == pytest.approx((-0.6, 0.3))
 
 
+@pytest.mark.parametrize(("nose_down", "turn"), [(0.03, 0.0), (-0.02, 0.015)])
+def test_wheels_that_are_not_level_are_brought_onto_level_ground(nose_down, turn, tmp_path):
+    straight = read_foreign(tmp_path)
+    tilted = foreign_urdf()
+    for place, angle in (
+        ("0.1 0.3 -0.5", nose_down),
+        ("0.1 -0.3 -0.5", nose_down),
+        ("0.2 0 0.05", turn),
+    ):
+        # The file has y to the right, so its pitch is positive with the nose up.
+        turned = f'<origin xyz="{place}" rpy="0 {angle} 0"/>'
+        assert f'<origin xyz="{place}"/>' in tilted
+        tilted = tilted.replace(f'<origin xyz="{place}"/>', turned)
+    rover = read_foreign(tmp_path, tilted)
+    read = rover_from_urdf(tmp_path / "foreign.urdf", tmp_path / "foreign.yaml")
+    # The rockers are turned back by the pitch of the body, the bogies by their own angle.
+    assert read.levelling.pitch == pytest.approx(nose_down, abs=1e-6)
+    assert read.levelling.bogie == pytest.approx(turn, abs=1e-6)
+    for wheel, place in straight.suspension.wheels.items():
+        assert rover.suspension.wheels[wheel] == pytest.approx(place, abs=1e-6)
+    assert rover.suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
+
+
+def test_level_wheels_are_not_touched(tmp_path):
+    for name in preset_names():
+        assert rover_from_urdf(*written(load_rover(name), tmp_path)).levelling == Levelling()
+
+
+def test_a_rocker_may_be_fixed_if_the_map_has_its_limits(tmp_path):
+    text = foreign_urdf()
+    for side in "RL":
+        text = text.replace(
+            f'<joint name="P{side}" type="revolute">', f'<joint name="P{side}" type="fixed">'
+        )
+    keys = foreign_map()["rover"]
+    rover = read_foreign(
+        tmp_path, text, rover={**keys, "suspension": {"rocker_limits": [-0.3, 0.3]}}
+    )
+    assert rover.suspension.rocker_limits == (-0.3, 0.3)
+    assert rover.masses.rocker.mass == pytest.approx(2.0)
+    assert rover.masses.body.mass == pytest.approx(10.0)
+
+
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
@@ -214,8 +258,8 @@ def test_angles_of_the_map_bring_the_rover_onto_flat_ground(tmp_path):
         ({"rocker": {"right": "PL", "left": "PR"}}, "does not hang on Rocker"),
         ({"axes": {"forward": "x", "up": "z"}}, "rocker.right: y is .* on the other side"),
         ({"axes": {"forward": "x", "up": "-x"}}, "axes.up is -x; it must be across forward x"),
-        ({"axes": {"forward": "z", "up": "x"}}, "wheels.middle is .* as high as the rear"),
-        ({"angles": {"PR": 0.4}}, "both sides of the rover must be alike"),
+        ({"axes": {"forward": "z", "up": "x"}}, "wheels at angle 0 are not level"),
+        ({"angles": {"PR": 0.05}}, "both sides of the rover must be alike"),
         ({"bogie": None}, "missing key bogie; a joint map needs"),
         ({"rover": {}}, "missing key .* the URDF does not tell it: write it under rover: in"),
         ({"steering": {"rear_right": "WBR"}}, "wheels.rear_right: its link .* does not hang on"),
