@@ -166,9 +166,16 @@ class _Results:
 
         values = self._parameters
         messages = ResultMessages(
-            answer.judgement, answer.identity, self._rover, values.plan_spacing,
-            values.map_frame, ns_to_stamp(answer.stamp), PoseStock(), [], values.steering_sign,
-        )  # fmt: skip
+            judgement=answer.judgement,
+            identity=answer.identity,
+            rover=self._rover,
+            plan_spacing=values.plan_spacing,
+            frame=values.map_frame,
+            stamp=ns_to_stamp(answer.stamp),
+            poses=PoseStock(),
+            points=[],
+            positive_steering=values.steering_sign,
+        )
         for topic in RESULT_KINDS:
             self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
 
