@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rover_physics.errors import RoverFileError
-from rover_physics.files.validation import errors_of
+from rover_physics.files.validation import describe, errors_of
 from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
@@ -137,6 +137,9 @@ class _Reading:
 
         A rocker may be fixed, as in models for simulators that have no differential.
         """
+        arm = self._joints.arm
+        if arm is not None and arm.tip not in self._robot.links:
+            raise RoverFileError(f"arm.tip: no link {describe(arm.tip)} in the URDF")
         for kind, joints in (("rocker", self._rockers), ("bogie", self._bogies),
                              ("wheels", self._wheels)):  # fmt: skip
             for part, joint in joints.items():

@@ -2,6 +2,7 @@
 
 import math
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +16,12 @@ from rover_physics.numerics.arrays import Floats
 
 MAX_BYTES = 10_000_000
 """Largest URDF file that is read."""
+MAX_LINKS = 2000
+"""Largest number of links, and of joints."""
 UNLIMITED = 1e6
 """Limit of a joint [rad, m, N m, rad/s] from which on it counts as none."""
+MAX_NUMBER = 1e9
+"""Largest coordinate, size or mass [m, kg]."""
 MOVING = ("revolute", "continuous", "prismatic")
 KINDS = (*MOVING, "fixed", "floating", "planar")
 X_AXIS = (1.0, 0.0, 0.0)
@@ -123,10 +128,12 @@ def parse_robot(text: bytes) -> Robot:
     if any("xacro" in element.tag for element in top.iter()):
         raise RoverFileError("is xacro; expand it first: xacro FILE > OUT.urdf")
     for tag in ("link", "joint"):
-        names = [_name(element) for element in top.findall(tag)]
-        twice = next((name for name in names if names.count(name) > 1), None)
+        names = Counter(_name(element) for element in top.findall(tag))
+        if len(names) > MAX_LINKS:
+            raise RoverFileError(f"has {len(names)} <{tag}>; at most {MAX_LINKS} are read")
+        twice = next((name for name, count in names.items() if count > 1), None)
         if twice is not None:
-            raise RoverFileError(f"has two <{tag}> of the same name, {twice}")
+            raise RoverFileError(f"has two <{tag}> of the same name, {describe(twice)}")
     links = {_name(element): _read_link(element) for element in top.findall("link")}
     joints = {_name(element): _read_joint(element, links) for element in top.findall("joint")}
     return Robot(top.get("name", "rover"), links, joints, _find_root(links, joints))
@@ -188,7 +195,7 @@ def _read_limit(element: ElementTree.Element, name: str, kind: str) -> Limit:
         return Limit()
 
     def read(key: str, missing: float) -> float:
-        value = missing if limit.get(key) is None else _number(limit, key, name)
+        value = missing if limit.get(key) is None else _number(limit, key, name, math.inf)
         return value if abs(value) < UNLIMITED else math.copysign(math.inf, value)
 
     lower, upper = read("lower", 0.0), read("upper", 0.0)
@@ -219,19 +226,19 @@ def _vector(
         numbers = np.array([float(word) for word in text.split()])
     except ValueError:
         numbers = np.empty(0)
-    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+    if numbers.shape != (3,) or not (np.abs(numbers) <= MAX_NUMBER).all():
         raise RoverFileError(f"{name}: {key} is {describe(text)}; it must be 3 numbers")
     return numbers
 
 
-def _number(element: ElementTree.Element, key: str, name: str) -> float:
-    """Return a number of an attribute."""
+def _number(element: ElementTree.Element, key: str, name: str, most: float = MAX_NUMBER) -> float:
+    """Return a number of an attribute, of at most `most` and at least its negative."""
     text = element.get(key)
     try:
         number = float(text or "")
     except ValueError:
         number = math.nan
-    if math.isnan(number):
+    if not abs(number) <= most:
         raise RoverFileError(f"{name}: {key} is {describe(text)}; it must be a number")
     return number
 
@@ -245,8 +252,8 @@ def _name(element: ElementTree.Element) -> str:
 
 def _find_root(links: dict[str, Link], joints: dict[str, Joint]) -> str:
     """Return the link without a parent; all others must hang on it."""
-    children = [joint.child for joint in joints.values()]
-    twice = next((name for name in children if children.count(name) > 1), None)
+    children = Counter(joint.child for joint in joints.values())
+    twice = next((name for name, count in children.items() if count > 1), None)
     if twice is not None:
         raise RoverFileError(f"link {twice} hangs on two joints; a URDF is a tree")
     roots = links.keys() - set(children)

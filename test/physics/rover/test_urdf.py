@@ -263,6 +263,13 @@ def test_a_rocker_may_be_fixed_if_the_map_has_its_limits(tmp_path):
         ({"bogie": None}, "missing key bogie; a joint map needs"),
         ({"rover": {}}, "missing key .* the URDF does not tell it: write it under rover: in"),
         ({"steering": {"rear_right": "WBR"}}, "wheels.rear_right: its link .* does not hang on"),
+        ({"rover": {3: 1.0}}, r"rover\[3\].* is 3; it must be a valid string"),
+        ({"angles": {"PR": "x"}}, "angles.PR is 'x'; it must be a number in rad"),
+        ({"arm": {"joints": ["a", "b", "c"], "tip": "t", "stowed": [0.0, 0.0, 0.0]}}, "no joint"),
+        (
+            {"arm": {"joints": ["PR", "QR", "PL"], "tip": "t", "stowed": [0.0, 0.0, 0.0]}},
+            "arm.tip: no link 't' in the URDF",
+        ),
         ({"axis": {}}, "unknown key axis; did you mean axes"),
     ],
 )
@@ -278,6 +285,10 @@ def test_a_wrong_joint_map_is_refused_with_its_key(keys, said, tmp_path):
         ('<robot name="foreign">', '<!DOCTYPE r><robot name="foreign">', "document type"),
         ('xyz="0.1 0.3 -0.5"', 'xyz="0.1 0.3"', "PR: xyz is '0.1 0.3'; it must be 3 numbers"),
         ('mass value="10.0"', 'mass value="-1"', "link Body: mass is -1"),
+        ('mass value="10.0"', 'mass value="1e999"', "Body: value is '1e999'; it must be a number"),
+        ('mass value="10.0"', 'mass value="nan"', "Body: value is 'nan'; it must be a number"),
+        ('xyz="0.1 0.3 -0.5"', 'xyz="0.1 inf -0.5"', "PR: xyz is '0.1 inf -0.5'"),
+        ('xyz="0.1 0.3 -0.5"', 'xyz="1e300 0.3 -0.5"', "PR: xyz is '1e300 0.3 -0.5'"),
         ('type="floating"', 'type="hinge"', "joint Root: type is 'hinge'"),
         ('<child link="RockerL"/>', '<child link="RockerX"/>', "'RockerX' is no link"),
         ('<child link="RockerL"/>', '<child link="RockerR"/>', "RockerR hangs on two joints"),
@@ -304,6 +315,12 @@ def test_xacro_and_circles_are_refused():
     robot = parse_robot(b"<robot>" + links + circle + b"</robot>")
     with pytest.raises(RoverFileError, match="hangs on itself"):
         Tree(robot, {}, np.eye(4))
+
+
+def test_a_file_of_many_links_is_refused_at_once():
+    text = "".join(f'<link name="l{k}"/>' for k in range(100_000))
+    with pytest.raises(RoverFileError, match="has 100000 <link>; at most 2000 are read"):
+        parse_robot(f"<robot>{text}</robot>".encode())
 
 
 def test_limits_that_no_joint_reaches_count_as_none():
