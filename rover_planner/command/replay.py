@@ -48,7 +48,7 @@ def replay(
     stretch: Annotated[
         float, typer.Option(metavar="M", help="Length in which the drive is judged.", min=0.1)
     ] = 5.0,
-    map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="PointCloud2 map.")] = "",
+    map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="PointCloud2 or GridMap.")] = "",
     joints_topic: Annotated[str, typer.Option(metavar="TOPIC", help="JointState.")] = "",
     odometry_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Odometry.")] = "",
     path_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Path to check.")] = "",
@@ -78,7 +78,7 @@ def replay(
     }
     with bag_reader.open_bag(bag, topics) as source:
         if bag_reader.MAP not in source.topics:
-            raise PlanningError(f"{bag}: has no map, a topic of type sensor_msgs/msg/PointCloud2")
+            raise PlanningError(f"{bag}: has no map: PointCloud2 or GridMap")
         _make_folder(out)
         with (
             write_bag(out / "predictions") as predictions,

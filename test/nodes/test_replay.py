@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
@@ -21,11 +21,13 @@ from msg_adapters.stamps import ns_to_stamp
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.command.prediction_files import read_prediction
 from rover_planner.nodes.result_topics import RESULT_KINDS
+from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
 from rover_planner.viewer.state.session import ViewSession
+from support.messages.grid_maps import grid_map_of, move_buffer
 
 LSR1 = load_rover("lsr1")
 BEGIN = 1_700_000_000_000_000_000
@@ -204,6 +206,50 @@ def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
     np.testing.assert_allclose(first[[0, -1], 0], [1.0, 3.0], atol=1e-6)
 
 
+def record_grid_map(folder: Path, message: object) -> Path:
+    """Write a GridMap and an odometry to a new bag, as a robot with grid_map_msgs does."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
+        types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        odometry = writer.add_connection("/odometry", "nav_msgs/msg/Odometry", typestore=types)
+        writer.write(odometry, BEGIN, serialize_message(odometry_at(1.0)))
+        grid = writer.add_connection("/elevation_map", GRID_MAP, typestore=types)
+        writer.write(grid, BEGIN + 1, types.serialize_cdr(message, GRID_MAP))
+    return folder
+
+
+def test_a_grid_map_is_replayed_without_its_package_whatever_its_buffer(tmp_path, capsys):
+    heights = waves().elevation
+    centre = -1.0 + 0.04 * (heights.shape[1] - 1) / 2, -2.0 + 0.04 * (heights.shape[0] - 1) / 2
+    message = grid_map_of({"elevation": heights}, 0.04, centre)
+    told = []
+    for name, map_message in (("still", message), ("moved", move_buffer(message, 31, 17))):
+        bag = record_grid_map(tmp_path / name, map_message)
+        answers, total = replay(capsys, bag, tmp_path / f"out_{name}", "--goal", "3,0.2,0")
+        assert total["topics"]["map"] == "/elevation_map" and total["refused_messages"] == {}
+        told.append(answers)
+    assert told[0] == told[1] and len(told[0]) == 1 and told[0][0]["waypoints"] > 90
+    ground = load_terrain(tmp_path / "out_moved" / "map_001.npz")
+    np.testing.assert_allclose(ground.elevation, heights, atol=1e-6)
+
+
+def test_local_maps_merge_into_a_loaded_one_as_in_the_server(tmp_path, capsys):
+    prior = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
+    save_terrain(tmp_path / "prior.npz", prior)
+    file = tmp_path / "server.yaml"
+    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
+    local = Terrain(np.full((25, 25), 0.1), 0.04, (3.0, -0.52))
+    messages = [("/odometry", odometry_at(0.0)), ("/elevation_cloud", cloud(local))]
+    bag = record(tmp_path / "bag", messages)
+    words = ["--parameters", str(file), "--goal", "1.5,0,0"]
+    (answer,), _ = replay(capsys, bag, tmp_path / "out", *words)
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    assert ground.elevation.shape == prior.elevation.shape
+    assert ground.elevation_at(np.array([3.4]), np.array([0.0]))[0] > 0.05
+    assert ground.elevation_at(np.array([0.0]), np.array([0.0]))[0] == 0.0
+
+
 def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
     messages = [
         ("/elevation_cloud", cloud(waves(), frame="odom")),
@@ -239,7 +285,7 @@ def test_a_parameter_file_of_the_server_sets_rover_and_policy(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("messages", "words", "said"),
     [
-        ([("/odometry", odometry_at(0.0))], (), "has no map, a topic of type sensor_msgs/msg/Po"),
+        ([("/odometry", odometry_at(0.0))], (), "has no map: PointCloud2 or GridMap"),
         ([("/a", cloud(waves())), ("/b", cloud(waves()))], (), "choose one by --map-topic"),
         ([("/a", cloud(waves()))], ("--map-topic", "/c"), "no topic /c of type .* it has /a"),
         ([("/a", cloud(waves()))], ("--goal", "1,2"), "--goal is '1,2'"),

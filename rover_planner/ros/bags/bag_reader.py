@@ -10,6 +10,7 @@ from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import JointState, PointCloud2
 
 from rover_physics.files.validation import show_file
@@ -17,20 +18,44 @@ from rover_planner.errors import PlanningError
 
 MAP, JOINTS, ODOMETRY, PATH = "map", "joints", "odometry", "path"
 """Inputs of a replay."""
-TYPES = {
-    MAP: ("sensor_msgs/msg/PointCloud2", PointCloud2),
-    JOINTS: ("sensor_msgs/msg/JointState", JointState),
-    ODOMETRY: ("nav_msgs/msg/Odometry", Odometry),
-    PATH: ("nav_msgs/msg/Path", PathMessage),
+GRID_MAP = "grid_map_msgs/msg/GridMap"
+TYPES: dict[str, tuple[str, ...]] = {
+    MAP: ("sensor_msgs/msg/PointCloud2", GRID_MAP),
+    JOINTS: ("sensor_msgs/msg/JointState",),
+    ODOMETRY: ("nav_msgs/msg/Odometry",),
+    PATH: ("nav_msgs/msg/Path",),
 }
-"""Type of each input: its name in bags, and its class."""
+"""Types of each input, as bags name them."""
+CLASSES = {
+    "sensor_msgs/msg/PointCloud2": PointCloud2,
+    "sensor_msgs/msg/JointState": JointState,
+    "nav_msgs/msg/Odometry": Odometry,
+    "nav_msgs/msg/Path": PathMessage,
+}
+"""Classes of the types that every ROS has."""
 USUAL = {
-    MAP: "elevation_cloud",
-    JOINTS: "joint_states",
-    ODOMETRY: "odometry",
-    PATH: "traverse_server/path",
+    MAP: ("elevation_cloud", "elevation_map"),
+    JOINTS: ("joint_states",),
+    ODOMETRY: ("odometry",),
+    PATH: ("traverse_server/path",),
 }
 """How the topic of each input usually ends."""
+GRID_MAP_INFO_FIELDS = """
+float64 resolution
+float64 length_x
+float64 length_y
+geometry_msgs/Pose pose
+"""
+GRID_MAP_FIELDS = """
+std_msgs/Header header
+grid_map_msgs/GridMapInfo info
+string[] layers
+string[] basic_layers
+std_msgs/Float32MultiArray[] data
+uint16 outer_start_index
+uint16 inner_start_index
+"""
+"""Fields of a GridMap, which is read without its package."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +79,9 @@ class BagReader:
         self._reader, self.topics = reader, topics
         """Topics by input; without inputs that the bag does not have."""
         self._kinds = {topic: kind for kind, topic in topics.items()}
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
+            self._store.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
 
     @property
     def count(self) -> int:
@@ -71,7 +99,7 @@ class BagReader:
             try:
                 connection, stamp, raw = next(stream)
                 kind = self._kinds[connection.topic]
-                message = deserialize_message(bytes(raw), TYPES[kind][1])
+                message = self._deserialize(bytes(raw), connection.msgtype)
             except StopIteration:
                 return
             except Exception as error:  # each storage has errors of its own
@@ -84,8 +112,13 @@ class BagReader:
         return [
             connection
             for connection in self._reader.connections
-            if connection.msgtype == TYPES.get(self._kinds.get(connection.topic, ""), ("",))[0]
+            if connection.msgtype in TYPES.get(self._kinds.get(connection.topic, ""), ())
         ]
+
+    def _deserialize(self, raw: bytes, name: str) -> Any:
+        if name in CLASSES:
+            return deserialize_message(raw, CLASSES[name])
+        return self._store.deserialize_cdr(raw, name)
 
 
 @contextmanager
@@ -114,8 +147,9 @@ def open_bag(path: Path, wanted: Mapping[str, str]) -> Iterator[BagReader]:
 
 def _choose(reader: Reader, kind: str, wanted: str) -> str:
     """Return the topic of an input, empty if the bag has none."""
-    name = TYPES[kind][0]
-    topics = sorted({c.topic for c in reader.connections if c.msgtype == name and c.msgcount})
+    names = TYPES[kind]
+    name = " or ".join(names)
+    topics = sorted({c.topic for c in reader.connections if c.msgtype in names and c.msgcount})
     if wanted:
         if f"/{wanted.lstrip('/')}" not in topics:
             raise PlanningError(
@@ -123,7 +157,7 @@ def _choose(reader: Reader, kind: str, wanted: str) -> str:
                 f"{', '.join(topics) or 'none'}"
             )
         return f"/{wanted.lstrip('/')}"
-    usual = [topic for topic in topics if topic.endswith(f"/{USUAL[kind]}")]
+    usual = [topic for topic in topics if topic.endswith(tuple(f"/{end}" for end in USUAL[kind]))]
     candidates = usual if usual or kind == PATH else topics
     if len(candidates) > 1:
         raise PlanningError(

@@ -5,28 +5,35 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
+from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
 from msg_adapters.joints import joint_positions
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses
-from msg_adapters.stamps import stamp_to_ns
+from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import stamp_text
-from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.service_settings import (
+    keeper_settings,
+    load_service_settings,
+)
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.bags.bag_reader import JOINTS, MAP, ODOMETRY, PATH, Recorded
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
+from rover_planner.worlds.maps.living_map import MapSnapshot
+from rover_planner.worlds.maps.map_keeper import MapKeeper
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
@@ -79,6 +86,14 @@ class Replay:
 
     def __post_init__(self) -> None:
         self._service = TraverseService(load_service_settings(self.parameters))
+        values = self.parameters
+        self._keeper = MapKeeper(self._service.settings.rover, keeper_settings(values))
+        self._layers = GridMapLayers(
+            values.elevation_layer, values.variance_layer, values.friction_layer
+        )
+        if values.terrain_file:
+            terrain = load_terrain(values.terrain_file, values.max_map_cells)
+            self._keep(self._keeper.load(terrain, 0.0, None), values.terrain_file, None)
         self._register = Register("replay")
         self._drive, self._begun = RecordedDrive(), self._service.situation()
         self._pose: NDArray[np.float64] | None = None
@@ -104,11 +119,16 @@ class Replay:
             yield self._judge_drive()
 
     def _take_map(self, recorded: Recorded) -> Iterator[Answer]:
-        cloud, values = recorded.message, self.parameters
-        check_frame(cloud.header.frame_id, values.map_frame, recorded.topic)
-        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height)
-        stamp = stamp_to_ns(cloud.header.stamp)
-        is_new = self._service.take_terrain(terrain, recorded.topic, stamp)
+        message, values = recorded.message, self.parameters
+        check_frame(message.header.frame_id, values.map_frame, recorded.topic)
+        if isinstance(message, PointCloud2):
+            terrain = terrain_from_point_cloud(message, values.map_resolution, values.cell_height)
+        else:
+            terrain = terrain_from_grid_map(message, self._layers)
+        stamp = stamp_to_ns(message.header.stamp)
+        since = (recorded.stamp if stamp is None else stamp) / NANOSECONDS
+        kept = self._keeper.take(terrain, recorded.topic, since, self._service.standing())
+        is_new = self._keep(kept, recorded.topic, stamp)
         goal = self.questions.goal
         if not is_new or goal is None:
             return
@@ -116,6 +136,11 @@ class Replay:
         start = self._pose if start is None else start
         if start is not None:
             yield self._ask(PLANNED, recorded.stamp, lambda now: now.answer(start, goal))
+
+    def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> bool:
+        """Keep a map in the service; return whether its content is new."""
+        frame = self.parameters.map_frame
+        return self._service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
 
     def _take_joints(self, recorded: Recorded) -> Iterator[Answer]:
         self._service.take_joints(joint_positions(recorded.message, self._service.joint_names))
