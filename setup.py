@@ -33,6 +33,7 @@ EXTRAS = {
     ],
     "plots": ["matplotlib>=3.6,<4"],
     "view": ["viser>=1.1,<2", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
+    "bags": ["rosbags>=0.11,<1"],
     "test": [
         "pytest>=7.4,<10",
         "pytest-xdist>=3.4,<4",
@@ -46,7 +47,7 @@ EXTRAS = {
         "mypy>=1.14,<3",
     ],
 }
-EXTRAS["all"] = EXTRAS["ros"] + EXTRAS["plots"] + EXTRAS["view"] + EXTRAS["test"]
+EXTRAS["all"] = EXTRAS["ros"] + EXTRAS["plots"] + EXTRAS["view"] + EXTRAS["bags"] + EXTRAS["test"]
 
 
 def read_version() -> str:

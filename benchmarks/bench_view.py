@@ -12,9 +12,10 @@ from benchmarks.grounds import made_reef, real_maps
 from benchmarks.measure import Figure, quantile
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.studies.rover_values import RoverValue, get_value, list_values, rover_to_dict
+from rover_planner.studies.rover_values import RoverValue, get_value, list_values
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.scenario import Pose
 from rover_planner.viewer.state.session import ViewSession

@@ -5,12 +5,20 @@ ros2 launch rover_planner simulation.launch.py terrain_file:=mars.npz
 Then: ros2 run rover_planner mission_planner --start 0,0,0 --goal 3,0,0 --drive
 """
 
+from pathlib import Path
+
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
+HERE = Path(__file__).absolute().parent
+PARAMETERS = HERE.parent / "config" / "parameters"
+"""Folder of the parameter files, in a checkout and where the package is installed."""
+RESPAWN_DELAY = 1.0
+"""Time after which a node that has ended is started again [s]."""
 ARGUMENTS = {
     "rover": ("lsr1", "preset name or rover file"),
     "terrain_file": ("", "terrain file, .npz; empty makes a Mars-like one"),
@@ -20,43 +28,50 @@ ARGUMENTS = {
     "engine": ("quasi_static", "quasi_static or mujoco"),
     "speed": ("0.0", "m/s along a path; 0 takes the rover's own"),
 }
-"""Default and meaning of each argument."""
-RESPAWN_DELAY = 1.0
-"""Time after which a node that has ended is started again [s]."""
+"""Default and meaning of each argument that is a parameter of the simulator."""
 NUMBERS = ("start_x", "start_y", "start_yaw", "speed")
+SHARED = {
+    "namespace": ("", "namespace of all nodes; diagnostics stay in /diagnostics"),
+    "use_sim_time": ("false", "true takes the time from /clock"),
+    "respawn": ("true", "whether a node that has ended is started again"),
+    "rover_simulator_parameters": (str(PARAMETERS / "rover_simulator.yaml"), "parameter file"),
+    "traverse_server_parameters": (str(PARAMETERS / "traverse_server.yaml"), "parameter file"),
+    "traction_controller_parameters": (
+        str(PARAMETERS / "simulated_traction_controller.yaml"),
+        "parameter file; the one of the package enables the controller at start",
+    ),
+}
+"""Default and meaning of the other arguments."""
+PASSED_ON = ("namespace", "use_sim_time", "respawn", "rover",
+             "traverse_server_parameters", "traction_controller_parameters")  # fmt: skip
 
 
 def generate_launch_description() -> LaunchDescription:
     """Start the three nodes; the rover is driven by the controller's torques."""
-    given = {
-        name: ParameterValue(
-            LaunchConfiguration(name), value_type=float if name in NUMBERS else str
-        )
+    given = {name: LaunchConfiguration(name) for name in ARGUMENTS | SHARED}
+    simulated = {
+        name: ParameterValue(given[name], value_type=float if name in NUMBERS else str)
         for name in ARGUMENTS
     }
-    rover = {"rover": given["rover"]}
-    nodes = {
-        "rover_simulator": given | {"follow_commands": True},
-        "traverse_server": rover,
-        "traction_controller": rover | {"enabled_at_start": True},
-    }
-    return LaunchDescription(
-        [
-            *(
-                DeclareLaunchArgument(name, default_value=default, description=meaning)
-                for name, (default, meaning) in ARGUMENTS.items()
-            ),
-            *(
-                Node(
-                    package="rover_planner",
-                    executable=name,
-                    name=name,
-                    parameters=[parameters],
-                    output="screen",
-                    respawn=True,
-                    respawn_delay=RESPAWN_DELAY,
-                )
-                for name, parameters in nodes.items()
-            ),
-        ]
+    simulated["use_sim_time"] = ParameterValue(given["use_sim_time"], value_type=bool)
+    simulator = Node(
+        package="rover_planner",
+        executable="rover_simulator",
+        name="rover_simulator",
+        namespace=given["namespace"],
+        parameters=[given["rover_simulator_parameters"], simulated],
+        remappings=[("diagnostics", "/diagnostics")],
+        output="screen",
+        respawn=given["respawn"],
+        respawn_delay=RESPAWN_DELAY,
     )
+    rover = IncludeLaunchDescription(
+        PythonLaunchDescriptionSource(str(HERE / "rover.launch.py")),
+        # The map is the simulator's; an included file would see the terrain_file of this one.
+        launch_arguments=[("terrain_file", ""), *((name, given[name]) for name in PASSED_ON)],
+    )
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=meaning)
+        for name, (default, meaning) in (ARGUMENTS | SHARED).items()
+    ]
+    return LaunchDescription([*declared, simulator, GroupAction([rover])])

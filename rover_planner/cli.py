@@ -9,8 +9,10 @@ from rover_planner.command.figure4 import figure4
 from rover_planner.command.plan import plan, replay_plan
 from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
+from rover_planner.command.replay import replay
 from rover_planner.command.study import study
 from rover_planner.command.terrain import terrain
+from rover_planner.command.urdf import rover, urdf
 from rover_planner.command.view import view
 from rover_planner.command.warm_up import warm_up
 from rover_planner.shell.run_app import run_app
@@ -33,6 +35,9 @@ app.command(context_settings=NEGATIVE_ARGUMENTS)(reach)
 app.command()(study)
 app.command()(view)
 app.command()(terrain)
+app.command()(replay)
+app.command()(urdf)
+app.command()(rover)
 app.command()(demo)
 app.command()(figure4)
 app.command()(warm_up)

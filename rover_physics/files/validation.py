@@ -17,6 +17,8 @@ UNKNOWN_KEY = ("unexpected_keyword_argument", "extra_forbidden", "invalid_key")
 """Error types of pydantic for unknown keys."""
 MISSING_KEY = "missing"
 RULE_BROKEN = "rule"
+KEY_ITSELF = "[key]"
+"""Last part of pydantic's place of an error about a key that must be a text."""
 MAX_SHOWN = 60
 """Largest number of characters of a value or key in an error text."""
 MAX_FILE_SHOWN = 150
@@ -170,7 +172,13 @@ def _part(kind: Any, key: Key) -> dict[str, Any]:
     schema = _json_schema(kind)
     part = _resolve(schema, schema)
     for name in key:
-        if isinstance(name, str):
+        if name == KEY_ITSELF:
+            return {}
+        if "additionalProperties" in part and "properties" not in part:  # keys of any name
+            inner = part["additionalProperties"]
+            if not isinstance(inner, dict):
+                return {}
+        elif isinstance(name, str):
             inner = part["properties"][name]
         else:
             inner = part["prefixItems"][name] if "prefixItems" in part else part["items"]

@@ -82,8 +82,8 @@ def plan(
     question = WayQuestion(
         load_rover(rover),
         load_terrain(terrain, max_cells),
-        _read_pose("start", start),
-        _read_pose("goal", goal),
+        read_pose("start", start),
+        read_pose("goal", goal),
         PathQueryOptions(
             policy=policy,
             control_margin=0.0,
@@ -141,7 +141,7 @@ def _ask(
     typer.echo(json.dumps(report_way(question.rover, answer), allow_nan=False))
 
 
-def _read_pose(name: str, text: str) -> tuple[float, float, float]:
+def read_pose(name: str, text: str) -> tuple[float, float, float]:
     """Return the pose of an option.
 
     Raises:

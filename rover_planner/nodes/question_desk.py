@@ -84,7 +84,7 @@ class QuestionDesk:
 
     def ask(self, inquiry: Inquiry) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
-        now = self._node.get_clock().now().nanoseconds
+        now, arrival = self._node.get_clock().now().nanoseconds, time.monotonic()
         situation = replace(self._service.situation(now), watch=self._watch())
         asked = _Asked(self._register.next_number(), situation)
         ticket = self._maps.ticket()
@@ -100,7 +100,8 @@ class QuestionDesk:
             return refuse_error(self.guard, inquiry.service, error, inquiry.refuse)
 
         def deliver(given: Any) -> None:
-            self.health.take_answer(given.code, time.monotonic())
+            done, question = time.monotonic(), f"{asked.number}, {inquiry.service}"
+            self.health.take_answer(given.code, done, question, done - arrival)
             identity = self._register.identify(
                 asked.number, inquiry.service, inquiry.question_hash, asked.situation
             )

@@ -50,7 +50,7 @@ MAX_STOCK = 2000
 SET_BACK = 1_000_000_000
 """Time [ns] up to which a clock that was set back counts as standing still."""
 
-_KINDS = {
+RESULT_KINDS = {
     "plan": Path,
     **dict.fromkeys([*WHEEL_TOPICS, "tip_over_margin"], Float64MultiArray),
     "predicted_joints": JointTrajectory,
@@ -73,7 +73,7 @@ class ResultTopics:
         self._points: list[JointTrajectoryPoint] = []
         self._stamp = 0
         self._topics = {
-            name: LazyPublisher(node, kind, f"~/{name}") for name, kind in _KINDS.items()
+            name: LazyPublisher(node, kind, f"~/{name}") for name, kind in RESULT_KINDS.items()
         }
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(LOOK_OUT, self._serve_late_comers, clock=steady)
@@ -97,7 +97,7 @@ class ResultTopics:
             The plan, whose poses are valid until the next plan is made, and a function that
             returns the report.
         """
-        results = _Results(
+        results = ResultMessages(
             judgement,
             identity,
             rover,
@@ -134,7 +134,7 @@ class ResultTopics:
         self._poses.shrink(MAX_STOCK)
         del self._points[MAX_STOCK:]
 
-    def _log(self, results: "_Results") -> None:
+    def _log(self, results: "ResultMessages") -> None:
         judgement, about = results.judgement, results.identity
         text = f"question {about.request}, {about.service}: {judgement.summary()}"
         if judgement.traversable:
@@ -155,7 +155,7 @@ def _add_plan(identity: IdentityReport, plan: Path) -> IdentityReport:
 
 
 @dataclass(frozen=True)
-class _Results:
+class ResultMessages:
     """The messages of one judgement; each is made on demand."""
 
     judgement: Judgement

@@ -6,7 +6,7 @@ import sys
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.programs import HELP_WORDS, print_help
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
-from rover_planner.shell.extras import need
+from rover_planner.shell.extras import explain_import, need
 from rover_planner.shell.run_program import end_with
 
 
@@ -36,6 +36,9 @@ def _start(name: str) -> int:
         return EXIT_OK
     try:
         need("rclpy", "the node")
+        module = importlib.import_module(f"rover_planner.nodes.{name}")
     except PlanningError as error:
         return end_with(name, EXIT_BAD_INPUT, str(error))
-    return importlib.import_module(f"rover_planner.nodes.{name}").main()
+    except ImportError as error:  # rclpy of another Python, or only a part of ROS
+        return end_with(name, EXIT_BAD_INPUT, explain_import(error, "the node"))
+    return module.main()

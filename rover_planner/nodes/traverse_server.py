@@ -44,6 +44,7 @@ from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import stamp_text
+from rover_planner.planning.answering.map_status import MapStatus
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
 from rover_planner.planning.answering.situation import Situation
@@ -100,6 +101,7 @@ class TraverseServer(Node):
         )
         self._reach = ReachTopics(self, self.desk, frame, reliability)
         self._map_cloud = MapCloud(self, self._service, frame)
+        self._map_status = MapStatus()
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(
@@ -229,8 +231,10 @@ class TraverseServer(Node):
     def _publish_diagnostics(self) -> None:
         self._map_cloud.update()
         now = self.get_clock().now()
-        missing = self._service.situation(now.nanoseconds).refuse_map()
+        situation = self._service.situation(now.nanoseconds)
+        missing = situation.refuse_map()
         counts = {
+            **self._map_status.describe(situation),
             "open questions": self.desk.open_count,
             "internal errors": self.guard.total,
             **({"kernels not cached": kernel_cache_note()} if kernel_cache_note() else {}),

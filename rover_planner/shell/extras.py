@@ -1,18 +1,49 @@
 """Checks for optional libraries, which only some commands need."""
 
 import importlib.util
+import platform
 
 from rover_planner.errors import PlanningError
 
 INSTALL = {
     "rclpy": "ROS 2 Jazzy: source it, or pip install 'rover_planner[ros]'",
     "matplotlib": "matplotlib: pip install 'rover_planner[plots]'",
+    "rosbags": "rosbags: pip install 'rover_planner[bags]'",
     "viser": "viser: pip install 'rover_planner[view]'",
 }
 """Name of each optional module's package, and how to install it."""
+
+PLAIN = {
+    "clarabel": "clarabel",
+    "numba": "numba",
+    "numpy": "numpy",
+    "osqp": "osqp",
+    "pydantic": "pydantic",
+    "rich": "rich",
+    "scipy": "scipy",
+    "typer": "typer",
+    "yaml": "PyYAML",
+}
+"""Modules of a plain installation and their packages, which apt has not all."""
 
 
 def need(module: str, what: str) -> None:
     """Raise PlanningError if `module`, a key of INSTALL that `what` needs, is missing."""
     if importlib.util.find_spec(module) is None:
         raise PlanningError(f"{what} needs {INSTALL[module]}")
+
+
+def explain_import(error: ImportError, what: str) -> str:
+    """Return in one line which library `what` needs that cannot be imported, and what helps.
+
+    That is a library of ROS built for another Python, a part of ROS, or a plain requirement.
+    """
+    name = (error.name or "").partition(".")[0]
+    if isinstance(error, ModuleNotFoundError) and name in PLAIN:
+        return f"{what} needs {PLAIN[name]}, which is not installed: pip install {PLAIN[name]}"
+    version = ".".join(platform.python_version_tuple()[:2])
+    return (
+        f"{what} needs {INSTALL['rclpy']}; this Python {version} cannot import "
+        f"{error.name or 'a library of ROS'} ({error}). ROS from apt needs the system's Python "
+        "or an environment made with --system-site-packages"
+    )

@@ -11,6 +11,7 @@ import yaml
 from rover_physics.files.validation import Key, errors_of
 from rover_physics.files.yaml_file import parse_yaml
 from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import rover_from_dict
 
 
@@ -28,25 +29,6 @@ class RoverValue:
     """Largest value offered."""
     step: float
     """Smallest change."""
-
-
-def rover_to_dict(rover: Rover) -> dict[str, Any]:
-    """Return the contents of a rover file, as `rover_from_dict` reads them."""
-    data = _plain(dataclasses.asdict(rover))
-    arm = data["manipulator"]
-    if arm is None:
-        del data["manipulator"]
-    elif arm["joint_limits"] is None:
-        del arm["joint_limits"]
-    if data["steering"] is None:
-        del data["steering"]
-    return data
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(inner) for key, inner in value.items()}
-    return [_plain(inner) for inner in value] if isinstance(value, tuple | list) else value
 
 
 def list_values(rover: Rover) -> dict[str, list[RoverValue]]:

@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+import yaml
 from rclpy.parameter import Parameter
 
 from rover_planner.nodes import start
@@ -20,8 +21,9 @@ from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traction_controller import main as traction_controller
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.nodes.traverse_server import main as traverse_server
+from rover_planner.shell.extras import PLAIN
 from support.command_line import REPOSITORY
-from support.project.checkout import console_scripts
+from support.project.checkout import console_scripts, setup_arguments
 from support.ros_fixtures import domain_id, wait_until
 
 MAINS = {
@@ -76,6 +78,48 @@ def test_without_ros_a_program_says_in_one_line_what_to_install(name):
     assert ended.stderr.count("\n") == 1
     assert ended.stderr.startswith(f"{name}: ")
     assert "pip install 'rover_planner[ros]'" in ended.stderr
+
+
+def run_with(code, name, folder=REPOSITORY):
+    """Run the entry point of a program after `code`, with a folder first on Python's path."""
+    code = (
+        f"import sys; {code}from rover_planner.nodes.start import start_{name} as s; sys.exit(s())"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": f"{folder}{os.pathsep}{REPOSITORY}"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_ros_that_this_python_cannot_import_is_named_in_one_line(name, tmp_path):
+    (tmp_path / "rclpy").mkdir()
+    (tmp_path / "rclpy" / "__init__.py").write_text("import rclpy.built_for_another_python")
+    ended = run_with("", name, tmp_path)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.startswith(f"{name}: ") and ended.stderr.count("\n") == 1
+    assert "cannot import rclpy.built_for_another_python" in ended.stderr
+    assert "pip install 'rover_planner[ros]'" in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "said"),
+    [("diagnostic_msgs", "cannot import diagnostic_msgs"), ("osqp", "pip install osqp")],
+)
+def test_a_part_that_is_missing_is_named_in_one_line(module, said):
+    ended = run_with(f"sys.modules[{module!r}] = None; ", "traverse_server")
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
+    assert said in ended.stderr
+
+
+def test_what_a_plain_installation_brings_is_known_by_its_modules():
+    required = {
+        re.match(r"[\w-]+", line)[0].lower() for line in setup_arguments()["install_requires"]
+    }
+    assert {package.lower() for package in PLAIN.values()} == required
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
@@ -137,6 +181,19 @@ def test_a_parameter_that_does_not_exist_is_warned_of_once_with_the_nearest(name
 def test_parameters_that_exist_are_not_warned_of(name, ros, capfd):
     right = [Parameter("rover", value="m2020"), Parameter("use_sim_time", value=False)]
     ros.spin(NODES[name](context=ros.context, parameter_overrides=right))
+    assert "does not exist" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if PROGRAMS[name].parameters])
+def test_a_node_takes_its_parameter_file_in_a_namespace(name, ros, capfd):
+    file = REPOSITORY / "config" / "parameters" / f"{name}.yaml"
+    words = ["--ros-args", "--params-file", str(file), "-r", "__ns:=/one"]
+    words += ["-r", "diagnostics:=/diagnostics"]
+    node = ros.spin(NODES[name](context=ros.context, cli_args=words))
+    assert node.get_fully_qualified_name() == f"/one/{name}"
+    for key, value in yaml.safe_load(file.read_text())["/**"]["ros__parameters"].items():
+        assert node.get_parameter(key).value == value
+    wait_until(lambda: node.count_publishers("/diagnostics") == 1, "diagnostics")
     assert "does not exist" not in capfd.readouterr().err
 
 

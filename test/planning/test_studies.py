@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rover_physics.errors import RoverFileError
+from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.cli import main
 from rover_planner.studies.objectives import climbs, tallest_step
 from rover_planner.studies.rover_keys import find_key, vary
-from rover_planner.studies.rover_values import rover_to_dict
 from rover_planner.studies.runner import run_study
 from rover_planner.studies.study_file import study_from_dict
 

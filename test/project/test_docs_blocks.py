@@ -25,11 +25,13 @@ from support.ros_fixtures import domain_id
 NOT_RUN = {
     ("make",): "makes an environment and runs the tests; each target has tests of its own",
     ("pip",): "installs; test_lowest_versions installs in an environment of its own",
+    ("git", "clone"): "needs the network",
     ("ros2",): "PyPI does not have the ros2 command",
     ("rosdep",): "is for a robot that has ROS 2 from apt",
     ("source",): "is for a robot that has ROS 2 from apt",
     ("python3", "-m", "colcon"): "is for a robot that has ROS 2 from apt",
     ("python", "-m", "benchmarks"): "takes minutes; test_benchmarks runs each topic small",
+    ("rover_planner", "replay"): "needs a bag; test_replay records small ones",
     ("rover_planner", "view"): "serves a page until Ctrl-C; the tests in test/viewer serve it",
     ("rover_planner", "study"): "takes minutes; test_studies runs small ones",
 }

@@ -12,6 +12,8 @@ from rover_planner.cli import main
     [
         (("figure4", "out.png"), "matplotlib", "rover_planner[plots]"),
         (("study", "study.yaml"), "matplotlib", "rover_planner[plots]"),
+        (("replay", "bag", "out"), "rosbags", "rover_planner[bags]"),
+        (("replay", "bag", "out"), "rclpy", "rover_planner[ros]"),
         (("view",), "viser", "rover_planner[view]"),
         (("view", "--follow"), "rclpy", "rover_planner[ros]"),
     ],

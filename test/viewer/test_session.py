@@ -5,6 +5,7 @@ import pytest
 
 from rover_physics.errors import RoverFileError
 from rover_physics.names import WHEELS
+from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge_path import judge_path
@@ -15,7 +16,6 @@ from rover_planner.studies.rover_values import (
     get_value,
     list_values,
     read_rover,
-    rover_to_dict,
     with_value,
     write_rover,
 )

@@ -1,6 +1,6 @@
 """What a traverse server has done and what is wrong with it, for its diagnostics."""
 
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +8,8 @@ MEMORY = 10.0
 """Time for which a refused question or an internal error counts as a present fault [s]."""
 OK, WARN, ERROR = "ok", "warning", "error"
 """Levels of the health."""
+LATENCIES = 100
+"""Number of the last answers whose times are kept."""
 OVERLOADS = ("busy", "too_long")
 """Codes of questions for which there was no time."""
 
@@ -31,10 +33,23 @@ class ServerHealth:
         self._codes: Counter[str] = Counter()
         self._overload, self._overload_time = "", -float("inf")
         self._map_refusal = ""
+        self._last: dict[str, Any] = {"last question": "none"}
+        self._last_time = 0.0
+        self._latencies: deque[float] = deque(maxlen=LATENCIES)
 
-    def take_answer(self, code: str, now: float) -> None:
-        """Count an answer by the code of its reason, empty if the path is traversable."""
+    def take_answer(self, code: str, now: float, question: str, latency: float) -> None:
+        """Count an answer.
+
+        Args:
+            code: Code of its reason, empty if the path is traversable.
+            now: Time of the steady clock [s].
+            question: Number and service of the question.
+            latency: Time from the arrival of the question to its answer [s].
+        """
         self._codes[code or "traversable"] += 1
+        self._last = {"last question": question, "last answer": code or "traversable"}
+        self._last_time = now
+        self._latencies.append(latency)
         if code in OVERLOADS:
             self._overload, self._overload_time = code, now
 
@@ -51,7 +66,11 @@ class ServerHealth:
             error: The last internal error if it is recent, else empty.
             counts: Further values to show.
         """
-        values = {**counts, **{f"answers {code}": n for code, n in sorted(self._codes.items())}}
+        values = {
+            **counts,
+            **self._describe_last(now),
+            **{f"answers {code}": n for code, n in sorted(self._codes.items())},
+        }
         if error:
             return Health(ERROR, f"internal error in {error}", values)
         overload = now - self._overload_time <= MEMORY
@@ -62,3 +81,14 @@ class ServerHealth:
         ]
         told = "; ".join(fault for fault in faults if fault)
         return Health(WARN if told else OK, told or "ready", values)
+
+    def _describe_last(self, now: float) -> dict[str, Any]:
+        """Return the last question, its age and times of the last LATENCIES answers."""
+        if not self._latencies:
+            return self._last
+        return {
+            **self._last,
+            "last answer age [s]": f"{now - self._last_time:.1f}",
+            "last latency [ms]": f"{1e3 * self._latencies[-1]:.1f}",
+            f"largest latency of {len(self._latencies)} [ms]": f"{1e3 * max(self._latencies):.1f}",
+        }

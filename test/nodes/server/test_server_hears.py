@@ -233,6 +233,16 @@ def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(server, client,
     assert client.can_traverse(START, GOAL).poses == []
     wait_until(lambda: last().message == "ready", "the map")
     assert last().level == DiagnosticStatus.OK
+
+    def told() -> dict[str, str]:
+        return {value.key: value.value for value in last().values}
+
+    wait_until(lambda: told()["last question"] == "1, can_traverse", "the question")
+    values = told()
+    assert values["map"] == "elevation_cloud" and values["map coverage [%]"] == "100.0"
+    assert 0.0 <= float(values["map age [s]"]) < 60.0
+    assert values["last answer"] != "traversable"
+    assert float(values["last latency [ms]"]) > 0.0
     server.guard.report("a test", ZeroDivisionError("made up"))
     wait_until(lambda: last().level == DiagnosticStatus.ERROR, "the error")
     assert "ZeroDivisionError" in last().message

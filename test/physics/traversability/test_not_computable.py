@@ -16,6 +16,7 @@ from rover_physics.prediction.map_sweep import PoseScores, score_all, score_pose
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover, rover_from_dict
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
@@ -26,7 +27,6 @@ from rover_physics.traversability.reach import judge_reach
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import judge
 from rover_planner.planning.path_query import path_cost
-from rover_planner.studies.rover_values import rover_to_dict
 from support.rough_grounds import plane
 
 LSR1 = load_rover("lsr1")

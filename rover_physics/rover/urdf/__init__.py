@@ -1,0 +1,1 @@
+"""Rovers as URDF: a rover is written as a robot of links and joints, and read from one."""

@@ -1,0 +1,221 @@
+"""The command `rover_planner replay`: answers the questions of a recorded drive again."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rover_planner.command.plan import read_pose
+from rover_planner.errors import PlanningError
+from rover_planner.shell.extras import need
+
+if TYPE_CHECKING:
+    from rover_planner.parameters.traverse_server import TraverseServerParameters
+    from rover_planner.ros.bags.bag_writer import BagWriter
+    from rover_planner.ros.bags.replay import Answer
+
+NODE_KEYS = ("/**", "traverse_server", "/traverse_server")
+"""Keys of a parameter file that are about traverse_server; later ones take precedence."""
+
+
+def replay(
+    bag: Annotated[
+        Path, typer.Argument(metavar="BAG", help="Folder of a rosbag2, or its .mcap or .db3 file.")
+    ],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="Folder for the answers; must not exist.")
+    ],
+    parameters: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Parameter file of traverse_server, .yaml."),
+    ] = None,
+    rover: Annotated[
+        str, typer.Option(metavar="ROVER", help="Preset name or rover file; sets the parameter.")
+    ] = "",
+    map_frame: Annotated[
+        str, typer.Option(metavar="NAME", help="Frame of the map; sets the parameter.")
+    ] = "",
+    resolution: Annotated[
+        float, typer.Option(metavar="M", help="Cell size of the map; sets map_resolution.")
+    ] = 0.0,
+    goal: Annotated[
+        str, typer.Option(metavar="X,Y,YAW", help="Ask for a way to it after each new map.")
+    ] = "",
+    start: Annotated[
+        str, typer.Option(metavar="X,Y,YAW", help="Start of that way; default: the odometry.")
+    ] = "",
+    stretch: Annotated[
+        float, typer.Option(metavar="M", help="Length in which the drive is judged.", min=0.1)
+    ] = 5.0,
+    map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="PointCloud2 or GridMap.")] = "",
+    joints_topic: Annotated[str, typer.Option(metavar="TOPIC", help="JointState.")] = "",
+    odometry_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Odometry.")] = "",
+    path_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Path to check.")] = "",
+) -> None:
+    """Answer the questions of a bag again and write the predictions as MCAP and .npz.
+
+    Questions are: the recorded drive, recorded paths, and a goal. Exit code 0: it ran, with any
+    answer. 2: bad input.
+    """
+    need("rclpy", "replay")
+    need("rosbags", "replay")
+    from rover_planner.progress import show_bar
+    from rover_planner.ros.bags import bag_reader
+    from rover_planner.ros.bags.bag_writer import write_bag
+    from rover_planner.ros.bags.replay import Questions, Replay
+
+    if out.exists():
+        raise PlanningError(f"{out} exists already; OUT must be a new folder")
+    given = {"rover": rover, "map_frame": map_frame, "map_resolution": resolution}
+    questions = Questions(_read_end("goal", goal), _read_end("start", start), stretch)
+    work = Replay(_read_parameters(parameters, given), questions)
+    topics = {
+        bag_reader.MAP: map_topic,
+        bag_reader.JOINTS: joints_topic,
+        bag_reader.ODOMETRY: odometry_topic,
+        bag_reader.PATH: path_topic,
+    }
+    with bag_reader.open_bag(bag, topics) as source:
+        if bag_reader.MAP not in source.topics:
+            raise PlanningError(f"{bag}: has no map: PointCloud2 or GridMap")
+        _make_folder(out)
+        with (
+            write_bag(out / "predictions") as predictions,
+            show_bar("replay", source.count) as step,
+        ):
+            results = _Results(out, work.parameters, predictions)
+            for recorded in source.messages():
+                for answer in work.take(recorded):
+                    results.take(answer)
+                step()
+            for answer in work.finish():
+                results.take(answer)
+    for note in work.notes:
+        typer.echo(f"not used: {note}", err=True)
+    total = {"answers": results.count, "refused_messages": work.refused, "topics": source.topics}
+    typer.echo(json.dumps(total))
+
+
+class _Results:
+    """Writes answers to a folder: messages, predictions and maps."""
+
+    def __init__(self, folder: Path, parameters: "TraverseServerParameters", bag: "BagWriter"):
+        from rover_physics.rover.rover_file import load_rover
+
+        self._folder, self._parameters, self._bag = folder, parameters, bag
+        self._rover = load_rover(parameters.rover)
+        self._maps: dict[str, str] = {}
+        self.count = 0
+        """Number of answers."""
+
+    def take(self, answer: "Answer") -> None:
+        """Write an answer and print it in one line."""
+        self.count += 1
+        name = f"{self.count:03d}_{answer.kind}"
+        told: dict[str, Any] = {
+            "question": self.count,
+            "kind": answer.kind,
+            "stamp": f"{answer.stamp / 1e9:.9f}",
+            "traversable": answer.judgement.traversable,
+            "reason": answer.judgement.reason,
+            "map": self._save_map(answer),
+        }
+        told |= self._save_prediction(answer, name)
+        self._write_messages(answer)
+        typer.echo(json.dumps(told))
+
+    def _save_map(self, answer: "Answer") -> str:
+        """Write the map of an answer once; return its file's name."""
+        from rover_physics.terrain.grid import save_terrain
+
+        if answer.terrain is None:
+            return ""
+        key = answer.identity.map_hash
+        if key not in self._maps:
+            self._maps[key] = f"map_{len(self._maps) + 1:03d}.npz"
+            save_terrain(self._folder / self._maps[key], answer.terrain)
+        return self._maps[key]
+
+    def _save_prediction(self, answer: "Answer", name: str) -> dict[str, Any]:
+        """Write prediction and measurements of an answer; return what is told of them."""
+        from rover_physics.files.npz_file import write_npz
+        from rover_planner.command.prediction_files import write_prediction
+
+        candidate = answer.judgement.candidate
+        if candidate is None or answer.terrain is None:
+            return {}
+        on_soil = bool(self._parameters.soil) or bool(answer.terrain.soil_names)
+        file = f"{name}.npz"
+        write_prediction(
+            self._folder / file, candidate.prediction, candidate.verdict, on_soil=on_soil
+        )
+        told: dict[str, Any] = {"prediction": file, "waypoints": len(candidate.prediction.poses)}
+        if answer.measured is not None:
+            measured = answer.measured
+            write_npz(self._folder / f"{name}_measured.npz", vars(measured))
+            told["measured"] = f"{name}_measured.npz"
+            told["suspension"] = measured.compare(candidate.prediction)
+        return told
+
+    def _write_messages(self, answer: "Answer") -> None:
+        """Write the messages that a server would publish, under its topics."""
+        from msg_adapters.paths import PoseStock
+        from msg_adapters.stamps import ns_to_stamp
+        from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
+
+        values = self._parameters
+        messages = ResultMessages(
+            judgement=answer.judgement,
+            identity=answer.identity,
+            rover=self._rover,
+            plan_spacing=values.plan_spacing,
+            frame=values.map_frame,
+            stamp=ns_to_stamp(answer.stamp),
+            poses=PoseStock(),
+            points=[],
+            positive_steering=values.steering_sign,
+        )
+        for topic in RESULT_KINDS:
+            self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
+
+
+def _read_end(name: str, text: str) -> tuple[float, float, float] | None:
+    return read_pose(name, text) if text else None
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise PlanningError(f"{folder} cannot be made: {error.strerror or error}") from None
+
+
+def _has_parameters(part: Any) -> bool:
+    return isinstance(part, dict) and isinstance(part.get("ros__parameters"), dict)
+
+
+def _read_parameters(path: Path | None, given: dict[str, Any]) -> "TraverseServerParameters":
+    """Return the parameters of a file, with those that are given over them.
+
+    Raises:
+        PlanningError: The file is no parameter file, or a parameter is unknown or wrong.
+    """
+    from rover_physics.files.yaml_file import read_yaml
+    from rover_planner.parameters.table import specs_of
+    from rover_planner.parameters.traverse_server import TraverseServerParameters
+
+    content: dict[str, Any] = {}
+    if path is not None:
+        read = read_yaml(path)
+        found = [read[key] for key in NODE_KEYS if key in read] if isinstance(read, dict) else []
+        found = [part["ros__parameters"] for part in found if _has_parameters(part)]
+        if not found:
+            raise PlanningError(f"{path} is no parameter file; it needs /**: ros__parameters:")
+        content = {name: value for part in found for name, value in part.items()}
+    content |= {name: value for name, value in given.items() if value}
+    known = {spec.name for spec in specs_of(TraverseServerParameters)}
+    unknown = sorted(content.keys() - known - {"use_sim_time"})
+    if unknown:
+        raise PlanningError(f"{path}: traverse_server has no parameter {unknown[0]}")
+    return TraverseServerParameters(**{k: v for k, v in content.items() if k in known})

@@ -1,0 +1,66 @@
+"""The commands `rover_planner urdf` and `rover`: rover files to URDF and back."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rover_planner.command.options import RoverName
+
+
+def urdf(
+    rover: RoverName,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="URDF to write; is overwritten.")],
+    joint_map: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="FILE", help="Write the joint map that reads it back."),
+    ] = None,
+) -> None:
+    """Write a rover as URDF, with inertias, joint limits and collision cylinders."""
+    from rover_physics.rover.rover_contents import save_yaml
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.rover.urdf.joint_map import map_of
+    from rover_physics.rover.urdf.write_urdf import write_urdf
+
+    model = load_rover(rover)
+    write_urdf(out, model)
+    if joint_map is not None:
+        comment = f"Joints of {model.name}'s URDF, and what the URDF does not tell."
+        save_yaml(joint_map, map_of(model), comment)
+    typer.echo(f"wrote {out}: {model.name}, {model.total_mass:.6g} kg")
+
+
+def rover(
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="Rover file to write, .yaml; is overwritten.")
+    ],
+    from_urdf: Annotated[
+        Path, typer.Option("--from-urdf", metavar="FILE", help="URDF of the rover.")
+    ],
+    joint_map: Annotated[
+        Path,
+        typer.Option(
+            "--map", metavar="FILE", help="Joint map, .yaml (docs/integration/robot.md)."
+        ),
+    ],
+) -> None:
+    """Write a rover file from a URDF and a joint map."""
+    from rover_physics.rover.rover_contents import save_rover
+    from rover_physics.rover.urdf.read_rover import rover_from_urdf
+
+    read = rover_from_urdf(from_urdf, joint_map)
+    comment = (
+        f"From {from_urdf.name} by {joint_map.name}. SI units. Positions: left side, body frame\n"
+        "(x forward, y left, z up, origin midway between the rocker pivots), on flat ground."
+    )
+    save_rover(out, read.rover, comment)
+    typer.echo(
+        f"wrote {out}: {read.rover.name}, {read.rover.total_mass:.6g} kg, left and right differ "
+        f"by {1e3 * read.asymmetry:.3g} mm"
+    )
+    pitch, bogie = read.levelling.pitch, read.levelling.bogie
+    if pitch or bogie:
+        typer.echo(
+            "wheels were not level; on flat ground the URDF's axes have a pitch of "
+            f"{pitch:.4g} rad, its bogies an angle of {bogie:.4g} rad"
+        )

@@ -1,0 +1,1 @@
+"""Recorded messages: bags are read, their questions answered again, and answers recorded."""

@@ -1,0 +1,167 @@
+"""Reads the messages that a traverse server needs from a rosbag2, in SQLite or MCAP."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nav_msgs.msg import Odometry
+from nav_msgs.msg import Path as PathMessage
+from rclpy.serialization import deserialize_message
+from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from sensor_msgs.msg import JointState, PointCloud2
+
+from rover_physics.files.validation import show_file
+from rover_planner.errors import PlanningError
+
+MAP, JOINTS, ODOMETRY, PATH = "map", "joints", "odometry", "path"
+"""Inputs of a replay."""
+GRID_MAP = "grid_map_msgs/msg/GridMap"
+TYPES: dict[str, tuple[str, ...]] = {
+    MAP: ("sensor_msgs/msg/PointCloud2", GRID_MAP),
+    JOINTS: ("sensor_msgs/msg/JointState",),
+    ODOMETRY: ("nav_msgs/msg/Odometry",),
+    PATH: ("nav_msgs/msg/Path",),
+}
+"""Types of each input, as bags name them."""
+CLASSES = {
+    "sensor_msgs/msg/PointCloud2": PointCloud2,
+    "sensor_msgs/msg/JointState": JointState,
+    "nav_msgs/msg/Odometry": Odometry,
+    "nav_msgs/msg/Path": PathMessage,
+}
+"""Classes of the types that every ROS has."""
+USUAL = {
+    MAP: ("elevation_cloud", "elevation_map"),
+    JOINTS: ("joint_states",),
+    ODOMETRY: ("odometry",),
+    PATH: ("traverse_server/path",),
+}
+"""How the topic of each input usually ends."""
+GRID_MAP_INFO_FIELDS = """
+float64 resolution
+float64 length_x
+float64 length_y
+geometry_msgs/Pose pose
+"""
+GRID_MAP_FIELDS = """
+std_msgs/Header header
+grid_map_msgs/GridMapInfo info
+string[] layers
+string[] basic_layers
+std_msgs/Float32MultiArray[] data
+uint16 outer_start_index
+uint16 inner_start_index
+"""
+"""Fields of a GridMap, which is read without its package."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A recorded message."""
+
+    kind: str
+    """One of TYPES."""
+    topic: str
+    """Its topic."""
+    stamp: int
+    """Time of its recording [ns]."""
+    message: Any
+    """The ROS message."""
+
+
+class BagReader:
+    """The inputs of a replay in an open bag."""
+
+    def __init__(self, reader: Reader, topics: Mapping[str, str]):
+        self._reader, self.topics = reader, topics
+        """Topics by input; without inputs that the bag does not have."""
+        self._kinds = {topic: kind for kind, topic in topics.items()}
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
+            self._store.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
+
+    @property
+    def count(self) -> int:
+        """Number of messages."""
+        return sum(c.msgcount for c in self._connections())
+
+    def messages(self) -> Iterator[Recorded]:
+        """Yield the messages in the order of their recording.
+
+        Raises:
+            PlanningError: The bag is damaged.
+        """
+        stream = self._reader.messages(self._connections())
+        while True:
+            try:
+                connection, stamp, raw = next(stream)
+                kind = self._kinds[connection.topic]
+                message = self._deserialize(bytes(raw), connection.msgtype)
+            except StopIteration:
+                return
+            except Exception as error:  # each storage has errors of its own
+                raise PlanningError(
+                    f"{show_file(self._reader.path)}: is damaged: {error}"
+                ) from None
+            yield Recorded(kind, connection.topic, stamp, message)
+
+    def _connections(self) -> list[Any]:
+        return [
+            connection
+            for connection in self._reader.connections
+            if connection.msgtype in TYPES.get(self._kinds.get(connection.topic, ""), ())
+        ]
+
+    def _deserialize(self, raw: bytes, name: str) -> Any:
+        if name in CLASSES:
+            return deserialize_message(raw, CLASSES[name])
+        return self._store.deserialize_cdr(raw, name)
+
+
+@contextmanager
+def open_bag(path: Path, wanted: Mapping[str, str]) -> Iterator[BagReader]:
+    """Open a bag: a folder with metadata.yaml, or a single .mcap or .db3 file.
+
+    Args:
+        path: The bag.
+        wanted: Topics by input, empty to choose: the one that ends as USUAL, or the only one of
+            its type; for PATH only the former.
+
+    Raises:
+        PlanningError: It cannot be read, a wanted topic is missing, or several topics are as good.
+    """
+    try:
+        reader = Reader(path)
+        reader.open()
+    except (ReaderError, OSError, ValueError, KeyError) as error:
+        raise PlanningError(f"{show_file(path)}: is no bag that can be read: {error}") from None
+    try:
+        topics = {kind: _choose(reader, kind, wanted.get(kind, "")) for kind in TYPES}
+        yield BagReader(reader, {kind: topic for kind, topic in topics.items() if topic})
+    finally:
+        reader.close()
+
+
+def _choose(reader: Reader, kind: str, wanted: str) -> str:
+    """Return the topic of an input, empty if the bag has none."""
+    names = TYPES[kind]
+    name = " or ".join(names)
+    topics = sorted({c.topic for c in reader.connections if c.msgtype in names and c.msgcount})
+    if wanted:
+        if f"/{wanted.lstrip('/')}" not in topics:
+            raise PlanningError(
+                f"no topic {wanted} of type {name} in the bag; it has "
+                f"{', '.join(topics) or 'none'}"
+            )
+        return f"/{wanted.lstrip('/')}"
+    usual = [topic for topic in topics if topic.endswith(tuple(f"/{end}" for end in USUAL[kind]))]
+    candidates = usual if usual or kind == PATH else topics
+    if len(candidates) > 1:
+        raise PlanningError(
+            f"the bag has {len(candidates)} topics of type {name}: {', '.join(candidates)}; "
+            f"choose one by --{kind}-topic"
+        )
+    return candidates[0] if candidates else ""

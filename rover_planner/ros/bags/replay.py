@@ -1,0 +1,196 @@
+"""Feeds recorded messages to the service behind a traverse server, and collects its answers."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sensor_msgs.msg import PointCloud2
+
+from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.errors import MessageError
+from msg_adapters.frames import check_frame
+from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
+from msg_adapters.identity import path_hash
+from msg_adapters.joints import joint_positions
+from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.paths import path_to_poses
+from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from rover_physics.errors import RoverError
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.errors import PlanningError
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.identity import Register
+from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.known_map import stamp_text
+from rover_planner.planning.answering.service_settings import (
+    keeper_settings,
+    load_service_settings,
+)
+from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.verdict_report import IdentityReport
+from rover_planner.ros.bags.bag_reader import JOINTS, MAP, ODOMETRY, PATH, Recorded
+from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
+from rover_planner.worlds.maps.living_map import MapSnapshot
+from rover_planner.worlds.maps.map_keeper import MapKeeper
+
+DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
+"""Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
+MAX_NOTES = 5
+"""Number of refused messages that are told one by one."""
+
+
+@dataclass(frozen=True)
+class Questions:
+    """What is asked of a bag."""
+
+    goal: tuple[float, float, float] | None = None
+    """Goal x, y [m], yaw [rad] of a question after each new map; None asks none."""
+    start: tuple[float, float, float] | None = None
+    """Its start; None takes the last odometry."""
+    stretch: float = 5.0
+    """Length of the stretches in which the recorded drive is judged [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """An answer to a question of a replay."""
+
+    kind: str
+    """DRIVEN, CHECKED or PLANNED."""
+    stamp: int
+    """Time of the question [ns], as recorded."""
+    judgement: Judgement
+    """The answer."""
+    identity: IdentityReport
+    """What it is about."""
+    terrain: Terrain | None
+    """The map it is about; None if there was none yet."""
+    measured: Measured | None = None
+    """What was measured at its waypoints; for DRIVEN."""
+
+
+@dataclass
+class Replay:
+    """A service, fed with recorded messages."""
+
+    parameters: TraverseServerParameters
+    """Parameters as of the node traverse_server."""
+    questions: Questions
+    """What is asked."""
+    refused: dict[str, int] = field(default_factory=dict)
+    """Number of messages that could not be used, by input."""
+    notes: list[str] = field(default_factory=list)
+    """Why, for the first MAX_NOTES of them."""
+
+    def __post_init__(self) -> None:
+        self._service = TraverseService(load_service_settings(self.parameters))
+        values = self.parameters
+        self._keeper = MapKeeper(self._service.settings.rover, keeper_settings(values))
+        self._layers = GridMapLayers(
+            values.elevation_layer, values.variance_layer, values.friction_layer
+        )
+        if values.terrain_file:
+            terrain = load_terrain(values.terrain_file, values.max_map_cells)
+            self._keep(self._keeper.load(terrain, 0.0, None), values.terrain_file, None)
+        self._register = Register("replay")
+        self._drive, self._begun = RecordedDrive(), self._service.situation()
+        self._pose: NDArray[np.float64] | None = None
+        self._take: dict[str, Callable[[Recorded], Iterator[Answer]]] = {
+            MAP: self._take_map,
+            JOINTS: self._take_joints,
+            ODOMETRY: self._take_odometry,
+            PATH: self._take_path,
+        }
+
+    def take(self, recorded: Recorded) -> Iterator[Answer]:
+        """Take a message; yield the answers to the questions that it causes."""
+        try:
+            yield from self._take[recorded.kind](recorded)
+        except (MessageError, PlanningError, RoverError) as error:
+            self.refused[recorded.kind] = self.refused.get(recorded.kind, 0) + 1
+            if len(self.notes) < MAX_NOTES:
+                self.notes.append(f"{recorded.topic} at {stamp_text(recorded.stamp)}: {error}")
+
+    def finish(self) -> Iterator[Answer]:
+        """Yield the answer about the rest of the drive."""
+        if len(self._drive.poses) > 1:
+            yield self._judge_drive()
+
+    def _take_map(self, recorded: Recorded) -> Iterator[Answer]:
+        message, values = recorded.message, self.parameters
+        check_frame(message.header.frame_id, values.map_frame, recorded.topic)
+        if isinstance(message, PointCloud2):
+            terrain = terrain_from_point_cloud(message, values.map_resolution, values.cell_height)
+        else:
+            terrain = terrain_from_grid_map(message, self._layers)
+        stamp = stamp_to_ns(message.header.stamp)
+        since = (recorded.stamp if stamp is None else stamp) / NANOSECONDS
+        kept = self._keeper.take(terrain, recorded.topic, since, self._service.standing())
+        is_new = self._keep(kept, recorded.topic, stamp)
+        goal = self.questions.goal
+        if not is_new or goal is None:
+            return
+        start: ArrayLike | None = self.questions.start
+        start = self._pose if start is None else start
+        if start is not None:
+            yield self._ask(PLANNED, recorded.stamp, lambda now: now.answer(start, goal))
+
+    def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> bool:
+        """Keep a map in the service; return whether its content is new."""
+        frame = self.parameters.map_frame
+        return self._service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
+
+    def _take_joints(self, recorded: Recorded) -> Iterator[Answer]:
+        self._service.take_joints(joint_positions(recorded.message, self._service.joint_names))
+        yield from ()
+
+    def _take_odometry(self, recorded: Recorded) -> Iterator[Answer]:
+        pose, _ = odometry_to_pose(recorded.message, self.parameters.map_frame)
+        self._pose = pose[[0, 1, 3]]
+        self._service.take_pose(self._pose)
+        if self._service.known_map is None:
+            return  # what is driven before the first map cannot be judged
+        if not self._drive.poses or self._begun.known_map is None:
+            self._begun = self._service.situation(recorded.stamp)
+        self._drive.add(self._pose, recorded.stamp, self._service.joints)
+        if self._drive.length >= self.questions.stretch:
+            yield self._judge_drive()
+            self._begun = self._service.situation(recorded.stamp)
+
+    def _take_path(self, recorded: Recorded) -> Iterator[Answer]:
+        poses = path_to_poses(recorded.message, self.parameters.map_frame)
+        about = path_hash(recorded.message), stamp_text(stamp_to_ns(recorded.message.header.stamp))
+        self._service.take_path(poses, *about)
+        yield self._ask(CHECKED, recorded.stamp, Situation.check_path)
+
+    def _judge_drive(self) -> Answer:
+        """Judge the drive on the map that was known when it began; begin the next stretch."""
+        drive, self._drive = self._drive, self._drive.rest()
+        self._service.take_path(np.array(drive.poses))
+        path = self._service.given_path
+        begun = replace(self._begun, path=path, measured_pose=None)
+        answer = self._ask(DRIVEN, drive.stamps[0], Situation.check_path, begun)
+        candidate = answer.judgement.candidate
+        if candidate is None:
+            return answer
+        return replace(answer, measured=drive.measured_at(candidate.prediction.poses))
+
+    def _ask(
+        self,
+        kind: str,
+        stamp: int,
+        ask: Callable[[Situation], Judgement],
+        situation: Situation | None = None,
+    ) -> Answer:
+        """Ask a question; an invalid one is refused with its reason."""
+        now = self._service.situation(stamp) if situation is None else situation
+        number = self._register.next_number()
+        try:
+            judgement = ask(now).complete()
+        except (PlanningError, RoverError) as error:
+            judgement = refusal("bad_request", str(error))
+        identity = self._register.identify(number, kind, "", now)
+        identity = replace(identity, path_hash=now.path.hash, path_stamp=now.path.stamp)
+        return Answer(kind, stamp, judgement, identity, now.terrain)

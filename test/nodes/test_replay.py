@@ -1,0 +1,360 @@
+"""Recorded drives are judged again: from SQLite and MCAP, with maps, joints and odometry."""
+
+import json
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point, PoseStamped, Quaternion
+from nav_msgs.msg import Odometry
+from nav_msgs.msg import Path as PathMessage
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float64MultiArray
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.stamps import ns_to_stamp
+from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_planner.cli import main
+from rover_planner.command.prediction_files import read_prediction
+from rover_planner.nodes.result_topics import RESULT_KINDS
+from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
+from rover_planner.viewer.state.session import ViewSession
+from support.messages.grid_maps import grid_map_of, move_buffer
+
+LSR1 = load_rover("lsr1")
+BEGIN = 1_700_000_000_000_000_000
+"""Time of the first message [ns]."""
+STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
+
+
+def waves() -> Terrain:
+    """Return ground 10 m x 4 m with waves that turn the suspension."""
+    X, Y = np.meshgrid(np.arange(-1.0, 9.0, 0.04), np.arange(-2.0, 2.0, 0.04))
+    return Terrain(0.03 * np.sin(4.0 * X + 0.8 * Y), 0.04, (-1.0, -2.0))
+
+
+def odometry_at(x: float, frame: str = "map") -> Odometry:
+    message = Odometry()
+    message.header.frame_id = frame
+    message.pose.pose.position = Point(x=x)
+    message.pose.pose.orientation.w = 1.0
+    return message
+
+
+def joints_of(angles: dict[str, float]) -> JointState:
+    return JointState(name=list(angles), position=list(angles.values()))
+
+
+def drive(length: float, off: float = 0.0) -> list[tuple[str, object]]:
+    """Return the messages of a drive along x: odometry and suspension angles each 2 cm.
+
+    The angles are those of the model, plus `off` [rad] for the bogies.
+    """
+    x = np.arange(0.5, 0.5 + length, 0.02)
+    poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
+    prediction = sweep_path(LSR1, waves(), poses)
+    messages: list[tuple[str, object]] = []
+    for k, place in enumerate(x.tolist()):
+        right, left = prediction.bogie_angle[k].tolist()
+        angles = {
+            "rocker_right": float(prediction.rocker_angle[k, 0]),
+            "rocker_left": float(prediction.rocker_angle[k, 1]),
+            "bogie_right": right + off,
+            "bogie_left": left + off,
+        }
+        messages += [("/joint_states", joints_of(angles)), ("/odometry", odometry_at(place))]
+    return messages
+
+
+def cloud(terrain: Terrain, stamp: int = BEGIN, frame: str = "map") -> PointCloud2:
+    return terrain_to_point_cloud(terrain, frame, ns_to_stamp(stamp))
+
+
+def path_to(x: float) -> PathMessage:
+    message = PathMessage()
+    message.header.frame_id = "map"
+    message.header.stamp = ns_to_stamp(BEGIN + 5)
+    for place in (1.0, x):
+        pose = PoseStamped()
+        pose.pose.position.x = place
+        pose.pose.orientation = Quaternion(w=1.0)
+        message.poses.append(pose)
+    return message
+
+
+def record(folder: Path, messages: list[tuple[str, object]], storage: str = "mcap") -> Path:
+    """Write messages 10 ms apart to a new bag."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(folder, version=9, storage_plugin=STORAGES[storage]) as writer:
+        connections = {}
+        for k, (topic, message) in enumerate(messages):
+            if topic not in connections:
+                package, name = type(message).__module__.split(".")[0], type(message).__name__
+                connections[topic] = writer.add_connection(
+                    topic, f"{package}/msg/{name}", typestore=types
+                )
+            stamp = BEGIN + 10_000_000 * k
+            writer.write(connections[topic], stamp, serialize_message(message))
+    return folder
+
+
+def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]:
+    """Replay a bag; return its answers and the total."""
+    assert main(["replay", str(bag), str(out), *words]) == 0, capsys.readouterr().err
+    *answers, total = map(json.loads, capsys.readouterr().out.splitlines())
+    return answers, total
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_drive_is_judged_in_stretches_with_what_was_measured(storage, tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(4.0)], storage)
+    answers, total = replay(capsys, bag, tmp_path / "out", "--stretch", "1.5")
+    assert [answer["kind"] for answer in answers] == ["driven"] * 3
+    assert all(answer["traversable"] for answer in answers)
+    assert total["refused_messages"] == {} and total["answers"] == 3
+    assert total["topics"] == {
+        "map": "/elevation_cloud", "joints": "/joint_states", "odometry": "/odometry",
+    }  # fmt: skip
+    for answer in answers:
+        # Poses are kept 5 cm apart, the ground turns the bogies by up to 0.12 rad in 10 cm.
+        assert answer["suspension"]["rms"] < 0.025
+        measured = np.load(tmp_path / "out" / answer["measured"])
+        assert measured["bogie_angle"].shape == (answer["waypoints"], 2)
+        assert (np.diff(measured["stamp"]) >= 0).all()
+        assert np.ptp(measured["bogie_angle"]) > 0.1
+    assert float(answers[0]["stamp"]) == pytest.approx(BEGIN / 1e9 + 0.02)
+
+
+def test_joints_that_the_model_does_not_predict_show_in_the_difference(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(2.0, off=0.1)])
+    (answer,), _ = replay(capsys, bag, tmp_path / "out")
+    assert answer["suspension"]["rms"] == pytest.approx(0.1 / np.sqrt(2.0), abs=0.02)
+    assert 0.1 < answer["suspension"]["largest"] < 0.2
+
+
+def test_both_storages_give_the_same_predictions(tmp_path, capsys):
+    messages = [
+        ("/elevation_cloud", cloud(waves())),
+        *drive(1.0),
+        ("/traverse_server/path", path_to(3.0)),
+    ]
+    told = {}
+    for storage in STORAGES:
+        bag = record(tmp_path / storage, messages, storage)
+        told[storage] = replay(capsys, bag, tmp_path / f"out_{storage}")
+    assert told["sqlite"] == told["mcap"]
+    for name in ("001_check_path.npz", "002_driven.npz"):
+        one, other = (np.load(tmp_path / f"out_{storage}" / name) for storage in STORAGES)
+        for key in one.files:
+            np.testing.assert_array_equal(one[key], other[key])
+
+
+def test_the_page_opens_predictions_on_their_maps(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(1.0)])
+    (answer,), _ = replay(capsys, bag, tmp_path / "out")
+    prediction, reasons = read_prediction(tmp_path / "out" / answer["prediction"])
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    np.testing.assert_allclose(ground.elevation, waves().elevation, atol=1e-6)
+    session = ViewSession(LSR1, ground, (0.5, 0.0, 0.0), (1.5, 0.0, 0.0))
+    session.replay(prediction, reasons)
+    assert session.answer.candidates[0].verdict.traversable
+
+
+def test_predictions_are_recorded_as_a_server_publishes_them(tmp_path, capsys):
+    messages = [
+        ("/elevation_cloud", cloud(waves())),
+        *drive(2.0),
+        ("/traverse_server/path", path_to(2.0)),
+    ]
+    bag = record(tmp_path / "bag", messages)
+    answers, _ = replay(capsys, bag, tmp_path / "out", "--stretch", "1")
+    assert [answer["kind"] for answer in answers] == ["driven", "check_path", "driven"]
+    loads = []
+    with Reader(tmp_path / "out" / "predictions") as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+        for connection, stamp, raw in reader.messages():
+            if connection.topic == "/traverse_server/wheel_loads":
+                loads.append((stamp, deserialize_message(bytes(raw), Float64MultiArray).data))
+    assert counts == {f"/traverse_server/{name}": 3 for name in RESULT_KINDS}
+    told = {answer["stamp"]: answer["prediction"] for answer in answers}
+    for stamp, data in loads:
+        file = np.load(tmp_path / "out" / told[f"{stamp / 1e9:.9f}"])
+        np.testing.assert_array_equal(np.array(data).reshape(-1, 6), file["wheel_loads"])
+
+
+def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
+    flat = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
+    messages = [
+        ("/odometry", odometry_at(1.0)),
+        ("/elevation_cloud", cloud(waves())),
+        ("/elevation_cloud", cloud(waves())),  # the same again
+        ("/elevation_cloud", cloud(flat, BEGIN + 1)),
+    ]
+    bag = record(tmp_path / "bag", messages)
+    answers, _ = replay(capsys, bag, tmp_path / "out", "--goal", "3,0.2,0")
+    assert [answer["kind"] for answer in answers] == ["can_traverse"] * 2
+    assert [answer["map"] for answer in answers] == ["map_001.npz", "map_002.npz"]
+    first = np.load(tmp_path / "out" / "001_can_traverse.npz")["poses"]
+    np.testing.assert_allclose(first[[0, -1], 0], [1.0, 3.0], atol=1e-6)
+
+
+def record_grid_map(folder: Path, message: object) -> Path:
+    """Write a GridMap and an odometry to a new bag, as a robot with grid_map_msgs does."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
+        types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        odometry = writer.add_connection("/odometry", "nav_msgs/msg/Odometry", typestore=types)
+        writer.write(odometry, BEGIN, serialize_message(odometry_at(1.0)))
+        grid = writer.add_connection("/elevation_map", GRID_MAP, typestore=types)
+        writer.write(grid, BEGIN + 1, types.serialize_cdr(message, GRID_MAP))
+    return folder
+
+
+def test_a_grid_map_is_replayed_without_its_package_whatever_its_buffer(tmp_path, capsys):
+    heights = waves().elevation
+    centre = -1.0 + 0.04 * (heights.shape[1] - 1) / 2, -2.0 + 0.04 * (heights.shape[0] - 1) / 2
+    message = grid_map_of({"elevation": heights}, 0.04, centre)
+    told = []
+    for name, map_message in (("still", message), ("moved", move_buffer(message, 31, 17))):
+        bag = record_grid_map(tmp_path / name, map_message)
+        answers, total = replay(capsys, bag, tmp_path / f"out_{name}", "--goal", "3,0.2,0")
+        assert total["topics"]["map"] == "/elevation_map" and total["refused_messages"] == {}
+        told.append(answers)
+    assert told[0] == told[1] and len(told[0]) == 1 and told[0][0]["waypoints"] > 90
+    ground = load_terrain(tmp_path / "out_moved" / "map_001.npz")
+    np.testing.assert_allclose(ground.elevation, heights, atol=1e-6)
+
+
+def test_local_maps_merge_into_a_loaded_one_as_in_the_server(tmp_path, capsys):
+    prior = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
+    save_terrain(tmp_path / "prior.npz", prior)
+    file = tmp_path / "server.yaml"
+    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
+    local = Terrain(np.full((25, 25), 0.1), 0.04, (3.0, -0.52))
+    messages = [("/odometry", odometry_at(0.0)), ("/elevation_cloud", cloud(local))]
+    bag = record(tmp_path / "bag", messages)
+    words = ["--parameters", str(file), "--goal", "1.5,0,0"]
+    (answer,), _ = replay(capsys, bag, tmp_path / "out", *words)
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    assert ground.elevation.shape == prior.elevation.shape
+    assert ground.elevation_at(np.array([3.4]), np.array([0.0]))[0] > 0.05
+    assert ground.elevation_at(np.array([0.0]), np.array([0.0]))[0] == 0.0
+
+
+def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
+    messages = [
+        ("/elevation_cloud", cloud(waves(), frame="odom")),
+        ("/elevation_cloud", cloud(waves())),
+        ("/odometry", odometry_at(1.0, frame="odom")),
+        ("/joint_states", JointState(name=["bogie_left"], position=[float("nan")])),
+    ]
+    bag = record(tmp_path / "bag", messages)
+    assert main(["replay", str(bag), str(tmp_path / "out")]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["refused_messages"] == {"map": 1, "odometry": 1, "joints": 1}
+    assert err.count("not used: ") == 3
+    assert "not used: /elevation_cloud at 1700000000.000000000" in err
+
+
+def test_a_parameter_file_of_the_server_sets_rover_and_policy(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(1.0)])
+    file = tmp_path / "server.yaml"
+    file.write_text(
+        "/**:\n  ros__parameters: {policy: optimal, control_margin: 0.5, rover: m2020}\n"
+    )
+    (answer,), _ = replay(
+        capsys, bag, tmp_path / "out", "--parameters", str(file), "--rover", "lsr1"
+    )
+    (plain,), _ = replay(capsys, bag, tmp_path / "plain")
+    torques = [
+        np.load(tmp_path / folder / told["prediction"])["torque"]
+        for folder, told in (("out", answer), ("plain", plain))
+    ]
+    assert np.ptp(torques[0], axis=1).max() > 10.0 * np.ptp(torques[1], axis=1).max() + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("messages", "words", "said"),
+    [
+        ([("/odometry", odometry_at(0.0))], (), "has no map: PointCloud2 or GridMap"),
+        ([("/a", cloud(waves())), ("/b", cloud(waves()))], (), "choose one by --map-topic"),
+        ([("/a", cloud(waves()))], ("--map-topic", "/c"), "no topic /c of type .* it has /a"),
+        ([("/a", cloud(waves()))], ("--goal", "1,2"), "--goal is '1,2'"),
+        ([("/a", cloud(waves()))], ("--rover", "lsr9"), "no rover 'lsr9'"),
+        ([("/a", cloud(waves()))], ("--parameters", "none.yaml"), "none.yaml"),
+    ],
+)
+def test_bad_input_is_one_line_and_makes_nothing(messages, words, said, tmp_path, capsys):
+    bag = record(tmp_path / "bag", messages)
+    assert main(["replay", str(bag), str(tmp_path / "out"), *words]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert re.search(said, err), err
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_no_bag_and_a_damaged_one_are_refused(tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    for bag in (tmp_path / "empty", tmp_path / "none", Path(__file__)):
+        assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
+        assert "is no bag that can be read" in capsys.readouterr().err
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(1.0)])
+    (file,) = bag.glob("*.mcap")
+    content = bytearray(file.read_bytes())
+    content[len(content) // 3 :] = b"\x00" * (len(content) - len(content) // 3)
+    file.write_bytes(content)
+    assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("rover_planner: ") and err.count("\n") == 1
+
+
+def test_an_answer_is_never_written_over(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
+    (tmp_path / "out").mkdir()
+    assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_clouds_of_spirits_hazcams_are_replayed(tmp_path, capsys):
+    beside = Path(__file__).resolve().parents[3] / "shared" / "bags"
+    folder = Path(os.environ.get("ROVER_BAG_DIR", beside))
+    bag = folder / "mer_spirit_sol1352_hazcam_mcap"
+    if not bag.is_dir():
+        pytest.skip(f"no bag {bag}; set ROVER_BAG_DIR to its folder")
+    file = tmp_path / "hazcam.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {map_resolution: 0.05, cell_height: mean, max_gap: 0.5, "
+        "unknown_cells: interpolate}}\n"
+    )
+    words = ["--parameters", str(file), "--map-frame", "site"]
+    words += ["--start=-44.4,-19.4,-2.5", "--goal=-45.5,-20.2,-2.5"]
+    answers, total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["topics"] == {"map": "/hazcam/points"} and total["refused_messages"] == {}
+    assert [answer["traversable"] for answer in answers] == [True, False]
+    assert answers[1]["reason"] == "unknown ground under a wheel"
+    prediction, reasons = read_prediction(tmp_path / "out" / answers[0]["prediction"])
+    assert prediction.settled.all() and not any(reasons)
+
+
+def test_orientation_of_odometry_is_its_heading(tmp_path, capsys):
+    x, y, z, w = xyzw_from_rpy(0.0, 0.0, 0.5).tolist()
+    messages = [("/elevation_cloud", cloud(waves()))]
+    for k in range(20):
+        message = odometry_at(1.0 + 0.05 * k * np.cos(0.5))
+        message.pose.pose.position.y = 0.05 * k * np.sin(0.5)
+        message.pose.pose.orientation = Quaternion(x=x, y=y, z=z, w=w)
+        messages.append(("/odometry", message))
+    bag = record(tmp_path / "bag", messages)
+    (answer,), _ = replay(capsys, bag, tmp_path / "out")
+    poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
+    np.testing.assert_allclose(poses[:, 2], 0.5, atol=1e-9)
+    assert answer["suspension"] is None  # no joints were recorded

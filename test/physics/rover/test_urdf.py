@@ -1,0 +1,341 @@
+"""Rovers as URDF: there and back, in MuJoCo, and files of other conventions."""
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from rover_physics.errors import RoverFileError
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_contents import rover_to_dict, save_rover, save_yaml
+from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.rover.urdf.joint_map import map_of
+from rover_physics.rover.urdf.levelling import Levelling
+from rover_physics.rover.urdf.read_rover import rover_from_urdf
+from rover_physics.rover.urdf.robot import parse_robot, read_robot
+from rover_physics.rover.urdf.tree import Tree
+from rover_physics.rover.urdf.write_urdf import write_urdf
+
+
+def numbers_of(contents: Any, key: str = "") -> dict[str, Any]:
+    """Return all values of nested contents by their dotted key."""
+    if isinstance(contents, dict):
+        pairs = contents.items()
+    elif isinstance(contents, list):
+        pairs = enumerate(contents)
+    else:
+        return {key: contents}
+    return {k: v for name, item in pairs for k, v in numbers_of(item, f"{key}.{name}").items()}
+
+
+def assert_alike(first: Rover, second: Rover, tolerance: float) -> None:
+    one, other = numbers_of(rover_to_dict(first)), numbers_of(rover_to_dict(second))
+    assert one.keys() == other.keys()
+    for key, value in one.items():
+        if isinstance(value, float):
+            assert other[key] == pytest.approx(value, rel=0.0, abs=tolerance), key
+        else:
+            assert other[key] == value, key
+
+
+def written(rover: Rover, folder: Path) -> tuple[Path, Path]:
+    """Write URDF and joint map of a rover."""
+    urdf, joints = folder / "rover.urdf", folder / "joints.yaml"
+    write_urdf(urdf, rover)
+    save_yaml(joints, map_of(rover))
+    return urdf, joints
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_rover_comes_back_from_its_urdf(name, tmp_path):
+    rover = load_rover(name)
+    read = rover_from_urdf(*written(rover, tmp_path))
+    assert_alike(rover, read.rover, 1e-9)
+    assert read.asymmetry < 1e-9
+
+
+def test_a_written_rover_file_loads_as_the_same_rover(tmp_path):
+    for name in preset_names():
+        rover = load_rover(name)
+        save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
+        assert load_rover(tmp_path / "rover.yaml") == rover
+
+
+def test_links_have_inertias_that_a_body_can_have_and_wheels_collide_as_cylinders(tmp_path):
+    rover = load_rover("lsr1")
+    urdf, _ = written(rover, tmp_path)
+    text = urdf.read_text()
+    for moments in re.findall(r'ixx="(\S+)" iyy="(\S+)" izz="(\S+)"', text):
+        moment = sorted(map(float, moments))
+        assert 0.0 < moment[2] <= moment[0] + moment[1] + 1e-15
+    robot = read_robot(urdf)
+    for wheel in ("rear_right", "front_left"):
+        (cylinder,) = robot.links[wheel].solids
+        assert cylinder.size == (rover.wheel.radius, rover.wheel.width)
+        assert abs(cylinder.place[1, 2]) == pytest.approx(1.0)
+
+
+PARTS = ("Body", "RockerR", "RockerL", "BogieR", "BogieL")
+"""Links with a mass in `foreign_urdf`, 10, 2, 2, 1 and 1 kg, at their origins."""
+
+
+def foreign_urdf() -> str:
+    """Return a URDF as CAD programs write: x forward, y right, z down, wheels on short axles."""
+
+    def link(name: str, mass: float, geometry: str = "") -> str:
+        inertia = 'ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"'
+        return (
+            f'<link name="{name}"><inertial><mass value="{mass}"/><inertia {inertia}/></inertial>'
+            f"{geometry}</link>"
+        )
+
+    def joint(name: str, kind: str, parent: str, child: str, xyz: str, axis: str) -> str:
+        return (
+            f'<joint name="{name}" type="{kind}"><origin xyz="{xyz}"/><parent link="{parent}"/>'
+            f'<child link="{child}"/><axis xyz="{axis}"/>'
+            '<limit lower="-0.4" upper="0.5" effort="3" velocity="2"/></joint>'
+        )
+
+    text = '<robot name="foreign">' + link("World", 0.0) + link("Body", 10.0)
+    text += '<joint name="Root" type="floating"><parent link="World"/><child link="Body"/></joint>'
+    for side, y in (("R", 1.0), ("L", -1.0)):
+        text += link(f"Rocker{side}", 2.0) + link(f"Bogie{side}", 1.0)
+        text += joint(f"P{side}", "revolute", "Body", f"Rocker{side}", f"0.1 {0.3 * y} -0.5",
+                      "0 1 0")  # fmt: skip
+        text += joint(f"Q{side}", "revolute", f"Rocker{side}", f"Bogie{side}", "0.2 0 0.05",
+                      "0 -1 0")  # fmt: skip
+        for wheel, parent, x, z in (
+            ("B", f"Rocker{side}", -0.4, 0.2),
+            ("M", f"Bogie{side}", -0.2, 0.15),
+            ("F", f"Bogie{side}", 0.2, 0.15),
+        ):
+            tread = (
+                f'<collision><origin xyz="0 {0.05 * y} 0" rpy="1.5707963267948966 0 0"/>'
+                '<geometry><cylinder radius="0.1" length="0.06"/></geometry></collision>'
+            )
+            text += link(f"Wheel{wheel}{side}", 0.5, tread)
+            text += joint(f"W{wheel}{side}", "continuous", parent, f"Wheel{wheel}{side}",
+                          f"{x} 0 {z}", "0 1 0")  # fmt: skip
+    return text + "</robot>"
+
+
+def foreign_map() -> dict[str, Any]:
+    wheels = {"rear": "B", "middle": "M", "front": "F"}
+    return {
+        "axes": {"forward": "x", "up": "-z"},
+        "rocker": {"right": "PR", "left": "PL"},
+        "bogie": {"right": "QR", "left": "QL"},
+        "wheels": {
+            f"{position}_{side}": f"W{letter}{side[0].upper()}"
+            for position, letter in wheels.items()
+            for side in ("right", "left")
+        },
+        "rover": {
+            "gravity": 9.81,
+            "friction": 0.7,
+            "nominal_speed": 0.05,
+            "belly": {"z": -0.05, "x": [-0.2, 0.2], "y": [-0.2, 0.2]},
+            "limits": rover_to_dict(load_rover("lsr1"))["limits"],
+        },
+    }
+
+
+def read_foreign(folder: Path, text: str = "", **keys: Any) -> Rover:
+    """Read the foreign rover with keys of its map changed; None leaves a key out."""
+    (folder / "foreign.urdf").write_text(text or foreign_urdf())
+    contents = {k: v for k, v in (foreign_map() | keys).items() if v is not None}
+    save_yaml(folder / "foreign.yaml", contents)
+    return rover_from_urdf(folder / "foreign.urdf", folder / "foreign.yaml").rover
+
+
+def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
+    rover = read_foreign(tmp_path)
+    suspension = rover.suspension
+    assert suspension.rocker_pivot == pytest.approx((0.0, 0.3, 0.0))
+    assert suspension.bogie_pivot == pytest.approx((0.2, 0.3, -0.05))
+    assert suspension.rocker_wheel == "rear"
+    assert suspension.wheels["rear"] == pytest.approx((-0.4, 0.35, -0.2))
+    assert suspension.wheels["front"] == pytest.approx((0.4, 0.35, -0.2))
+    # The rocker's axis is y of the file, which is -y of the body; the bogie's is +y.
+    assert suspension.rocker_limits == pytest.approx((-0.5, 0.4))
+    assert suspension.bogie_limits == pytest.approx((-0.4, 0.5))
+    assert (rover.wheel.radius, rover.wheel.width) == (0.1, 0.06)
+    assert (rover.wheel.max_torque, rover.wheel.max_speed) == (3.0, 2.0)
+
+
+def test_masses_add_up_and_keep_their_first_moments(tmp_path):
+    rover = read_foreign(tmp_path)
+    assert rover.total_mass == pytest.approx(10.0 + 2 * 2.0 + 2 * 1.0 + 6 * 0.5)
+    assert rover.masses.body.mass == pytest.approx(10.0)
+    assert rover.masses.body.com == pytest.approx((-0.1, 0.0, -0.5))
+    # The file has a wheel's mass on its axle, the model in the middle of its tread.
+    assert rover.masses.rocker.com == pytest.approx((0.0, 0.3 - 0.5 * 0.05 / 2.0, 0.0))
+
+
+def test_a_heavier_wheel_loads_the_link_that_carries_it(tmp_path):
+    text = foreign_urdf()
+    for side in "RL":
+        before, after = text.split(f'<link name="WheelB{side}">')
+        heavier = after.replace('mass value="0.5"', 'mass value="0.8"', 1)
+        text = f'{before}<link name="WheelB{side}">{heavier}'
+    rover = read_foreign(tmp_path, text)
+    assert rover.wheel.mass == pytest.approx(0.5)
+    assert rover.masses.rocker.mass == pytest.approx(2.3)
+    assert rover.masses.rocker.com[0] == pytest.approx(0.3 * -0.4 / 2.3)
+
+
+def test_angles_of_the_map_bring_the_rover_onto_flat_ground(tmp_path):
+    straight = read_foreign(tmp_path)
+    turned = foreign_urdf()
+    for side, y in (("R", 0.3), ("L", -0.3)):
+        place = f'<origin xyz="0.1 {y} -0.5"/>'
+        turned = turned.replace(place, place.replace("/>", ' rpy="0 0.1 0"/>'))
+        assert place not in turned, side
+    again = read_foreign(tmp_path, turned, angles={"PR": -0.1, "PL": -0.1})
+    assert_alike(
+        Rover(**{**vars(straight), "suspension": again.suspension}),
+        Rover(**{**vars(again)}),
+        1e-9,
+    )
+    assert again.suspension.wheels["rear"] == pytest.approx(straight.suspension.wheels["rear"])
+    assert again.suspension.rocker_limits == pytest.approx((-0.6, 0.3))
+
+
+@pytest.mark.parametrize(("nose_down", "turn"), [(0.03, 0.0), (-0.02, 0.015)])
+def test_wheels_that_are_not_level_are_brought_onto_level_ground(nose_down, turn, tmp_path):
+    straight = read_foreign(tmp_path)
+    tilted = foreign_urdf()
+    for place, angle in (
+        ("0.1 0.3 -0.5", nose_down),
+        ("0.1 -0.3 -0.5", nose_down),
+        ("0.2 0 0.05", turn),
+    ):
+        # The file has y to the right, so its pitch is positive with the nose up.
+        turned = f'<origin xyz="{place}" rpy="0 {angle} 0"/>'
+        assert f'<origin xyz="{place}"/>' in tilted
+        tilted = tilted.replace(f'<origin xyz="{place}"/>', turned)
+    rover = read_foreign(tmp_path, tilted)
+    read = rover_from_urdf(tmp_path / "foreign.urdf", tmp_path / "foreign.yaml")
+    # The rockers are turned back by the pitch of the body, the bogies by their own angle.
+    assert read.levelling.pitch == pytest.approx(nose_down, abs=1e-6)
+    assert read.levelling.bogie == pytest.approx(turn, abs=1e-6)
+    for wheel, place in straight.suspension.wheels.items():
+        assert rover.suspension.wheels[wheel] == pytest.approx(place, abs=1e-6)
+    assert rover.suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
+
+
+def test_level_wheels_are_not_touched(tmp_path):
+    for name in preset_names():
+        assert rover_from_urdf(*written(load_rover(name), tmp_path)).levelling == Levelling()
+
+
+def test_a_rocker_may_be_fixed_if_the_map_has_its_limits(tmp_path):
+    text = foreign_urdf()
+    for side in "RL":
+        text = text.replace(
+            f'<joint name="P{side}" type="revolute">', f'<joint name="P{side}" type="fixed">'
+        )
+    keys = foreign_map()["rover"]
+    rover = read_foreign(
+        tmp_path, text, rover={**keys, "suspension": {"rocker_limits": [-0.3, 0.3]}}
+    )
+    assert rover.suspension.rocker_limits == (-0.3, 0.3)
+    assert rover.masses.rocker.mass == pytest.approx(2.0)
+    assert rover.masses.body.mass == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (
+            {"rocker": {"right": "PR", "left": "PX"}},
+            "no joint 'PX' in the URDF; .*its moving joints are PR, QR",
+        ),
+        ({"rocker": {"right": "PL", "left": "PR"}}, "does not hang on Rocker"),
+        ({"axes": {"forward": "x", "up": "z"}}, "rocker.right: y is .* on the other side"),
+        ({"axes": {"forward": "x", "up": "-x"}}, "axes.up is -x; it must be across forward x"),
+        ({"axes": {"forward": "z", "up": "x"}}, "wheels at angle 0 are not level"),
+        ({"angles": {"PR": 0.05}}, "both sides of the rover must be alike"),
+        ({"bogie": None}, "missing key bogie; a joint map needs"),
+        ({"rover": {}}, "missing key .* the URDF does not tell it: write it under rover: in"),
+        ({"steering": {"rear_right": "WBR"}}, "wheels.rear_right: its link .* does not hang on"),
+        ({"rover": {3: 1.0}}, r"rover\[3\].* is 3; it must be a valid string"),
+        ({"angles": {"PR": "x"}}, "angles.PR is 'x'; it must be a number in rad"),
+        ({"arm": {"joints": ["a", "b", "c"], "tip": "t", "stowed": [0.0, 0.0, 0.0]}}, "no joint"),
+        (
+            {"arm": {"joints": ["PR", "QR", "PL"], "tip": "t", "stowed": [0.0, 0.0, 0.0]}},
+            "arm.tip: no link 't' in the URDF",
+        ),
+        ({"axis": {}}, "unknown key axis; did you mean axes"),
+    ],
+)
+def test_a_wrong_joint_map_is_refused_with_its_key(keys, said, tmp_path):
+    with pytest.raises(RoverFileError, match=said):
+        read_foreign(tmp_path, **keys)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("<robot ", "<model ", "XML"),
+        ('<robot name="foreign">', '<!DOCTYPE r><robot name="foreign">', "document type"),
+        ('xyz="0.1 0.3 -0.5"', 'xyz="0.1 0.3"', "PR: xyz is '0.1 0.3'; it must be 3 numbers"),
+        ('mass value="10.0"', 'mass value="-1"', "link Body: mass is -1"),
+        ('mass value="10.0"', 'mass value="1e999"', "Body: value is '1e999'; it must be a number"),
+        ('mass value="10.0"', 'mass value="nan"', "Body: value is 'nan'; it must be a number"),
+        ('xyz="0.1 0.3 -0.5"', 'xyz="0.1 inf -0.5"', "PR: xyz is '0.1 inf -0.5'"),
+        ('xyz="0.1 0.3 -0.5"', 'xyz="1e300 0.3 -0.5"', "PR: xyz is '1e300 0.3 -0.5'"),
+        ('type="floating"', 'type="hinge"', "joint Root: type is 'hinge'"),
+        ('<child link="RockerL"/>', '<child link="RockerX"/>', "'RockerX' is no link"),
+        ('<child link="RockerL"/>', '<child link="RockerR"/>', "RockerR hangs on two joints"),
+        ('<link name="RockerL">', '<link name="RockerR">', "two <link> of the same name"),
+        ('xyz="0.1 -0.3 -0.5"', 'xyz="0.15 -0.3 -0.5"', "m apart; both sides"),
+        ('radius="0.1" length="0.06"', 'radius="x" length="0.06"', "radius is 'x'"),
+    ],
+)
+def test_a_wrong_urdf_is_refused_with_what_is_wrong(old, new, said, tmp_path):
+    text = foreign_urdf()
+    assert old in text
+    with pytest.raises(RoverFileError, match=said):
+        read_foreign(tmp_path, text.replace(old, new, 1))
+
+
+def test_xacro_and_circles_are_refused():
+    with pytest.raises(RoverFileError, match="expand it first"):
+        parse_robot(b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include/></robot>')
+    circle = b"".join(
+        b'<joint name="%s" type="fixed"><parent link="%s"/><child link="%s"/></joint>' % ends
+        for ends in ((b"x", b"a", b"b"), (b"y", b"b", b"a"))
+    )
+    links = b'<link name="a"/><link name="b"/><link name="c"/>'
+    robot = parse_robot(b"<robot>" + links + circle + b"</robot>")
+    with pytest.raises(RoverFileError, match="hangs on itself"):
+        Tree(robot, {}, np.eye(4))
+
+
+def test_a_file_of_many_links_is_refused_at_once():
+    text = "".join(f'<link name="l{k}"/>' for k in range(100_000))
+    with pytest.raises(RoverFileError, match="has 100000 <link>; at most 2000 are read"):
+        parse_robot(f"<robot>{text}</robot>".encode())
+
+
+def test_limits_that_no_joint_reaches_count_as_none():
+    text = (
+        '<robot><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+        '<parent link="a"/><child link="b"/>'
+        '<limit lower="-1.79769e+308" upper="1.79769e+308" effort="0" velocity="1e+300"/>'
+        "</joint></robot>"
+    )
+    limit = parse_robot(text.encode()).joints["j"].limit
+    assert (limit.lower, limit.upper) == (-math.inf, math.inf)
+    assert (limit.effort, limit.velocity) == (math.inf, math.inf)
+
+
+def test_the_joint_map_of_the_guide_is_one():
+    page = Path(__file__).parents[3] / "docs" / "integration" / "robot.md"
+    (block,) = re.findall(r"```yaml\n(axes:.*?)```", page.read_text(), re.DOTALL)
+    assert set(yaml.safe_load(block)) == {"axes", "rocker", "bogie", "wheels", "steering", "rover"}

@@ -1,0 +1,195 @@
+"""Launch files, parameter files and layouts name nodes, parameters and topics that exist.
+
+PyPI has no launch: the files run with stand-ins for its actions, which keep what they are given.
+"""
+
+import json
+import re
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+import yaml
+
+from rover_planner.nodes.programs import PROGRAMS
+from support.project.checkout import TOP, console_scripts, setup_arguments
+
+LAUNCH_FILES = sorted(path.name for path in (TOP / "launch").glob("*.py"))
+PARAMETER_FILES = sorted((TOP / "config" / "parameters").glob("*.yaml"))
+LAYOUTS = sorted((TOP / "config" / "views").iterdir())
+OF_OTHERS = {"robot_description", "diagnostics"}
+"""Topics in layouts that are not published by a node under its own help's name."""
+
+
+class Kept(SimpleNamespace):
+    """An action or substitution that keeps what it was given."""
+
+    def __init__(self, *given: Any, **named: Any):
+        super().__init__(given=given, **named)
+
+    def perform(self, context: dict[str, str]) -> str:
+        """Return the value of a LaunchConfiguration."""
+        return context[self.given[0]]
+
+
+@pytest.fixture
+def launch_modules(monkeypatch):
+    """Put stand-ins for launch and launch_ros where imports look first."""
+    names = {
+        "launch": ("LaunchContext", "LaunchDescription"),
+        "launch.actions": ("DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription",
+                           "OpaqueFunction"),
+        "launch.launch_description_sources": ("PythonLaunchDescriptionSource",),
+        "launch.substitutions": ("LaunchConfiguration",),
+        "launch_ros": (),
+        "launch_ros.actions": ("Node",),
+        "launch_ros.parameter_descriptions": ("ParameterValue",),
+    }  # fmt: skip
+    for module, classes in names.items():
+        made = ModuleType(module)
+        for name in classes:
+            setattr(made, name, type(name, (Kept,), {}))
+        monkeypatch.setitem(sys.modules, module, made)
+
+
+def kind(action: Any) -> str:
+    return type(action).__name__
+
+
+def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
+    """Run a launch file; return its arguments with defaults, its other actions and its names."""
+    names = runpy.run_path(str(TOP / "launch" / name))
+    actions = names["generate_launch_description"]().given[0]
+    declared = [action for action in actions if kind(action) == "DeclareLaunchArgument"]
+    assert all(action.description for action in declared)
+    defaults = {action.given[0]: action.default_value for action in declared}
+    return defaults, [action for action in actions if action not in declared], names
+
+
+def start_rover(**given: str) -> list[Any]:
+    """Return the nodes that rover.launch.py starts with arguments."""
+    defaults, (opaque,), _ = describe("rover.launch.py")
+    assert given.keys() <= defaults.keys()
+    return opaque.function(defaults | given)
+
+
+def check_parameters(node: str, parameters: dict[str, Any]) -> None:
+    """Hold parameters against the table of a node."""
+    specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
+    for name, value in parameters.items():
+        assert name in specs, f"{node} has no parameter {name}"
+        specs[name].check(value)
+
+
+def test_the_rover_starts_as_its_parameter_files_say(launch_modules):
+    nodes = start_rover()
+    assert [node.executable for node in nodes] == ["traverse_server", "traction_controller"]
+    for node in nodes:
+        assert node.package == "rover_planner" and node.executable in console_scripts()
+        file, given = node.parameters
+        assert file == str(TOP / "config" / "parameters" / f"{node.executable}.yaml")
+        assert Path(file).is_file() and given == {"use_sim_time": False}
+        assert (node.namespace, node.respawn) == ("", True)
+
+
+def test_arguments_of_the_rover_take_precedence_over_its_files(launch_modules):
+    server, controller = start_rover(
+        namespace="one", use_sim_time="True", respawn="false", rover="m2020", terrain_file="spirit"
+    )
+    assert server.parameters[1] == {
+        "use_sim_time": True, "rover": "m2020", "terrain_file": "spirit",
+    }  # fmt: skip
+    assert controller.parameters[1] == {"use_sim_time": True, "rover": "m2020"}
+    for node in (server, controller):
+        assert (node.namespace, node.respawn) == ("one", False)
+        assert ("diagnostics", "/diagnostics") in node.remappings
+        check_parameters(
+            node.executable, {k: v for k, v in node.parameters[1].items() if k != "use_sim_time"}
+        )
+    assert [n.executable for n in start_rover(traction_controller="false")] == ["traverse_server"]
+    with pytest.raises(ValueError, match="'maybe' must be true or false"):
+        start_rover(respawn="maybe")
+
+
+def test_the_simulation_is_the_rover_with_a_simulator(launch_modules):
+    defaults, (simulator, group), names = describe("simulation.launch.py")
+    assert simulator.executable == "rover_simulator"
+    file, given = simulator.parameters
+    assert file.given[0] == "rover_simulator_parameters"
+    assert Path(defaults["rover_simulator_parameters"]).is_file()
+    specs = {spec.name: spec for spec in PROGRAMS["rover_simulator"].parameters}
+    for name in names["ARGUMENTS"]:
+        kind_of = type(specs[name].default)
+        assert given[name].value_type is (float if kind_of is float else str)
+        assert kind_of(defaults[name]) == specs[name].default
+    (include,) = group.given[0]
+    (source,) = include.given
+    assert Path(source.given[0]) == TOP / "launch" / "rover.launch.py"
+    passed = dict(include.launch_arguments)
+    assert passed.keys() <= describe("rover.launch.py")[0].keys()
+    assert passed["terrain_file"] == ""  # the server's map is the simulator's
+    file = yaml.safe_load(Path(defaults["traction_controller_parameters"]).read_text())
+    assert file["/**"]["ros__parameters"]["enabled_at_start"] is True
+
+
+@pytest.mark.parametrize("path", PARAMETER_FILES, ids=lambda path: path.stem)
+def test_a_parameter_file_has_parameters_that_exist_for_any_namespace(path):
+    (pattern, content), *others = yaml.safe_load(path.read_text()).items()
+    assert (pattern, others, list(content)) == ("/**", [], ["ros__parameters"])
+    check_parameters(path.stem.removeprefix("simulated_"), content["ros__parameters"])
+
+
+def test_a_parameter_file_has_the_defaults_where_it_is_not_for_a_simulation():
+    for name in ("traverse_server", "traction_controller"):
+        path = TOP / "config" / "parameters" / f"{name}.yaml"
+        defaults = {spec.name: spec.ros_default for spec in PROGRAMS[name].parameters}
+        for key, value in yaml.safe_load(path.read_text())["/**"]["ros__parameters"].items():
+            assert defaults[key] == value, key
+
+
+def topics_of(path: Path) -> set[str]:
+    """Return the topics that a layout names, without the leading slash."""
+    text = path.read_text()
+    if path.suffix == ".rviz":
+        displays = yaml.safe_load(text)["Visualization Manager"]["Displays"]
+        found = {d[key]["Value"] for d in displays for key in ("Topic", "Description Topic")
+                 if key in d}  # fmt: skip
+    else:
+        json.loads(text)
+        found = set(re.findall(r'"(/[a-z_]+(?:/[a-z_]+)*)[."]', text))
+    return {name.lstrip("/") for name in found}
+
+
+@pytest.mark.parametrize("path", LAYOUTS, ids=lambda path: path.name)
+def test_a_layout_shows_topics_that_the_nodes_publish(path):
+    published = set()
+    for node, program in PROGRAMS.items():
+        for part in program.topics.split("; "):
+            if part.startswith("publishes"):
+                published |= {re.sub("^~", node, name)
+                              for name in re.findall(r"[~/a-z_]+", part)}  # fmt: skip
+    shown = topics_of(path)
+    assert {"elevation_cloud", "traverse_server/plan", "traverse_server/markers"} <= shown
+    assert shown <= published | OF_OTHERS
+
+
+def test_foxglove_places_every_panel_once():
+    layout = json.loads((TOP / "config" / "views" / "foxglove.json").read_text())
+
+    def panels(part: Any) -> list[str]:
+        if isinstance(part, str):
+            return [part]
+        return panels(part["first"]) + panels(part["second"])
+
+    assert sorted(panels(layout["layout"])) == sorted(layout["configById"])
+
+
+def test_launch_and_configuration_files_are_installed():
+    installed = dict(setup_arguments()["data_files"])
+    assert installed["share/rover_planner/launch"] == [f"launch/{name}" for name in LAUNCH_FILES]
+    for path in (*PARAMETER_FILES, *LAYOUTS):
+        relative = path.relative_to(TOP)
+        assert relative.as_posix() in installed[f"share/rover_planner/{relative.parent}"]

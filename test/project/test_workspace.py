@@ -1,0 +1,119 @@
+"""colcon builds and tests the package in a clean workspace, and its executables run there."""
+
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+from support.processes import ProcessToken
+from support.project.checkout import console_scripts, copy_checkout
+from support.ros_fixtures import domain_id
+
+pytestmark = pytest.mark.slow
+TOOLS = ("setuptools<80", "colcon-common-extensions")
+"""colcon links by `setup.py develop --editable`, which setuptools 80 has dropped; Noble has 68."""
+HOW = {"copied": (), "linked": ("--symlink-install",)}
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory) -> Path:
+    """Return the Python of an environment with colcon from PyPI, and what this one has besides."""
+    folder = tmp_path_factory.mktemp("colcon") / "venv"
+    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    pip = [folder / "bin" / "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, *TOOLS], check=True, timeout=600)
+    (site,) = folder.glob("lib/python*/site-packages")
+    ours = sysconfig.get_paths()["purelib"]
+    (site / "zz_ours.pth").write_text(f"import site; site.addsitedir({ours!r})\n")
+    return folder / "bin" / "python"
+
+
+@pytest.fixture(scope="module", params=HOW)
+def workspace(request, python, tmp_path_factory) -> Path:
+    """Return a workspace in which the package was built, copied or linked."""
+    folder = tmp_path_factory.mktemp(request.param)
+    copy_checkout(folder / "src" / "rover_planner")
+    built = colcon(python, folder, "build", *HOW[request.param])
+    assert "1 package finished" in built.stdout + built.stderr
+    return folder
+
+
+def colcon(python: Path, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run colcon in a workspace."""
+    clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "AMENT_PREFIX_PATH")}
+    ended = subprocess.run(
+        [python, "-m", "colcon", *words],
+        cwd=folder, env=clean, capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended
+
+
+def sourced(folder: Path, command: str, token: ProcessToken | None = None) -> str:
+    """Run a command in a shell that has sourced the workspace; return what it says."""
+    clean = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    clean |= {"ROS_DOMAIN_ID": str(domain_id()), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    ended = subprocess.run(
+        ["bash", "-e", "-o", "pipefail", "-c", f"source install/setup.bash\n{command}"],
+        cwd=folder, env=clean | ({} if token is None else token.environment),
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended.stdout + ended.stderr
+
+
+def test_executables_are_where_ros2_run_looks_for_them(workspace):
+    folder = workspace / "install" / "rover_planner" / "lib" / "rover_planner"
+    assert {path.name for path in folder.iterdir()} == console_scripts().keys()
+    for path in folder.iterdir():
+        assert os.access(path, os.X_OK)
+        assert f"usage: {path.name} " in sourced(workspace, f"{path} --help").lower()
+
+
+def test_the_ament_index_and_share_have_the_package(workspace, python):
+    share = workspace / "install" / "rover_planner" / "share"
+    assert (share / "ament_index/resource_index/packages/rover_planner").is_file()
+    for name in ("package.xml", "launch/rover.launch.py", "config/parameters/traverse_server.yaml",
+                 "config/views/rover.rviz", "config/rovers/m2020.yaml"):  # fmt: skip
+        assert (share / "rover_planner" / name).is_file()
+    told = sourced(
+        workspace,
+        f'{python} -c "from ament_index_python.packages import *; '
+        "print(get_package_share_directory('rover_planner'))\"",
+    )
+    assert Path(told.strip()) == share / "rover_planner"
+
+
+def test_a_server_of_the_workspace_answers_its_mission_planner(workspace):
+    programs = "install/rover_planner/lib/rover_planner"
+    file = "install/rover_planner/share/rover_planner/config/parameters/traverse_server.yaml"
+    parameters = f"--params-file {file} -p terrain_file:=mars.npz"
+    script = f"""
+        {programs}/rover_planner terrain mars.npz --seed 7
+        {programs}/traverse_server --ros-args {parameters} & trap 'kill $!' EXIT
+        {programs}/mission_planner --start=1,1,0 --goal=3,1,0 --timeout 240  # kernels compile
+    """
+    token = ProcessToken()
+    try:
+        told = sourced(workspace, script, token)
+    finally:
+        token.kill()
+    assert "traversable" in told and "not traversable" not in told
+
+
+def test_colcon_test_runs_tests_of_the_package_and_keeps_their_results(workspace, python):
+    words = ["--event-handlers", "console_direct+", "--pytest-args", "-q", "test/shell"]
+    told = colcon(python, workspace, "test", *words).stdout
+    passed = int(re.search(r"(\d+) passed", told)[1])
+    assert passed > 10
+    results = ElementTree.parse(workspace / "build" / "rover_planner" / "pytest.xml").getroot()
+    assert sum(int(suite.get("tests")) for suite in results.iter("testsuite")) == passed
+    summary = colcon(python, workspace, "test-result", "--all").stdout
+    assert f"{passed} tests, 0 errors, 0 failures" in summary
