@@ -117,8 +117,9 @@ def test_the_topics_in_the_help_are_those_of_the_node(name, ros):
     told -= {"subscribes", "serves", "publishes", "calls", ""}
     told = {re.sub(r"^~", f"/{name}", topic) for topic in told}
     told = {topic if topic.startswith("/") else f"/{topic}" for topic in told}
-    # A topic that needs follow_commands is in the help, but not in this node.
-    optional = {"/cmd_vel", "/traction_controller/commands"} & told
+    # A topic that needs follow_commands or hazard_map is in the help, but not in this node.
+    hazards = {f"/traverse_server/hazard_map/{which}" for which in ("worst", "best")}
+    optional = ({"/cmd_vel", "/traction_controller/commands"} | hazards) & told
     wait_until(lambda: told - optional <= names(), f"{told - optional}")
     assert names() <= told | {"/tf"}
 
