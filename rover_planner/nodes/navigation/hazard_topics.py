@@ -28,8 +28,10 @@ from rover_planner.ros.qos import latched_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.ros.transition_log import TransitionLog
 
-PERIOD = 0.1
-"""Time between two looks for a new map [s]."""
+PERIOD = 0.5
+"""Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""
+CATCH_UP = 0.2
+"""Period of the check for new subscribers [s]."""
 SLICE = 0.2
 """Time after which the thread looks for a newer map, and for questions [s]."""
 SHOW_PERIOD = 1.0
@@ -69,7 +71,7 @@ class HazardTopics:
         self._topics: dict[str, LazyPublisher] = {}
         node.create_service(GetMap, "~/get_hazard_map", self._get)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(PERIOD, guard.around(self._catch_up), clock=steady)
+        node.create_timer(CATCH_UP, guard.around(self._catch_up), clock=steady)
         self._enabled = threading.Event()
         self._ending = threading.Event()
         self.apply(parameters)

@@ -69,10 +69,6 @@ class HazardMap:
         """Number of poses that are not judged on the present map."""
         return int(np.count_nonzero(self._stale))
 
-    def forget_stale(self) -> None:
-        """Count all poses as judged, for benchmarks that time a change alone."""
-        self._stale[:] = False
-
     def take(self, on_map: RoverOnMap) -> None:
         """Take a rover on a map; what the change of the map cannot have changed stays."""
         before, shape = self._on_map, (self.headings, *on_map.terrain.elevation.shape)

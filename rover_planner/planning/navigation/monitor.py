@@ -1,5 +1,6 @@
 """Watches a drive: judges the rest of the accepted path again, and says when to stop."""
 
+import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,6 +20,10 @@ NO_POSE, OFF_PATH, SUSPENSION = "no_pose", "off_path", "suspension"
 NEAR = 10.0
 """Length of the part of the path that is judged before the whole rest [m]: the rover is told
 early of what is near."""
+SHARE = 0.25
+"""Share of the time that judging may take where the map changes all the time."""
+MAX_PAUSE = 0.2
+"""Longest pause after a judgement [s]."""
 DRIFT_TIME = 1.0
 """Time for which a difference of the suspension must last to be a reason to stop [s]."""
 
@@ -85,6 +90,7 @@ class PathMonitor:
         self._finding = Finding(IDLE)
         self._judged_on: tuple[Terrain | None, ServiceSettings] | None = None
         self._pose_time = 0.0
+        self._pause_end = 0.0
 
     @property
     def finding(self) -> Finding:
@@ -178,7 +184,12 @@ class PathMonitor:
         before = self._judged_on
         if before is not None and all(a is b for a, b in zip(before, judged_on, strict=True)):
             return None
+        if before is not None and sight.time < self._pause_end:
+            return None
+        begin = time.monotonic()
         judgement = self._check_rest(path, situation)
+        taken = time.monotonic() - begin
+        self._pause_end = sight.time + taken + min(taken * (1.0 / SHARE - 1.0), MAX_PAUSE)
         self._judged_on = judged_on
         self._finding = replace(
             self._finding, judgement=judgement, judged=self._finding.judged + 1

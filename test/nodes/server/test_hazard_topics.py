@@ -33,8 +33,19 @@ class Costmap(Node):
         self.ask = self.create_client(GetMap, f"{SERVER}/get_hazard_map")
 
 
-def cells(grid):
-    return np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width)
+def cells(grid, x=(-1.0, 1.0), y=(-1.0, 1.0)):
+    """Return the values of the cells in a part of the map [m]; the map may reach beyond."""
+    values = np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width)
+    cell, corner = grid.info.resolution, grid.info.origin.position
+    rows, columns = (
+        slice(*(round((end - first) / cell) for end in ends))
+        for ends, first in ((y, corner.y), (x, corner.x))
+    )
+    return values[rows, columns]
+
+
+def is_free(grids):
+    return bool(grids) and (cells(grids[-1]) == PASSABLE).all()
 
 
 @pytest.fixture
@@ -46,36 +57,29 @@ def mapping(start_server, client):
 
 def test_a_late_subscriber_gets_worst_best_and_one_heading(mapping, client, ros):
     costmap = ros.spin(Costmap(ros, ("worst", "best", "heading_1")))
-    wait_until(lambda: all(costmap.grids.values()), "the grids", 60.0)
-
-    def is_whole():
-        return (cells(costmap.grids["worst"][-1])[40:80, 40:80] == PASSABLE).all()
-
-    wait_until(is_whole, "the whole map", 60.0)
-    grid = costmap.grids["worst"][-1]
+    for grids in costmap.grids.values():
+        wait_until(lambda grids=grids: is_free(grids), "the whole map", 60.0)
+    grid, terrain = costmap.grids["worst"][-1], mapping.service.terrain
     assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(0.05)
-    assert grid.info.origin.position.x == pytest.approx(-3.0 - 0.025)
-    worst, best = cells(grid), cells(costmap.grids["best"][-1])
-    assert worst.shape == best.shape == (121, 121)
-    assert (worst[:3] == UNKNOWN).all()  # wheels would leave the map
+    assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.025)
+    assert (grid.info.height, grid.info.width) == terrain.elevation.shape
+    assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
     wait_until(
-        lambda: (cells(costmap.grids["heading_1"][-1])[40:80, 40:80] == PASSABLE).all(), "heading"
+        lambda: call(costmap.ask, GetMap.Request()).map.data == costmap.grids["worst"][-1].data,
+        "the same map from the service",
     )
-    assert call(costmap.ask, GetMap.Request()).map.data == grid.data
 
 
 def test_a_change_of_the_map_changes_the_grid_around_it(mapping, client, ros):
     costmap = ros.spin(Costmap(ros, ("worst", "best")))
-    wait_until(lambda: costmap.grids["worst"] and costmap.grids["best"], "the grids", 60.0)
-    wait_until(
-        lambda: (cells(costmap.grids["worst"][-1])[40:80, 40:80] == PASSABLE).all(), "map", 60.0
-    )
-    before = cells(costmap.grids["worst"][-1])
+    worst, best = costmap.grids["worst"], costmap.grids["best"]
+    wait_until(lambda: is_free(worst) and is_free(best), "the map", 60.0)
+    there, away = ((1.5, 2.5), (1.5, 2.5)), ((-2.0, 0.5), (-2.0, 0.5))
+    before = cells(worst[-1], *away)
     client.send_terrain(make_terrain(slope_and_rock, half=3.0))
-    wait_until(lambda: cells(costmap.grids["worst"][-1])[94, 100] == IMPASSABLE, "the rock", 60.0)
-    after = cells(costmap.grids["worst"][-1])
-    np.testing.assert_array_equal(after[:60, :60], before[:60, :60])
-    assert (cells(costmap.grids["best"][-1])[94:106:4, 94] != PASSABLE).any()
+    wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
+    np.testing.assert_array_equal(cells(worst[-1], *away), before)
+    wait_until(lambda: (cells(best[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
 
 
 def test_without_the_parameter_there_is_no_map(mapped, ros):
