@@ -36,7 +36,7 @@ from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
 from rover_planner.nodes.navigation.frames import Frames, is_empty
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
-from rover_planner.nodes.navigation.path_watch import PathWatch
+from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
@@ -116,7 +116,9 @@ class TraverseServer(Node):
         )
         self._reach = ReachTopics(self, self.desk, frame, reliability)
         self._map_cloud = MapCloud(self, self._service, frame)
-        self.watch = PathWatch(self, self._service, self._values, self.guard, self._tell_stop)
+        self.watch = PathWatch(
+            self, self._service, self._values, self.guard, self._find_watched, self._tell_stop
+        )
         """Watches the accepted path."""
         self._hazards = HazardTopics(
             self, self._service, self._values, self.guard, lambda: self.desk.open_count > 0
@@ -236,6 +238,14 @@ class TraverseServer(Node):
             start = stamped_pose_to_array(located, frame, "start")
         located = frames.localise(end, "goal")
         return start, stamped_pose_to_array(located, frame, "goal")
+
+    def _find_watched(self) -> Pose | None:
+        """Return the pose (3,) of the body by /tf, else by odometry of just now."""
+        try:
+            here = self.frames.find_here()
+        except INPUT_ERRORS:  # it is stale
+            return None
+        return self._service.fresh_pose(MAX_POSE_AGE) if here is None else here
 
     def _find_here(self) -> Pose:
         """Return the pose (3,) of the body by /tf, else by odometry."""

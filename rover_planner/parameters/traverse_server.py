@@ -270,7 +270,7 @@ class TraverseServerParameters(ParameterTable):
     )
     monitor_timeout: float = parameter(
         1.0,
-        "Time without odometry after which ~/stop is published.",
+        "Time without a pose of the rover after which ~/stop is published.",
         unit="s",
         bounds=(0.1, 60.0),
     )

@@ -43,6 +43,8 @@ NO_PATH = WatchedPath(np.empty((0, 3)))
 END_TIME = 2.0
 """Longest wait for the thread at the end [s]."""
 
+FindPose = Callable[[], NDArray[np.float64] | None]
+"""Returns the pose (3,) x, y [m] and yaw [rad] of the body of just now, map frame."""
 Tell = Callable[[Judgement, str, Situation], None]
 """Publishes why the rover is to stop, with the hash of its path and what was known."""
 
@@ -56,6 +58,7 @@ class PathWatch:
         service: TraverseService,
         parameters: TraverseServerParameters,
         guard: Guard,
+        find_pose: FindPose,
         tell: Tell,
     ):
         """Create topic, service and thread.
@@ -65,9 +68,11 @@ class PathWatch:
             service: Knows map, pose and joints.
             parameters: The parameters of the node.
             guard: Takes unexpected errors.
+            find_pose: Returns where the body is; None if it is not known.
             tell: Called in the executor's thread when the rover is to stop.
         """
         self._node, self._service, self._guard, self._tell = node, service, guard, tell
+        self._find_pose = find_pose
         self._monitor = PathMonitor(watch_settings(parameters))
         self.finding = self._monitor.finding
         """What was found last; belongs to the executor's thread."""
@@ -141,7 +146,7 @@ class PathWatch:
     def _offer_sight(self) -> None:
         """Hand what is known now to the thread; a look that still waits is replaced."""
         now = self._node.get_clock().now().nanoseconds
-        situation, pose = self._service.situation(now), self._service.fresh_pose(MAX_POSE_AGE)
+        situation, pose = self._service.situation(now), self._find_pose()
         with self._changed:
             self._sight = Sight(situation, pose, time.monotonic())
             self._changed.notify_all()

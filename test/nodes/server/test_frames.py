@@ -113,6 +113,16 @@ def test_an_empty_start_is_where_tf_says_the_rover_is(in_odom, client):
     np.testing.assert_allclose(path_to_poses(plan, "odom")[0], START, atol=1e-9)
 
 
+def test_the_monitor_follows_tf_without_odometry(start_server, client):
+    server = start_server(monitor=True, planner="fan", transform_timeout=5.0)
+    server.service.take_terrain(make_terrain(rocky))
+    send(server, ("map", "base_link", Rigid.from_rpy(*START[:2], 0.0, 0.0, 0.0, START[2])))
+    assert client.can_traverse(START, GOAL).poses
+    wait_until(lambda: server.watch.finding.place is not None, "the place")
+    assert server.watch.finding.place.index == 0 and server.watch.finding.state == "watching"
+    assert server.service.fresh_pose() is None
+
+
 def test_odometry_in_another_frame_is_transformed(mapped, client):
     send(mapped, ("map", "odom", MAP_ODOM), take="take_static")
     client.send_odometry((1.0, 2.0, 0.5), "odom")
