@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from msg_adapters.errors import MessageError
+from msg_adapters.joint_map import OWN_NAMES, JointMap
 from rover_physics.names import WHEEL_JOINTS, WHEELS
 
 
@@ -28,17 +29,21 @@ def twist_to_speeds(twist: TwistStamped | Twist) -> tuple[float, float]:
     return forward, yaw
 
 
-def joint_order(joints: Sequence[str]) -> NDArray[np.int64]:
+def joint_order(joints: Sequence[str], names: JointMap = OWN_NAMES) -> NDArray[np.int64]:
     """Return the index (6,) of the wheel that each named joint drives.
+
+    Args:
+        joints: Names of the wheel joints, in the model or in messages.
+        names: Their names in messages.
 
     Raises:
         MessageError: The names are not those of the six wheel joints, each once.
     """
-    if sorted(joints) != sorted(WHEEL_JOINTS):
-        raise MessageError(
-            f"joints are {', '.join(joints)}; they must be {', '.join(WHEEL_JOINTS)} in any order"
-        )
-    return np.array([WHEEL_JOINTS.index(joint) for joint in joints])
+    found = [names.model_name(joint) for joint in joints]
+    if sorted(found) != sorted(WHEEL_JOINTS):
+        right = ", ".join(names.robot_names(WHEEL_JOINTS))
+        raise MessageError(f"joints are {', '.join(joints)}; they must be {right} in any order")
+    return np.array([WHEEL_JOINTS.index(joint) for joint in found])
 
 
 def effort_commands(torques: NDArray[np.float64], order: NDArray[np.int64]) -> Float64MultiArray:

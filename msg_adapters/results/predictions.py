@@ -8,6 +8,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.errors import MessageError
+from msg_adapters.joint_map import OWN_NAMES, JointMap
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
@@ -72,6 +73,7 @@ def joint_trajectory(
     stock: list[JointTrajectoryPoint] | None = None,
     *,
     positive_steering: str = LEFT,
+    names: JointMap = OWN_NAMES,
 ) -> JointTrajectory:
     """Return the joints along a path, up to the first waypoint that did not settle.
 
@@ -89,11 +91,12 @@ def joint_trajectory(
         stock: Points to reuse, because making them takes most of the time. The list grows as
             needed. One message must be sent before the next one is made from it.
         positive_steering: One of STEERING_SIGNS: where positive angles of the message turn.
+        names: Names, signs and offsets of the joints in messages.
     """
     count = len(prediction.settled)
     if not prediction.settled.all():
         count = int(np.argmin(prediction.settled))
-    trajectory = empty_trajectory(rover, frame_id, stamp)
+    trajectory = empty_trajectory(rover, frame_id, stamp, names)
     suspension = suspension_angles(prediction)[:count]
     sign, wheels = STEERING_SIGNS[positive_steering], steered_wheels(rover)
     steering = sign * prediction.steering_angle[:count, wheels]
@@ -105,6 +108,10 @@ def joint_trajectory(
     )
     efforts = np.zeros_like(positions)
     efforts[:, len(SUSPENSION_JOINTS) : len(JOINTS)] = prediction.torque[:count]
+    joints = [*JOINTS, *steering_joints(rover)]
+    signs = names.signs(joints)
+    positions, velocities = signs * (positions - names.offsets(joints)), signs * velocities
+    efforts = signs * efforts
     stock = [] if stock is None else stock
     stock.extend(JointTrajectoryPoint() for _ in range(count - len(stock)))
     trajectory.points = stock[:count]
@@ -116,9 +123,12 @@ def joint_trajectory(
     return trajectory
 
 
-def empty_trajectory(rover: Rover, frame_id: str, stamp) -> JointTrajectory:
+def empty_trajectory(
+    rover: Rover, frame_id: str, stamp, names: JointMap = OWN_NAMES
+) -> JointTrajectory:
     """Return a trajectory of the JOINTS and the rover's steering joints without points."""
-    trajectory = JointTrajectory(joint_names=[*JOINTS, *steering_joints(rover)])
+    joints = names.robot_names([*JOINTS, *steering_joints(rover)])
+    trajectory = JointTrajectory(joint_names=list(joints))
     trajectory.header.frame_id = frame_id
     trajectory.header.stamp = stamp
     return trajectory

@@ -27,26 +27,28 @@ def server_diagnostics(
         hardware_id: Name of the rover.
         stamp: builtin_interfaces/Time.
     """
-    status = DiagnosticStatus(
-        level=_LEVELS[level], name=STATUS_NAME, message=text, hardware_id=hardware_id
-    )
-    return _with_values(status, values, stamp)
+    return _stamped(make_status(STATUS_NAME, level, text, values, hardware_id), stamp)
 
 
 def search_diagnostics(
     values: Mapping[str, Any], text: str, hardware_id: str, stamp: Any
 ) -> DiagnosticArray:
     """Return the progress of a search for a way as one status; arguments as for the health."""
+    return _stamped(make_status(SEARCH_NAME, "ok", text, values, hardware_id), stamp)
+
+
+def make_status(
+    name: str, level: str, text: str, values: Mapping[str, Any], hardware_id: str
+) -> DiagnosticStatus:
+    """Return one status; arguments as for `server_diagnostics`."""
     status = DiagnosticStatus(
-        level=DiagnosticStatus.OK, name=SEARCH_NAME, message=text, hardware_id=hardware_id
+        level=_LEVELS[level], name=name, message=text, hardware_id=hardware_id
     )
-    return _with_values(status, values, stamp)
-
-
-def _with_values(
-    status: DiagnosticStatus, values: Mapping[str, Any], stamp: Any
-) -> DiagnosticArray:
     status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    return status
+
+
+def _stamped(status: DiagnosticStatus, stamp: Any) -> DiagnosticArray:
     message = DiagnosticArray(status=[status])
     message.header.stamp = stamp
     return message

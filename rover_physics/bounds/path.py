@@ -18,7 +18,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import forget_models, pack_model
 from rover_physics.prediction.path_bounds import PathBounds
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import check_poses, sweep_lock
+from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -96,14 +96,13 @@ def bound_path(
             f"most {MAX_SOILS - 1}"
         )
     ground, model = _pack_uncertain(terrain, allowed), pack_model(rover, terrain, options)
-    with sweep_lock:
-        found = find_bounds(
-            model,
-            ground,
-            check_poses(prediction.poses),
-            np.ascontiguousarray(prediction.motion),
-            _pack_nominal(prediction),
-        )
+    found = find_bounds(
+        model,
+        ground,
+        check_poses(prediction.poses),
+        np.ascontiguousarray(prediction.motion),
+        _pack_nominal(prediction),
+    )
     values = {name: _include(found[name], prediction, name) for name in BOUNDED_VALUES}
     return PathBounds(sigmas=allowed, status=found.status.copy(), **values)
 

@@ -24,7 +24,7 @@ from rover_physics.prediction.evaluation import (
     set_pose,
 )
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.sweep import check_poses, sweep_lock
+from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
@@ -132,7 +132,7 @@ def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pos
     """Score poses (n, 3) and return scores of `shape`, which has n elements."""
     n = len(poses)
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
-    with sweep_lock, limit_threads(effort(model.settings, n)) as threads:
+    with limit_threads(effort(model.settings, n)) as threads:
         works = new_works(threads, n)
         sweep = model.records, (poses, AHEAD), works, (status, numbers)
         run_chunks(score_all, sweep, len(works), threads)

@@ -17,7 +17,7 @@ from rover_physics.prediction.evaluation import (
 )
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import check_poses, make_prediction, sweep_lock, wheels_of
+from rover_physics.prediction.sweep import check_poses, make_prediction, wheels_of
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -65,10 +65,9 @@ class _Evaluator:
         work, results = self._work, new_results(len(poses))
         moved = np.repeat(self._motion[None], len(poses), axis=0)
         for i in range(len(poses)):
-            with sweep_lock:
-                set_pose(self._record, poses, moved, i, work)
-                work.placement.steering[:] = self._steering
-                work.can_follow = True
-                hold_wheels(held, i, work.contacts)
-                evaluate_pose(self._record, work, results[i])
+            set_pose(self._record, poses, moved, i, work)
+            work.placement.steering[:] = self._steering
+            work.can_follow = True
+            hold_wheels(held, i, work.contacts)
+            evaluate_pose(self._record, work, results[i])
         return results

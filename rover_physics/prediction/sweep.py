@@ -1,6 +1,5 @@
 """The quasi-static model along a path: poses in, `PathPrediction` out."""
 
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -37,8 +36,6 @@ POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
 Sums = tuple[float, float, float]
 """Distance [m], time [s] and energy [J] since the start of a path."""
 NO_SUMS = (0.0, 0.0, 0.0)
-
-sweep_lock = threading.Lock()  # some of Numba's threading layers allow one caller only
 
 
 def sweep_path(
@@ -193,8 +190,7 @@ def evaluator(model: PackedModel) -> Evaluate:
     def evaluate_at(
         at: np.ndarray, held: np.ndarray = NONE_HELD, motions: np.ndarray = AHEAD
     ) -> Any:
-        with sweep_lock:
-            return evaluate(model.records, at, held, motions)
+        return evaluate(model.records, at, held, motions)
 
     return evaluate_at
 

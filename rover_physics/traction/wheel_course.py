@@ -76,6 +76,17 @@ class WheelCourse:
         speeds = self._drive.share(angles, aims.angles) * aims.speeds
         return self.mean_of(speeds), speeds
 
+    def steering_aims(self, command: tuple[float, float]) -> Floats | None:
+        """Return the angles [rad] of the steered wheels for a command, positive to the left.
+
+        None if wheels do not steer, the command is to stand, or no angles follow it: the steering
+        stays as it is.
+        """
+        if not self._steered or not any(command):
+            return None
+        aims = self._drive.aim(*command)
+        return None if aims.refusal else aims.angles[self._drive.steers]
+
     def describe_refusal(self, command: tuple[float, float]) -> str:
         """Return why the steering cannot follow a command; empty if it can."""
         return self._drive.aim(*command).refusal if self._steered else ""

@@ -20,7 +20,7 @@ from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work, set_pose
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import check_poses, sweep_lock
+from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
@@ -95,9 +95,8 @@ def find_torque_ranges(
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
-        with sweep_lock:
-            set_pose(model.record, poses, motions, i, work)
-            evaluate_pose(model.record, work, result)
+        set_pose(model.record, poses, motions, i, work)
+        evaluate_pose(model.record, work, result)
         if result.status != PoseStatus.SETTLED or not _is_within(rover, model, result):
             continue
         feasible[i] = True

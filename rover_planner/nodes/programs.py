@@ -59,7 +59,8 @@ PROGRAMS = {
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
         "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
         "~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, "
-        "~/load_map, ~/cancel; publishes ~/plan, ~/verdict, diagnostics, "
+        "~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes ~/stop, "
+        "~/hazard_map/worst, ~/hazard_map/best, ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
         "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/search_progress, "
         "~/map, ~/markers",
@@ -69,8 +70,8 @@ PROGRAMS = {
     "traction_controller": Program(
         "Share the wheel torques by a quadratic program at its rate.",
         "subscribes joint_states, imu, cmd_vel, odometry, elevation_cloud, ~/emergency_stop; "
-        "serves ~/enable; publishes ~/commands, ~/brake, ~/state, ~/wheel_loads, "
-        "~/friction_utilisation, ~/contact_angles, diagnostics",
+        "serves ~/enable; publishes ~/commands, ~/velocity_commands, ~/steering_commands, "
+        "~/brake, ~/state, ~/wheel_loads, ~/friction_utilisation, ~/contact_angles, diagnostics",
         read_nothing,
         specs_of(TractionControllerParameters),
     ),

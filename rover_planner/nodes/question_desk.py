@@ -127,6 +127,13 @@ class QuestionDesk:
         stamp = self._node.get_clock().now().to_msg()
         self._progress.publish(search_diagnostics(asdict(report), text, name, stamp))
 
+    def identify(self, service: str, path_hash: str, situation: Situation) -> IdentityReport:
+        """Return a new number with what a judgement that nobody asked for is about."""
+        identity = self._register.identify(
+            self._register.next_number(), service, path_hash, situation
+        )
+        return replace(identity, path_hash=path_hash)
+
     def cancel(self, code: str, reason: str) -> int:
         """Answer all open questions with a refusal; return their number."""
         return self._queue.stop_all(code, reason)

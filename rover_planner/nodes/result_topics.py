@@ -16,6 +16,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.identity import path_hash
+from msg_adapters.joint_map import OWN_NAMES, JointMap
 from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
 from msg_adapters.results.closed_areas import area_to_grid, empty_area
 from msg_adapters.results.markers import cleared_markers, path_markers
@@ -65,9 +66,26 @@ class ResultTopics:
     """Makes the plan of a judgement at once and publishes all results after the answer is sent."""
 
     def __init__(
-        self, node: Node, deferred_work: DeferredWork, map_frame: str, positive_steering: str
+        self,
+        node: Node,
+        deferred_work: DeferredWork,
+        map_frame: str,
+        positive_steering: str,
+        joint_names: JointMap = OWN_NAMES,
+        to_base: Callable[[Path], Path] = lambda plan: plan,
     ):
-        self._positive_steering = positive_steering
+        """Create the topics.
+
+        Args:
+            node: The node.
+            deferred_work: Publishes after answers.
+            map_frame: Frame of the map.
+            positive_steering: One of STEERING_SIGNS: where positive angles of messages turn.
+            joint_names: Names of the joints in messages.
+            to_base: Turns a plan of the body into one of the robot's frame, in place.
+        """
+        self._to_base = to_base
+        self._positive_steering, self._joint_names = positive_steering, joint_names
         self._node, self._deferred_work, self._frame = node, deferred_work, map_frame
         self._poses = PoseStock()
         self._points: list[JointTrajectoryPoint] = []
@@ -107,6 +125,8 @@ class ResultTopics:
             self._poses,
             self._points,
             self._positive_steering,
+            self._joint_names,
+            self._to_base,
         )
         plan = results.plan()
         if judgement.traversable and not identity.path_hash:
@@ -167,6 +187,8 @@ class ResultMessages:
     poses: PoseStock
     points: list[JointTrajectoryPoint]
     positive_steering: str
+    joint_names: JointMap
+    to_base: Callable[[Path], Path]
 
     @cached_property
     def report(self) -> VerdictReport:
@@ -190,8 +212,10 @@ class ResultMessages:
         candidate = self.judgement.candidate
         if candidate is None or not self.judgement.traversable:
             return empty_path(self.frame, self.stamp)
-        return settled_path(
-            candidate.prediction, self._rows_to_show(), self.frame, self.stamp, self.poses
+        return self.to_base(
+            settled_path(
+                candidate.prediction, self._rows_to_show(), self.frame, self.stamp, self.poses
+            )
         )
 
     def _verdict(self) -> DiagnosticArray:
@@ -209,7 +233,7 @@ class ResultMessages:
     def _nothing(self, topic: str) -> object:
         """Return the empty message that is published if no path was judged."""
         if topic == "predicted_joints":
-            return empty_trajectory(self.rover, self.frame, self.stamp)
+            return empty_trajectory(self.rover, self.frame, self.stamp, self.joint_names)
         if topic == "markers":
             return cleared_markers(self.frame, self.stamp)
         if topic == "tip_over_margin":
@@ -224,7 +248,7 @@ class ResultMessages:
         if topic == "predicted_joints":
             return joint_trajectory(
                 prediction, self.rover, self.frame, self.stamp, self.points,
-                positive_steering=self.positive_steering,
+                positive_steering=self.positive_steering, names=self.joint_names,
             )  # fmt: skip
         if topic == "markers":
             classes = [waypoint.traversability_class for waypoint in self.judgement.classes]

@@ -25,10 +25,10 @@ from msg_adapters.commands import joint_order
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.results.traction_status import traction_diagnostics
-from rover_physics.names import WHEEL_COUNT
+from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.programs import read_words
-from rover_planner.nodes.traction_inputs import TractionInputs
-from rover_planner.nodes.traction_topics import TractionTopics, latched_qos
+from rover_planner.nodes.traction.inputs import TractionInputs
+from rover_planner.nodes.traction.topics import TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -36,7 +36,7 @@ from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
 from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.ros.transition_log import TransitionLog
@@ -48,6 +48,7 @@ from rover_planner.traction.settings import TractionSettings, load_traction_sett
 from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.supervisor import (
     DISABLED,
+    DRIVING,
     FAULT,
     STALLED,
     TractionCommand,
@@ -89,9 +90,11 @@ class TractionController(Node):
         self.guard = Guard(self.get_logger())
         """Counts unexpected errors."""
         self._clock_watch = ClockWatch(self._values.clock_timeout)
-        self._topics = TractionTopics(self, joint_order(self._values.joints))
         self._maps: MapIntake[PreparedMap] = MapIntake(self._prepare_map, self._refuse_map)
         self._inputs = TractionInputs(self, self._values, self.service, self._maps, self.guard)
+        names = self._inputs.joint_names
+        order = joint_order(self._values.joints, names)
+        self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
         self._create_switches()
         self._watchdog = Watchdog(self._send_watchdog_command)
         follow_changes(self, lambda: self._values, self._load, self._apply_parameters)
@@ -216,7 +219,7 @@ class TractionController(Node):
                 f"internal error: {self.guard.report('update', error)}"
             )
         sent = self._watchdog.send(
-            lambda: self._topics.writer.write(command.torques, command.brake, command.state),
+            lambda: self._write(command),
             now,
             self._find_deadline(now, command),
         )
@@ -225,6 +228,18 @@ class TractionController(Node):
         self._topics.publish_forces(command.update)
         self._statistics.take(command.update, start, time.perf_counter())
         self._tell(command, now)
+
+    def _write(self, command: TractionCommand) -> None:
+        """Publish torques, and rates and steering angles for drives that hold those."""
+        writer, service = self._topics.writer, self.service
+        if command.state != DRIVING:
+            writer.write(command.torques, command.brake, command.state)
+            return
+        writer.write(command.torques, command.brake, command.state, service.wanted_rates)
+        if self._topics.steering.get_subscription_count():
+            angles = service.course.steering_aims(service.wanted)
+            if angles is not None:
+                self._topics.publish_steering(self._inputs.to_robot_steering(angles))
 
     def _find_command(self, now: float) -> TractionCommand:
         prepared = self._maps.take()

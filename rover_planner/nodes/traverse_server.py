@@ -11,6 +11,7 @@ from typing import Any
 import rclpy
 import rclpy.logging
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.clock import Clock, ClockType
@@ -21,10 +22,10 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.joints import joint_positions
+from msg_adapters.joint_map import read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses, stamped_pose_to_array
-from msg_adapters.results.server_status import server_diagnostics
+from msg_adapters.results.server_status import make_status, server_diagnostics
 from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
@@ -32,7 +33,10 @@ from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_file_service import MapFileService
 from rover_planner.nodes.maps.map_topics import MapTopics
-from rover_planner.nodes.path_validity import PathValidity
+from rover_planner.nodes.nav2_services import PathComputation, PathValidity
+from rover_planner.nodes.navigation.frames import Frames, is_empty
+from rover_planner.nodes.navigation.hazard_topics import HazardTopics
+from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
@@ -49,13 +53,14 @@ from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.path_planner import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.qos import sensor_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.refusals import INPUT_ERRORS, attempt
 from rover_planner.ros.requests import subscribe_to_requests
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.kernels import load_kernels
@@ -84,7 +89,17 @@ class TraverseServer(Node):
         self.guard = Guard(self.get_logger())
         """Takes unexpected errors."""
         frame, reliability = self._values.map_frame, self._values.input_reliability
-        self._results = ResultTopics(self, DeferredWork(self), frame, self._values.steering_sign)
+        self._joint_names = read_joint_map(self._values.joint_map, self._service.all_joint_names)
+        self.frames = Frames(self, self._values, self.guard.around)
+        """Transforms poses to the map frame."""
+        self._results = ResultTopics(
+            self,
+            DeferredWork(self),
+            frame,
+            self._values.steering_sign,
+            self._joint_names,
+            self.frames.to_base,
+        )
         self._maps = MapTopics(
             self, self._service, self._values, self.guard, lambda error: self._note_map(error)
         )
@@ -94,7 +109,8 @@ class TraverseServer(Node):
         self._create_subscriptions(reliability)
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
-        PathValidity(self.desk, frame, self.publish).serve(self)
+        PathValidity(self.desk, frame, self.publish, self.frames.localise_path).serve(self)
+        PathComputation.serve(self, self.desk, self._read_ends, self.publish)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self._files = MapFileService(
             self, self._maps, frame, self.guard, lambda: map_limits(self._values)
@@ -102,6 +118,13 @@ class TraverseServer(Node):
         self._reach = ReachTopics(self, self.desk, frame, reliability)
         self._map_cloud = MapCloud(self, self._service, frame)
         self._map_status = MapStatus()
+        self.watch = PathWatch(
+            self, self._service, self._values, self.guard, self._find_watched, self._tell_stop
+        )
+        """Watches the accepted path."""
+        self._hazards = HazardTopics(
+            self, self._service, self._values, self.guard, lambda: self.desk.open_count > 0
+        )
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(
@@ -124,6 +147,8 @@ class TraverseServer(Node):
     def destroy_node(self) -> None:
         """Refuse open questions, end the threads and destroy the node."""
         self.desk.close()
+        self.watch.close()
+        self._hazards.close()
         self._maps.close()
         self._map_cloud.close()
         self._behind.close()
@@ -150,13 +175,18 @@ class TraverseServer(Node):
         self._service.settings = load_service_settings(parameters)
         self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
         self._maps.apply(parameters)
+        self.watch.apply(parameters)
+        self.frames.apply(parameters)
+        self._hazards.apply(parameters)
 
     def _note_map(self, error: str) -> None:
         self.desk.health.take_map(error)
 
     def _take_joints(self, state: JointState) -> None:
         try:
-            self._service.take_joints(joint_positions(state, self._service.joint_names))
+            self._service.take_joints(
+                self._joint_names.positions(state, self._service.joint_names)
+            )
         except MessageError as error:
             self.get_logger().warning(
                 f"{error}; the angles known before stay", throttle_duration_sec=5.0
@@ -164,11 +194,12 @@ class TraverseServer(Node):
 
     def _take_odometry(self, odometry: Odometry) -> None:
         try:
-            pose, _ = odometry_to_pose(odometry, self._values.map_frame)
-            body = float(pose[2]), *odometry_to_tilt(odometry)
+            here = self.frames.localise_odometry(odometry)
+            pose, _ = odometry_to_pose(here, self._values.map_frame)
+            body = float(pose[2]), *odometry_to_tilt(here)
             self._service.take_pose(pose[[0, 1, 3]], body)
             self._maps.look_under_rover()
-        except MessageError as error:
+        except INPUT_ERRORS as error:
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True
             )
@@ -176,20 +207,21 @@ class TraverseServer(Node):
     def _take_path(self, path: Path) -> None:
         about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
         try:
-            self._service.take_path(path_to_poses(path, self._values.map_frame), *about)
-        except MessageError as error:
+            there = self.frames.localise_path(path)
+            self._service.take_path(path_to_poses(there, self._values.map_frame), *about)
+        except INPUT_ERRORS as error:
             self._service.refuse_path(str(error), *about)
             self.get_logger().error(f"~/path refused: {error}")
 
     def _can_traverse(
         self, request: GetPlan.Request, response: GetPlan.Response, reply: Reply
     ) -> None:
-        frame = self._values.map_frame
+        ends = attempt(
+            lambda: self._read_ends(request.start, request.goal)
+        )  # transforms are those of now
 
         def answer(situation: Situation) -> Judgement:
-            start = stamped_pose_to_array(request.start, frame, "start")
-            goal = stamped_pose_to_array(request.goal, frame, "goal")
-            return situation.answer(start, goal, request.tolerance).complete()
+            return situation.answer(*ends(), request.tolerance).complete()
 
         def deliver(judgement: Judgement, identity: IdentityReport) -> None:
             response.plan, _ = self.publish(judgement, identity)
@@ -197,6 +229,37 @@ class TraverseServer(Node):
 
         about = plan_request_hash(request.start, request.goal, request.tolerance)
         self.desk.ask(Inquiry("can_traverse", about, answer, refusal, deliver))
+
+    def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
+        """Return start and goal (3,) of the body in the map frame; an empty start is here."""
+        frame, frames = self._values.map_frame, self.frames
+        if is_empty(begin):
+            start = self._find_here()
+        else:
+            located = frames.localise(begin, "start")
+            start = stamped_pose_to_array(located, frame, "start")
+        located = frames.localise(end, "goal")
+        return start, stamped_pose_to_array(located, frame, "goal")
+
+    def _find_watched(self) -> Pose | None:
+        """Return the pose (3,) of the body by /tf, else by odometry of just now."""
+        try:
+            here = self.frames.find_here()
+        except INPUT_ERRORS:  # it is stale
+            return None
+        return self._service.fresh_pose(MAX_POSE_AGE) if here is None else here
+
+    def _find_here(self) -> Pose:
+        """Return the pose (3,) of the body by /tf, else by odometry."""
+        here = self.frames.find_here()
+        if here is None:
+            here = self._service.fresh_pose()
+        if here is None:
+            raise MessageError(
+                "start is empty, which means where the rover is, but neither /tf nor odometry of "
+                f"the last second says so; give a start in {self._values.map_frame!r}"
+            )
+        return here
 
     def _check_path(
         self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
@@ -220,7 +283,15 @@ class TraverseServer(Node):
     ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; its results are published after the answer."""
         rover, spacing = self._service.settings.rover, self._values.plan_spacing
-        return self._results.take(judgement, identity, rover, spacing)
+        plan, report = self._results.take(judgement, identity, rover, spacing)
+        if judgement.traversable and judgement.candidate is not None:
+            poses = judgement.candidate.poses
+            self.watch.accept(poses, lambda: identity.path_hash or path_hash(plan))
+        return plan, report
+
+    def _tell_stop(self, judgement: Judgement, watched: str, situation: Situation) -> None:
+        """Publish why the rover is to stop, as the results of a judged path."""
+        self.publish(judgement, self.desk.identify("monitor", watched, situation))
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         count = self.desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
@@ -237,6 +308,7 @@ class TraverseServer(Node):
             **self._map_status.describe(situation),
             "open questions": self.desk.open_count,
             "internal errors": self.guard.total,
+            **self._hazards.describe(),
             **({"kernels not cached": kernel_cache_note()} if kernel_cache_note() else {}),
         }
         health = self.desk.health.describe(
@@ -246,9 +318,14 @@ class TraverseServer(Node):
             counts,
         )
         name = self._service.settings.rover.name
-        self._diagnostics.publish(
-            server_diagnostics(health.level, health.message, health.values, name, now.to_msg())
+        watch = self.watch.describe()
+        message = server_diagnostics(
+            health.level, health.message, health.values, name, now.to_msg()
         )
+        message.status.append(
+            make_status("traverse_server: monitor", watch.level, watch.message, watch.values, name)
+        )
+        self._diagnostics.publish(message)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -1,6 +1,7 @@
 """Parameters that several nodes share."""
 
 from msg_adapters.gridding import CELL_HEIGHTS
+from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover.steering_joints import LEFT, STEERING_SIGNS
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.parameters.table import ParameterError, parameter
@@ -35,6 +36,17 @@ def steering_sign_parameter() -> str:
         "Side to which positive angles of the steering joints turn in messages; left as in "
         "REP-103.",
         choices=tuple(STEERING_SIGNS),
+        read_only=True,
+    )
+
+
+def joint_map_parameter() -> tuple[str, ...]:
+    """Return the field of the parameter joint_map."""
+    return parameter(
+        tuple(f"{name}:{name}" for name in SUSPENSION_JOINTS),
+        "Names of the robot's joints: model_joint:robot_joint, then :-1 if it turns the other "
+        "way, then :offset with the model's angle in rad where the robot's is 0. A joint without "
+        "entry has the name of the model.",
         read_only=True,
     )
 

@@ -8,6 +8,7 @@ from rover_planner.parameters.shared import (
     imu_frame_parameter,
     imu_mounting_parameter,
     input_reliability_parameter,
+    joint_map_parameter,
     map_durability_parameter,
     map_resolution_parameter,
     max_torque_parameter,
@@ -127,6 +128,7 @@ class TractionControllerParameters(ParameterTable):
     )
     steering_limit: float = steering_limit_parameter()
     steering_sign: str = steering_sign_parameter()
+    joint_map: tuple[str, ...] = joint_map_parameter()
     map_frame: str = parameter(
         "map", "Frame of map and odometry; messages in another frame are refused.", read_only=True
     )

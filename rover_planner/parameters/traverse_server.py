@@ -10,6 +10,7 @@ from rover_planner.parameters.shared import (
     imu_frame_parameter,
     imu_mounting_parameter,
     input_reliability_parameter,
+    joint_map_parameter,
     map_durability_parameter,
     map_resolution_parameter,
     max_map_cells_parameter,
@@ -101,8 +102,24 @@ class TraverseServerParameters(ParameterTable):
     )
     steering_limit: float = steering_limit_parameter()
     steering_sign: str = steering_sign_parameter()
+    joint_map: tuple[str, ...] = joint_map_parameter()
     map_frame: str = parameter(
-        "map", "Frame of the map; requests in another frame are refused.", read_only=True
+        "map",
+        "Frame of the map; requests in another frame need a transform of /tf.",
+        read_only=True,
+    )
+    base_frame: str = parameter(
+        "base_link", "Frame of the robot on /tf, where tf2_msgs is installed.", read_only=True
+    )
+    base_offset: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        "x, y, z in m and roll, pitch, yaw in rad of the model's body, midway between the rocker "
+        "pivots, in the robot's frame; starts, goals, paths and plans are of the robot's frame.",
+        bounds=(-100.0, 100.0),
+        read_only=True,
+    )
+    transform_timeout: float = parameter(
+        0.5, "Age from which a transform of /tf is refused.", unit="s", bounds=(0.01, 60.0)
     )
     map_resolution: float = map_resolution_parameter()
     cell_height: str = cell_height_parameter()
@@ -238,6 +255,40 @@ class TraverseServerParameters(ParameterTable):
         "compared where odometry says that the rover stands.",
         unit="rad",
         bounds=(0.0, 3.2),
+    )
+
+    monitor: bool = parameter(
+        False,
+        "Whether the rest of the accepted path is judged again with each map, and ~/stop is "
+        "published; ~/monitor sets it too.",
+    )
+    monitor_offset: float = parameter(
+        0.5,
+        "Largest distance of the rover from its path; beyond it ~/stop is published.",
+        unit="m",
+        bounds=(0.01, 100.0),
+    )
+    monitor_timeout: float = parameter(
+        1.0,
+        "Time without a pose of the rover after which ~/stop is published.",
+        unit="s",
+        bounds=(0.1, 60.0),
+    )
+    monitor_mismatch: float = parameter(
+        0.3,
+        "Difference of measured and predicted suspension angles for which ~/stop is published if "
+        "it lasts a second; 0 never stops for it.",
+        unit="rad",
+        bounds=(0.0, 3.2),
+    )
+
+    hazard_map: bool = parameter(
+        False,
+        "Whether the traversability class of each cell and heading is kept up to date and "
+        "published on ~/hazard_map.",
+    )
+    hazard_headings: int = parameter(
+        8, "Number of headings of the hazard map.", bounds=(1, 36), read_only=True
     )
 
     def __post_init__(self) -> None:

@@ -5,6 +5,7 @@ from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 from rover_planner.ros.qos import result_qos
 
@@ -12,11 +13,13 @@ from rover_planner.ros.qos import result_qos
 class LazyPublisher:
     """Publishes messages to subscribers; without any, keeps the function that makes the latest."""
 
-    def __init__(self, node: Node, kind: type, name: str):
-        # The profile of these topics matches every subscription, so that no QoS mismatch is
+    def __init__(self, node: Node, kind: type, name: str, qos: QoSProfile | None = None):
+        # A profile that is transient local and reliable matches every subscription: no mismatch is
         # possible. Its event handler would cost a quarter of a millisecond per request.
         silent = PublisherEventCallbacks(use_default_callbacks=False)
-        self._publisher = node.create_publisher(kind, name, result_qos(), event_callbacks=silent)
+        self._publisher = node.create_publisher(
+            kind, name, qos or result_qos(), event_callbacks=silent
+        )
         self._make: Callable[[], Any] | None = None
 
     @property

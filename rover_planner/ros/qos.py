@@ -36,6 +36,11 @@ def result_qos() -> QoSProfile:
     )
 
 
+def latched_qos() -> QoSProfile:
+    """Return the profile of states: late subscribers get the last one."""
+    return map_qos()
+
+
 def sensor_qos() -> QoSProfile:
     """Return the profile of sensor data: best effort, which matches every publisher."""
     return QoSProfile(

@@ -98,7 +98,8 @@ class TractionService:
         rover = settings.rover
         self._joints = JointMemory(steering_joints(rover))
         self._monitor.forget()
-        self._steered, self._course = steered_wheels(rover), WheelCourse(rover)
+        self._steered, self.course = steered_wheels(rover), WheelCourse(rover)
+        """Which wheels steer, and what is asked of them."""
         self.steering = np.zeros(WHEEL_COUNT)
         """Last measured steering angles (6,) [rad], positive to the left."""
 
@@ -162,7 +163,7 @@ class TractionService:
     @property
     def wanted_rates(self) -> Floats:
         """Rates (6,) of the wheels that these ask for at the last steering angles [rad/s]."""
-        return self._course.want(self.wanted, self.steering)[1] / self._radius
+        return self.course.want(self.wanted, self.steering)[1] / self._radius
 
     @property
     def expiry(self) -> float:
@@ -267,7 +268,7 @@ class TractionService:
             return self.rest(fault, start)
         duration = 0.0 if self._last_time is None else min(now - self._last_time, MAX_STEP)
         self._last_time = now
-        if not self._course.take(self._writer.find_rolling(self._level_state()), self.steering):
+        if not self.course.take(self._writer.find_rolling(self._level_state()), self.steering):
             self._speed.reset()
         estimate, warning = self._estimate_contacts(now, duration)
         state = self._measure_state(estimate)
@@ -276,7 +277,7 @@ class TractionService:
             rows = self._write_rows(state, push)
         except ModelError as error:
             rows, warning = self._write_rows(self._level_state(), push), str(error)
-        warning = warning or self._course.describe_refusal(self.wanted)
+        warning = warning or self.course.describe_refusal(self.wanted)
         answer = self._share_torques(rows)
         self._from_map = estimate.source == MAP_SOURCE
         torques = self._command_torques(answer, rows, duration)
@@ -310,7 +311,7 @@ class TractionService:
             return from_motion, warning
         try:
             backward = self._mean_wanted() < 0.0
-            directions = -self._course.directions if backward else self._course.directions
+            directions = -self.course.directions if backward else self.course.directions
             state = self._measure_state(from_motion)
             return self._finder.find(state, self._pose, self._deviation, directions), ""
         except ModelError as error:
@@ -346,11 +347,11 @@ class TractionService:
 
     def _mean_wanted(self) -> float:
         """Return the wanted mean speed of the wheels [m/s]."""
-        return self._course.want(self.wanted, self.steering)[0]
+        return self.course.want(self.wanted, self.steering)[0]
 
     def _find_push(self, duration: float) -> float:
         """Return the wanted push [N], from the mean travel of the wheels."""
-        error = self._mean_wanted() - self._course.mean_of(self._wheel_rates) * self._radius
+        error = self._mean_wanted() - self.course.mean_of(self._wheel_rates) * self._radius
         growth = STALLED_GROWTH * duration if self._slip.detector.stalled else duration
         if not self._optimal:
             return self._speed.update(error, growth, self._limited)
@@ -358,7 +359,7 @@ class TractionService:
 
     def _write_rows(self, state: MeasuredState, push: float) -> BalanceRows:
         """Return the balance with a push; the program takes it as resistance at the wheels."""
-        push *= self._course.sign
+        push *= self.course.sign
         push, resistance = (0.0, push) if self._optimal else (push, 0.0)
         return self._writer.write(state, push, resistance)
 
@@ -378,7 +379,7 @@ class TractionService:
         self, answer: TractionAnswer, rows: BalanceRows, duration: float
     ) -> Floats:
         """Return the torques (6,) [N m] with the other loops, limited in magnitude and rate."""
-        settings, torques, course = self._settings, answer.torques.copy(), self._course
+        settings, torques, course = self._settings, answer.torques.copy(), self.course
         if self._body_rates is not None:
             mean_speed = course.mean_of(self._wheel_rates) * self._radius
             wanted = course.yaw_rate(self._wanted_yaw_rate, mean_speed)

@@ -5,6 +5,7 @@ import importlib
 import importlib.util
 import re
 import shutil
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -65,10 +66,23 @@ def _check_node(name: str, words: tuple[str, ...]) -> None:
     own, ros = _split_at(words, "--ros-args")
     if "--help" not in own:
         run_app(make_app(name), name, own)
-    assert set(ros[0::2]) <= {"-p", "-r"}, f"{name} {' '.join(ros)}"
+    assert set(ros[0::2]) <= {"-p", "-r", "--params-file"}, f"{name} {' '.join(ros)}"
     for option, value in zip(ros[0::2], ros[1::2], strict=True):
+        if option == "--params-file":
+            check_parameter_file(name, TOP / value)
         if option == "-p":
             _check_parameter(name, *value.split(":="))
+
+
+def check_parameter_file(node: str, path: Path) -> None:
+    """Hold the parameters of a file for a node against its table; `/**` is every node."""
+    values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert set(values) & {"/**", node}, f"{path.name} has nothing for {node}"
+    specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
+    for section in ("/**", node):
+        for name, value in values.get(section, {}).get("ros__parameters", {}).items():
+            assert name in specs, f"{path.name}: {node} has no parameter {name}"
+            specs[name].check(tuple(value) if isinstance(value, list) else value)
 
 
 def _check_parameter(node: str, name: str, value: str) -> None:

@@ -161,8 +161,10 @@ def test_the_topics_in_the_help_are_those_of_the_node(name, ros):
     told -= {"subscribes", "serves", "publishes", "calls", ""}
     told = {re.sub(r"^~", f"/{name}", topic) for topic in told}
     told = {topic if topic.startswith("/") else f"/{topic}" for topic in told}
-    # Topics that need follow_commands or grid_map_msgs are in the help, but not in this node.
-    optional = {"/cmd_vel", "/traction_controller/commands", "/elevation_map"} & told
+    # Topics that need follow_commands, grid_map_msgs or hazard_map are in the help, but not here.
+    hazards = {f"/traverse_server/hazard_map/{which}" for which in ("worst", "best")}
+    commands = {"/cmd_vel", "/traction_controller/commands", "/elevation_map"}
+    optional = (commands | hazards) & told
     wait_until(lambda: told - optional <= names(), f"{told - optional}")
     assert names() <= told | {"/tf"}
 

@@ -18,6 +18,7 @@ SMALL = {
         "MAP_SIZES": (200, 240),
         "RESOLUTIONS": (0.05,),
     },
+    "hazards": {"CELLS": 120, "CHANGE": 8, "HEADINGS": 2},
     "ingestion": {"CELLS": 60},
     "maps": {"SIZES": (80,), "LOCAL": 20, "SECONDS": 0.5, "PERIOD": 0.1},
     "mujoco": {"POSES": 2, "MANY": 20},

@@ -67,6 +67,10 @@ class Measurements:
         x, y, yaw = pose.tolist()
         return Standing(x, y, *body, yaw, suspension)
 
+    def fresh_pose(self, now: float, max_age: float) -> NDArray[np.float64] | None:
+        """Return the pose (3,) if it is not older than `max_age` [s]."""
+        return self._pose if now - self._pose_time <= max_age else None
+
     def pose_with_suspension(self, now: float) -> NDArray[np.float64] | None:
         """Return the pose (3,) if it and the suspension's angles are not older than MAX_AGE."""
         times = [time for name, time in self._times.items() if name in SUSPENSION_JOINTS]

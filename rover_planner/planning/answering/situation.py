@@ -180,6 +180,16 @@ class Situation:
         assert self.known_map is not None
         return BlindCheck(self.settings.rover, self.known_map.seen, self.settings.blind_ground)
 
+    def compare_standing(self) -> SuspensionReport | None:
+        """Compare measured and predicted suspension where the rover stands, if that is known.
+
+        Raises:
+            RoverError: The model refuses a setting.
+        """
+        if self.known_map is None:
+            return None
+        return self._compare_suspension(self._planner().predict_standing)
+
     def _planner(self) -> PathPlanner:
         """Return a planner for the map, the settings and the measured arm angles."""
         assert self.terrain is not None

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
-from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import KnownMap
-from rover_planner.planning.answering.measurements import Measurements
+from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.situation import GivenPath, Situation
 from rover_planner.planning.candidates import generate_candidates
@@ -78,6 +78,12 @@ class TraverseService:
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints whose angles are used: those of suspension and manipulator."""
         return SUSPENSION_JOINTS + self._settings.manipulator_joints
+
+    @property
+    def all_joint_names(self) -> tuple[str, ...]:
+        """Names of all joints of the model: suspension, wheels, steering and manipulator."""
+        drive = SUSPENSION_JOINTS + WHEEL_JOINTS + STEERING_JOINTS
+        return drive + self._settings.manipulator_joints
 
     def take_terrain(
         self,
@@ -151,6 +157,10 @@ class TraverseService:
     def standing(self) -> Standing | None:
         """Return pose and suspension of the rover if they were measured just now, else None."""
         return self._measurements.standing(time.monotonic())
+
+    def fresh_pose(self, max_age: float = MAX_AGE) -> NDArray[np.float64] | None:
+        """Return the measured pose (3,) x, y [m], yaw [rad] if it is not older [s], else None."""
+        return self._measurements.fresh_pose(time.monotonic(), max_age)
 
     def situation(self, ros_time: int | None = None) -> Situation:
         """Return all that is known now.

@@ -11,9 +11,12 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import convert_steering, joint_positions, joint_velocities
+from msg_adapters.joint_map import read_joint_map
+from msg_adapters.joints import convert_steering
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import MapIntake
@@ -53,6 +56,11 @@ class TractionInputs:
         self._node, self._service, self._maps = node, service, maps
         self._errors = guard
         self._steering_sign = parameters.steering_sign
+        arm = service.settings.rover.manipulator
+        known = (*JOINTS, *STEERING_JOINTS, *(() if arm is None else arm.joints))
+        self.joint_names = read_joint_map(parameters.joint_map, known)
+        """Names of the joints in messages."""
+        self._heard = frozenset(self.joint_names.robot_names({*JOINTS, *ANGLES}))
         self._map_frame, self._base_frame = parameters.map_frame, parameters.base_frame
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
@@ -63,6 +71,13 @@ class TractionInputs:
         self._subscribe(parameters)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
+
+    def to_robot_steering(self, angles: Floats) -> Floats:
+        """Return angles of the steered wheels [rad], in wheel order, as messages have them."""
+        joints = steering_joints(self._service.settings.rover)
+        ours = STEERING_SIGNS[self._steering_sign] * angles
+        names = self.joint_names
+        return names.signs(joints) * (ours - names.offsets(joints))
 
     def _subscribe(self, parameters: TractionControllerParameters) -> None:
         twist = TwistStamped if parameters.cmd_vel_stamped else Twist
@@ -125,12 +140,14 @@ class TractionInputs:
         return self.stamps.find_time(name, stamp, clock, now, merged=merged)
 
     def _take_joints(self, state: JointState, now: float) -> None:
-        if not {*JOINTS, *ANGLES}.intersection(state.name):  # an arm's message, for example
+        if not self._heard.intersection(state.name):  # an arm's message, for example
             return
         stamp = _stamp_of(state)
         measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
-        positions = convert_steering(joint_positions(state, ANGLES), self._steering_sign)
-        self._service.take_joints(positions, joint_velocities(state, JOINTS), measured, stamp)
+        angles = self.joint_names.positions(state, ANGLES)
+        rates = self.joint_names.velocities(state, JOINTS)
+        positions = convert_steering(angles, self._steering_sign)
+        self._service.take_joints(positions, rates, measured, stamp)
 
     def _take_imu(self, imu: Imu, now: float) -> None:
         measured = self._find_time(IMU, _stamp_of(imu), now)

@@ -1,0 +1,37 @@
+"""Writes traversability classes of cells as occupancy grids."""
+
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import OccupancyGrid
+from numpy.typing import NDArray
+
+VALUES = (0, 33, 66, 100)
+"""Values of the classes 0 to 3: passable, with speed servos, with traction control, impassable."""
+UNKNOWN = -1
+"""Value of cells whose class, a negative number, is unknown."""
+_TABLE = np.array([*VALUES, UNKNOWN], np.int8)
+
+
+def classes_to_grid(
+    classes: NDArray[np.int8], cell: float, first: tuple[float, float], frame: str, stamp: Any
+) -> OccupancyGrid:
+    """Return classes as an occupancy grid with VALUES and UNKNOWN.
+
+    Args:
+        classes: (ny, nx) class of each cell, row 0 at the smallest y; -1 is unknown.
+        cell: Cell size [m].
+        first: x, y of the centre of cell [0, 0] [m], map frame.
+        frame: Frame of the map.
+        stamp: builtin_interfaces/Time.
+    """
+    message = OccupancyGrid()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.info.map_load_time = stamp
+    message.info.resolution = cell
+    message.info.height, message.info.width = classes.shape
+    message.info.origin.position.x = first[0] - 0.5 * cell
+    message.info.origin.position.y = first[1] - 0.5 * cell
+    message.info.origin.orientation.w = 1.0
+    message.data.frombytes(_TABLE[classes].tobytes())  # -1 is the last of the table
+    return message

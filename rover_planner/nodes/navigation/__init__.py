@@ -1,0 +1,1 @@
+"""Topics and services for drives: watch of the path, hazard map, frames."""

@@ -1,0 +1,204 @@
+"""Transforms poses of messages to the map frame and to the body; listens to /tf and /tf_static."""
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Pose, PoseStamped, TransformStamped
+from nav_msgs.msg import Odometry, Path
+from numpy.typing import NDArray
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from scipy.spatial.transform import Rotation
+
+from msg_adapters.errors import MessageError
+from msg_adapters.paths import pose_to_array
+from msg_adapters.stamps import stamp_to_ns
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.navigation.transforms import Rigid, StampedTransform, TransformTree
+
+TF_DEPTH = 100
+"""Messages of /tf that wait to be taken, as in tf2."""
+
+
+def tf_message() -> type | None:
+    """Return tf2_msgs/msg/TFMessage; None where it is not installed."""
+    try:
+        from tf2_msgs.msg import TFMessage
+    except ImportError:
+        return None
+    kind: type = TFMessage
+    return kind
+
+
+class Frames:
+    """Knows the frames of a node; without tf2_msgs only that of the map.
+
+    Messages in the map frame, about a body without offset, are passed on as they are.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: TraverseServerParameters,
+        around: Callable[[Callable[..., Any]], Callable[..., Any]],
+    ):
+        """Subscribe where tf2_msgs is installed; `around` guards callbacks."""
+        self._node = node
+        self._map, self._base = parameters.map_frame, parameters.base_frame
+        self._tree = TransformTree(parameters.transform_timeout)
+        offset = parameters.base_offset
+        self._offset = Rigid.from_rpy(*offset) if any(offset) else None
+        kind = tf_message()
+        if kind is None:
+            return
+        static = QoSProfile(depth=TF_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        node.create_subscription(kind, "/tf", around(self.take), TF_DEPTH)
+        node.create_subscription(kind, "/tf_static", around(self.take_static), static)
+
+    def apply(self, parameters: TraverseServerParameters) -> None:
+        """Take new parameters."""
+        self._tree.timeout = parameters.transform_timeout
+
+    def take(self, message: Any) -> None:
+        """Take a TFMessage of /tf."""
+        self._take(message.transforms, is_static=False)
+
+    def take_static(self, message: Any) -> None:
+        """Take a TFMessage of /tf_static."""
+        self._take(message.transforms, is_static=True)
+
+    def find_here(self) -> NDArray[np.float64] | None:
+        """Return (3,) x, y [m], yaw [rad] of the body on the map by /tf; None without /tf.
+
+        Raises:
+            TransformError: The transform is stale, or does not lead to the map frame.
+        """
+        if not self._tree.has_parent(self._base):
+            return None
+        robot = self._tree.find(self._map, self._base, None, self._now())
+        return self._to_body(robot).xyyaw
+
+    def localise(self, stamped: PoseStamped, what: str) -> PoseStamped:
+        """Return a pose of the robot as one of the body in the map frame.
+
+        A pose in a frame that no transform has is returned as it is, for others to refuse.
+
+        Raises:
+            MessageError: The pose is not finite, or no unit quaternion.
+            TransformError: As `TransformTree.find`.
+        """
+        frame = stamped.header.frame_id
+        is_here = frame == self._map or not self._tree.knows(frame)
+        if is_here and self._offset is None:
+            return stamped
+        pose_to_array(stamped.pose, what)  # refuses what is no pose
+        rigid = _read_pose(stamped.pose)
+        if not is_here:
+            stamp = stamp_to_ns(stamped.header.stamp)
+            rigid = self._tree.find(self._map, frame, stamp, self._now()).then(rigid)
+        moved = PoseStamped(pose=_write_pose(self._to_body(rigid)))
+        moved.header.stamp = stamped.header.stamp
+        moved.header.frame_id = frame if is_here else self._map
+        return moved
+
+    def localise_path(self, path: Path) -> Path:
+        """Return a path of the robot as one of the body in the map frame; see `localise`."""
+        frame = path.header.frame_id
+        if self._offset is None and (frame == self._map or not self._tree.knows(frame)):
+            return path
+        moved = Path(header=copy.deepcopy(path.header))
+        for index, pose in enumerate(path.poses):
+            own = PoseStamped(header=pose.header, pose=pose.pose)
+            if not own.header.frame_id:
+                own.header = path.header
+            moved.poses.append(self.localise(own, f"path pose {index}"))
+        if moved.poses:
+            moved.header.frame_id = moved.poses[0].header.frame_id
+        return moved
+
+    def localise_odometry(self, odometry: Odometry) -> Odometry:
+        """Return odometry of the body in the map frame; see `localise`."""
+        here = PoseStamped(header=odometry.header, pose=odometry.pose.pose)
+        moved = self.localise(here, "odometry")
+        if moved is here:
+            return odometry
+        result = Odometry(header=moved.header, child_frame_id=odometry.child_frame_id)
+        result.pose.pose, result.pose.covariance = moved.pose, odometry.pose.covariance
+        return result
+
+    def to_base(self, path: Path) -> Path:
+        """Change a path of the body into one of the robot, in place, and return it."""
+        if self._offset is not None:
+            back = self._offset.inverse()
+            for stamped in path.poses:
+                moved = _write_pose(_read_pose(stamped.pose).then(back))
+                _copy_pose(moved, stamped.pose)
+        return path
+
+    def _to_body(self, robot: Rigid) -> Rigid:
+        return robot if self._offset is None else robot.then(self._offset)
+
+    def _now(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
+
+    def _take(self, transforms: list[TransformStamped], *, is_static: bool) -> None:
+        for transform in transforms:
+            try:
+                read = read_transform(transform)
+            except MessageError as error:
+                self._node.get_logger().warning(str(error), throttle_duration_sec=5.0)
+                continue
+            self._tree.take(read, is_static=is_static)
+
+
+def read_transform(message: TransformStamped) -> StampedTransform:
+    """Return the transform of a message.
+
+    Raises:
+        MessageError: It is not finite, no unit quaternion, or a frame has no name.
+    """
+    parent, child = message.header.frame_id, message.child_frame_id
+    place, turn = message.transform.translation, message.transform.rotation
+    numbers = np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w])
+    length = float(np.linalg.norm(numbers[3:]))
+    if not (np.isfinite(numbers).all() and 0.99 < length < 1.01 and parent and child):
+        raise MessageError(
+            f"transform from {child!r} to {parent!r} has translation {numbers[:3].tolist()} and "
+            f"rotation {numbers[3:].tolist()}; it must be finite, a quaternion of length 1, and "
+            "both frames must have names"
+        )
+    rigid = Rigid(numbers[:3], Rotation.from_quat(numbers[3:]))
+    return StampedTransform(parent, child, stamp_to_ns(message.header.stamp) or 0, rigid)
+
+
+def is_empty(stamped: PoseStamped) -> bool:
+    """Return whether a pose was left empty: no frame, all zero, which means "where I am"."""
+    place, turn = stamped.pose.position, stamped.pose.orientation
+    rest = place.x, place.y, place.z, turn.x, turn.y, turn.z
+    return not stamped.header.frame_id and not any(rest) and turn.w in (0.0, 1.0)
+
+
+def _read_pose(pose: Pose) -> Rigid:
+    place, turn = pose.position, pose.orientation
+    return Rigid(
+        np.array([place.x, place.y, place.z]),
+        Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]),
+    )
+
+
+def _write_pose(rigid: Rigid) -> Pose:
+    pose = Pose()
+    place, turn = pose.position, pose.orientation
+    place.x, place.y, place.z = rigid.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
+    return pose
+
+
+def _copy_pose(source: Pose, target: Pose) -> None:
+    """Copy numbers: the messages of a plan are reused, and their parts are known elsewhere."""
+    for part in ("position", "orientation"):
+        one, other = getattr(source, part), getattr(target, part)
+        for name in one.get_fields_and_field_types():
+            setattr(other, name, getattr(one, name))

@@ -1,0 +1,205 @@
+"""Keeps the hazard map in a thread; publishes it latched and serves ~/get_hazard_map."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import GetMap
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from msg_adapters.results.hazard_grids import classes_to_grid
+from rover_physics.numerics.interruption import interruptible
+from rover_physics.terrain.grid import Terrain
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
+from rover_planner.planning.answering.service_settings import ServiceSettings
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
+from rover_planner.planning.navigation.pose_classes import RoverOnMap
+from rover_planner.ros.guard import Guard
+from rover_planner.ros.handover import Handover
+from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.qos import latched_qos
+from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.transition_log import TransitionLog
+
+PERIOD = 0.5
+"""Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""
+CATCH_UP = 0.2
+"""Period of the check for new subscribers [s]."""
+SLICE = 0.2
+"""Time after which the thread looks for a newer map, and for questions [s]."""
+SHOW_PERIOD = 1.0
+"""Time between two publications while cells wait to be judged [s]."""
+MAX_PAUSE = 1.0
+"""Longest pause for questions [s]."""
+END_TIME = 2.0
+"""Longest wait for the thread at the end [s]."""
+
+
+class HazardTopics:
+    """Connects a HazardMap to a node; without the parameter `hazard_map` it does nothing."""
+
+    def __init__(
+        self,
+        node: Node,
+        service: TraverseService,
+        parameters: TraverseServerParameters,
+        guard: Guard,
+        is_busy: Callable[[], bool],
+    ):
+        """Create topics, service and thread.
+
+        Args:
+            node: The node.
+            service: Knows map, settings and pose.
+            parameters: The parameters of the node.
+            guard: Takes unexpected errors.
+            is_busy: Returns whether questions are open, which come first; called in the thread.
+        """
+        self._node, self._service, self._guard, self._is_busy = node, service, guard, is_busy
+        self._frame, self._headings = parameters.map_frame, parameters.hazard_headings
+        self._log = TransitionLog(node.get_logger())
+        self._handover = Handover(node, guard)
+        self._shown: _Shown | None = None
+        self._done: tuple[Terrain, ServiceSettings] | None = None
+        self._topics: dict[str, LazyPublisher] = {}
+        node.create_service(GetMap, "~/get_hazard_map", self._get)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(CATCH_UP, guard.around(self._catch_up), clock=steady)
+        self._enabled = threading.Event()
+        self._ending = threading.Event()
+        self.apply(parameters)
+        self._thread = threading.Thread(target=self._run, name="hazards", daemon=True)
+        self._thread.start()
+
+    def apply(self, parameters: TraverseServerParameters) -> None:
+        """Take new parameters."""
+        if not parameters.hazard_map:
+            self._enabled.clear()
+            return
+        if not self._topics:
+            self._create_topics()
+        self._enabled.set()
+
+    def _create_topics(self) -> None:
+        """Create the topics, which a node without a hazard map does not have."""
+        for name in ("worst", "best", *(f"heading_{k}" for k in range(self._headings))):
+            self._topics[name] = LazyPublisher(
+                self._node, OccupancyGrid, f"~/hazard_map/{name}", latched_qos()
+            )
+
+    def close(self) -> None:
+        """End the thread."""
+        self._ending.set()
+        self._enabled.set()
+        self._thread.join(END_TIME)
+
+    def describe(self) -> dict[str, Any]:
+        """Return keys and values for diagnostics."""
+        shown = self._shown
+        if not self._enabled.is_set() or shown is None:
+            return {}
+        return {"hazard map: cells to judge": shown.stale, "hazard map: map": shown.map_hash}
+
+    def _get(self, _request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
+        """Return the worst classes; a grid without cells if there are none."""
+        shown = self._shown
+        if shown is not None and self._enabled.is_set():
+            response.map = shown.grid("worst")
+        return response
+
+    def _catch_up(self) -> None:
+        for topic in list(self._topics.values()):
+            topic.catch_up()
+
+    def _run(self) -> None:
+        hazards = HazardMap(self._headings)
+        while not self._ending.is_set():
+            self._enabled.wait()
+            try:
+                with interruptible(self._check_end):
+                    self._update(hazards)
+            except QuestionStoppedError:
+                return
+            except INPUT_ERRORS as error:  # such as a soil of the map that is not known
+                self._log.update("hazards", f"no hazard map: {error}", "", time.monotonic())
+            except Exception as error:
+                self._guard.report("hazard map", error)
+                hazards, self._done = HazardMap(self._headings), None
+            self._ending.wait(PERIOD)
+
+    def _check_end(self) -> None:
+        if self._ending.is_set():
+            raise QuestionStoppedError(STOPPING, "the server is shutting down")
+
+    def _update(self, hazards: HazardMap) -> None:
+        """Take the present map, judge what is stale, and publish; newer maps are followed."""
+        shown_at, is_done = time.monotonic(), False
+        while not is_done and self._enabled.is_set():
+            known, settings = self._service.known_map, self._service.settings
+            if known is None or self._done == (known.terrain, settings):
+                return
+            query = settings.query
+            hazards.take(
+                RoverOnMap(settings.rover, known.terrain, query.sweep_options(), query.map_sigmas)
+            )
+            self._pause()
+            pose = self._service.fresh_pose()
+            is_done = hazards.work(SLICE, None if pose is None else (pose[0], pose[1]))
+            if is_done:
+                self._done = known.terrain, settings
+            if is_done or time.monotonic() - shown_at > SHOW_PERIOD:
+                shown_at = time.monotonic()
+                self._show(hazards, known.fingerprint)
+
+    def _pause(self) -> None:
+        """Let questions come first, for a while."""
+        end = time.monotonic() + MAX_PAUSE
+        while self._is_busy() and time.monotonic() < end:
+            self._check_end()
+            time.sleep(0.01)
+
+    def _show(self, hazards: HazardMap, map_hash: str) -> None:
+        view = hazards.view()
+        if view is None:
+            return
+        stamp = self._node.get_clock().now().to_msg()
+        shown = _Shown(view, map_hash, hazards.stale_count, self._frame, stamp)
+        self._handover.call(partial(self._publish, shown))
+
+    def _publish(self, shown: "_Shown") -> None:
+        """Publish a view; called in the executor's thread."""
+        self._shown = shown
+        for name, topic in self._topics.items():
+            topic.publish(partial(shown.grid, name))
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What is published."""
+
+    view: HazardView
+    """The classes."""
+    map_hash: str
+    """Fingerprint of the map they were judged on."""
+    stale: int
+    """Number of poses that were not judged yet; they are unknown."""
+    frame: str
+    """Frame of the map."""
+    stamp: Any
+    """builtin_interfaces/Time of all grids."""
+
+    def grid(self, name: str) -> OccupancyGrid:
+        """Return the grid of a topic."""
+        view = self.view
+        if name in ("worst", "best"):
+            classes = view.worst() if name == "worst" else view.best()
+        else:
+            classes = view.classes[int(name.removeprefix("heading_"))]
+        return classes_to_grid(classes, view.resolution, view.origin, self.frame, self.stamp)

@@ -1,0 +1,222 @@
+"""Watches the accepted path in a thread: publishes ~/stop at once, serves ~/monitor."""
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+from rover_physics.numerics.interruption import interruptible
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
+from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.server_health import Health
+from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.monitor import (
+    STOPPED,
+    Finding,
+    PathMonitor,
+    Sight,
+    WatchSettings,
+)
+from rover_planner.planning.navigation.monitor_health import describe_watch
+from rover_planner.planning.navigation.watched_path import WatchedPath
+from rover_planner.ros.guard import Guard
+from rover_planner.ros.handover import Handover
+from rover_planner.ros.qos import latched_qos
+
+PERIOD = 0.1
+"""Time between two looks while paths are watched [s]."""
+IDLE_PERIOD = 1.0
+"""The same while none is: the suspension is compared for the diagnostics."""
+MAX_POSE_AGE = 0.3
+"""Age up to which a pose says where the rover is [s]."""
+NO_PATH = WatchedPath(np.empty((0, 3)))
+"""The path that is watched where none is."""
+END_TIME = 2.0
+"""Longest wait for the thread at the end [s]."""
+
+FindPose = Callable[[], NDArray[np.float64] | None]
+"""Returns the pose (3,) x, y [m] and yaw [rad] of the body of just now, map frame."""
+Tell = Callable[[Judgement, str, Situation], None]
+"""Publishes why the rover is to stop, with the hash of its path and what was known."""
+
+
+class PathWatch:
+    """Connects a PathMonitor to a node; looks are taken in a thread, in which maps are judged."""
+
+    def __init__(
+        self,
+        node: Node,
+        service: TraverseService,
+        parameters: TraverseServerParameters,
+        guard: Guard,
+        find_pose: FindPose,
+        tell: Tell,
+    ):
+        """Create topic, service and thread.
+
+        Args:
+            node: The node; it has the parameter `monitor`.
+            service: Knows map, pose and joints.
+            parameters: The parameters of the node.
+            guard: Takes unexpected errors.
+            find_pose: Returns where the body is; None if it is not known.
+            tell: Called in the executor's thread when the rover is to stop.
+        """
+        self._node, self._service, self._guard, self._tell = node, service, guard, tell
+        self._find_pose = find_pose
+        self._monitor = PathMonitor(watch_settings(parameters))
+        self.finding = self._monitor.finding
+        """What was found last; belongs to the executor's thread."""
+        self.enabled = False
+        """Whether accepted paths are watched."""
+        self._told: Judgement | None = None
+        self._last_path: WatchedPath | None = None
+        self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
+        self._handover = Handover(node, guard)
+        self._changed = threading.Condition()
+        self._new_path: WatchedPath | None = None
+        self._sight: Sight | None = None
+        self._ending = False
+        self._thread = threading.Thread(target=self._run, name="monitor", daemon=True)
+        self._thread.start()
+        node.create_service(SetBool, "~/monitor", guard.around(self._switch))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(IDLE_PERIOD, guard.around(self._offer_sight), clock=steady)
+        self.apply(parameters)
+
+    def apply(self, parameters: TraverseServerParameters) -> None:
+        """Take new parameters."""
+        self._monitor.settings = watch_settings(parameters)
+        if parameters.monitor == self.enabled:
+            return
+        self.enabled = parameters.monitor
+        self._stop.publish(Bool(data=False))
+        if self.enabled:
+            self._set_path(self._last_path)
+        else:
+            self._set_path(NO_PATH)
+        period = PERIOD if self.enabled else IDLE_PERIOD
+        self._timer.timer_period_ns = round(1e9 * period)
+        self._timer.reset()
+
+    def accept(self, poses: NDArray[np.float64], find_hash: Callable[[], str]) -> None:
+        """Watch a path that was judged traversable, from the next look on.
+
+        Args:
+            poses: (n, 3) x, y [m] and yaw [rad] of its waypoints, map frame.
+            find_hash: Returns its hash.
+        """
+        self._last_path = WatchedPath(poses, find_hash() if self.enabled else "")
+        if self.enabled:
+            self._set_path(self._last_path)
+
+    def describe(self) -> Health:
+        """Return what is watched and what was found, for diagnostics."""
+        tolerance = self._service.settings.suspension_tolerance
+        return describe_watch(self.finding, self.enabled, tolerance)
+
+    def close(self) -> None:
+        """End the thread."""
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
+        self._thread.join(END_TIME)
+
+    def _set_path(self, path: WatchedPath | None) -> None:
+        with self._changed:
+            self._new_path = path
+
+    def _switch(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Set the parameter `monitor`, so that there is one place that has its value."""
+        result = self._node.set_parameters([Parameter("monitor", value=bool(request.data))])[0]
+        response.success = bool(result.successful)
+        state = "accepted paths are watched" if self.enabled else "no path is watched"
+        response.message = result.reason or state
+        return response
+
+    def _offer_sight(self) -> None:
+        """Hand what is known now to the thread; a look that still waits is replaced."""
+        now = self._node.get_clock().now().nanoseconds
+        situation, pose = self._service.situation(now), self._find_pose()
+        with self._changed:
+            self._sight = Sight(situation, pose, time.monotonic())
+            self._changed.notify_all()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._sight is not None or self._ending)
+                if self._ending:
+                    return
+                sight, path = self._sight, self._new_path
+                self._sight = self._new_path = None
+            assert sight is not None
+            try:
+                with interruptible(self._check_end):
+                    finding = self._look(sight, path)
+            except QuestionStoppedError:
+                return
+            except Exception as error:
+                finding = self._fail(error)
+            self._hand_over(finding, sight)
+
+    def _check_end(self) -> None:
+        if self._ending:
+            raise QuestionStoppedError(STOPPING, "the server is shutting down")
+
+    def _look(self, sight: Sight, path: WatchedPath | None) -> Finding:
+        if path is not None and not len(path.poses):
+            self._monitor.forget()
+        elif path is not None and not self._monitor.take_path(path, sight):
+            logger = self._node.get_logger()
+            logger.warning("monitor: the rover does not stand on the accepted path; not watched")
+        return self._monitor.look(sight)
+
+    def _fail(self, error: Exception) -> Finding:
+        """Return that the rover is to stop because the rest of its path could not be judged."""
+        text = self._guard.report("monitor", error)
+        return self._monitor.stop(refusal("internal_error", f"internal error: {text}"))
+
+    def _hand_over(self, finding: Finding, sight: Sight) -> None:
+        """Publish a finding at once; classes of a stop's waypoints take longer and follow."""
+        self._handover.call(lambda: self._take(finding))
+        judgement = finding.judgement
+        if finding.state != STOPPED or judgement is None or judgement is self._told:
+            return
+        self._told = judgement
+        with interruptible(self._check_end):
+            told = judgement.complete()
+        self._handover.call(lambda: self._tell(told, finding.path_hash, sight.situation))
+
+    def _take(self, finding: Finding) -> None:
+        """Publish ~/stop where it has changed; called in the executor's thread."""
+        before, self.finding = self.finding, finding
+        stops = finding.state == STOPPED
+        if not self.enabled or finding.state == before.state:
+            return
+        if stops or before.state == STOPPED:
+            self._stop.publish(Bool(data=stops))
+        logger = self._node.get_logger()
+        if stops:
+            assert finding.judgement is not None
+            logger.error(f"monitor: stop: {finding.judgement.reason}")
+        else:
+            logger.info(f"monitor: {finding.state}")
+
+
+def watch_settings(parameters: TraverseServerParameters) -> WatchSettings:
+    """Return the limits of a monitor from the parameters."""
+    return WatchSettings(
+        max_offset=parameters.monitor_offset,
+        pose_timeout=parameters.monitor_timeout,
+        max_mismatch=parameters.monitor_mismatch,
+    )

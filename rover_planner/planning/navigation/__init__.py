@@ -1,0 +1,1 @@
+"""What a drive needs without ROS: watch of the path, hazard map, frames."""

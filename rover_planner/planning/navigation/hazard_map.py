@@ -1,0 +1,238 @@
+"""Traversability class of each cell of a map and each heading, judged anew where it changed."""
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.navigation.footprint import find_footprint
+from rover_planner.planning.navigation.pose_classes import (
+    IMPASSABLE,
+    UNKNOWN,
+    RoverOnMap,
+    classify_poses,
+)
+
+TILE = 32
+"""Cells along the side of a tile; tiles are judged one after another."""
+MARGIN = 2
+"""Cells by which a footprint is widened: heights are interpolated, and cells have an extent."""
+SHIFT_TOLERANCE = 1e-3
+"""Share of a cell by which the grids of two maps may differ and still count as the same."""
+LAYERS = ("elevation", "friction", "soil", "elevation_std")
+"""Layers of a map that count."""
+
+
+@dataclass(frozen=True, eq=False)
+class HazardView:
+    """The classes at one time."""
+
+    classes: NDArray[np.int8]
+    """(headings, ny, nx) class of each heading and cell; UNKNOWN where it is not judged yet."""
+    resolution: float
+    """Cell size [m]."""
+    origin: tuple[float, float]
+    """x, y of the centre of cell [0, 0] [m], map frame."""
+
+    def worst(self) -> NDArray[np.int8]:
+        """Return (ny, nx) the worst class; IMPASSABLE is worse than UNKNOWN, all else better."""
+        worst = self.classes.max(axis=0)
+        unknown = (self.classes == UNKNOWN).any(axis=0)
+        return np.where(unknown & (worst != IMPASSABLE), UNKNOWN, worst).astype(np.int8)
+
+    def best(self) -> NDArray[np.int8]:
+        """Return (ny, nx) the best known class; UNKNOWN if one heading is and none is passable."""
+        known = np.where(self.classes == UNKNOWN, IMPASSABLE, self.classes).min(axis=0)
+        unknown = (self.classes == UNKNOWN).any(axis=0)
+        return np.where(unknown & (known == IMPASSABLE), UNKNOWN, known).astype(np.int8)
+
+
+class HazardMap:
+    """Keeps the classes of a map; all methods belong to one thread."""
+
+    def __init__(self, headings: int):
+        """Keep classes of so many headings: the first along x, then equally spaced to the left."""
+        self.headings = headings
+        """Number of headings."""
+        self._yaw = np.arange(headings) * (2.0 * math.pi / headings)
+        self._on_map: RoverOnMap | None = None
+        self._classes = np.empty((headings, 0, 0), np.int8)
+        self._stale = np.empty((headings, 0, 0), bool)
+
+    @property
+    def stale_count(self) -> int:
+        """Number of poses that are not judged on the present map."""
+        return int(np.count_nonzero(self._stale))
+
+    def take(self, on_map: RoverOnMap) -> None:
+        """Take a rover on a map; what the change of the map cannot have changed stays."""
+        before, shape = self._on_map, (self.headings, *on_map.terrain.elevation.shape)
+        shift = None if before is None else _find_shift(before, on_map)
+        classes, stale = np.full(shape, UNKNOWN, np.int8), np.ones(shape, bool)
+        if before is not None and shift is not None:
+            if before.terrain is on_map.terrain:
+                self._on_map = on_map
+                return
+            changed = find_changes(before.terrain, on_map.terrain, shift)
+            old, new = _overlap(before.terrain, on_map.terrain, shift)
+            classes[:, *new] = self._classes[:, *old]
+            stale[:, *new] = self._stale[:, *old]
+            stale |= self._within_reach(on_map, changed)
+        self._on_map, self._classes, self._stale = on_map, classes, stale
+
+    def work(self, seconds: float, near: tuple[float, float] | None = None) -> bool:
+        """Judge stale poses for about some time; return whether none is left.
+
+        Args:
+            seconds: Time [s]; the tile in work is finished.
+            near: x, y [m] of the place whose tiles come first; None begins at cell [0, 0].
+
+        Raises:
+            ModelError, SoilError: As `classify_poses`.
+        """
+        if self._on_map is None:
+            return True
+        end = time.monotonic() + seconds
+        for tile in self._stale_tiles(self._on_map.terrain, near):
+            self._judge(self._on_map, tile)
+            if time.monotonic() > end:
+                break
+        return not self._stale.any()
+
+    def view(self) -> HazardView | None:
+        """Return the classes of now; None before the first map."""
+        if self._on_map is None:
+            return None
+        terrain = self._on_map.terrain
+        classes = np.where(self._stale, np.int8(UNKNOWN), self._classes)
+        x, y = terrain.origin
+        return HazardView(classes, float(terrain.resolution), (float(x), float(y)))
+
+    def _within_reach(self, on_map: RoverOnMap, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return (headings, ny, nx) whether a changed cell is below the rover.
+
+        `changed` (ny + 2, nx + 2) has one more cell at each side of the map.
+        """
+        footprint, cell = find_footprint(on_map.rover), on_map.terrain.resolution
+        ny, nx = changed.shape
+        found = np.zeros((self.headings, ny - 2, nx - 2), bool)
+        if not changed.any():
+            return found
+        grown: dict[tuple[int, int], NDArray[np.bool_]] = {}
+        for heading, yaw in enumerate(self._yaw.tolist()):
+            x, y = (math.ceil(half / cell) + MARGIN for half in footprint.half_sides(yaw))
+            if (y, x) not in grown:
+                grown[y, x] = _grow(changed, (y, x))
+            found[heading] = grown[y, x][1:-1, 1:-1]
+        return found
+
+    def _stale_tiles(
+        self, terrain: Terrain, near: tuple[float, float] | None
+    ) -> Iterator[tuple[slice, slice]]:
+        """Yield the cells (rows, columns) of tiles with stale poses, the nearest first."""
+        any_heading = self._stale.any(axis=0)
+        rows, columns = (math.ceil(n / TILE) for n in any_heading.shape)
+        padded = np.zeros((rows * TILE, columns * TILE), bool)
+        padded[: any_heading.shape[0], : any_heading.shape[1]] = any_heading
+        tiles = np.argwhere(padded.reshape(rows, TILE, columns, TILE).any(axis=(1, 3)))
+        if near is not None:
+            place = (np.array(near) - terrain.origin) / (TILE * terrain.resolution) - 0.5
+            tiles = tiles[np.argsort(np.hypot(*(tiles[:, ::-1] - place).T), kind="stable")]
+        for i, j in tiles.tolist():
+            yield slice(i * TILE, (i + 1) * TILE), slice(j * TILE, (j + 1) * TILE)
+
+    def _judge(self, on_map: RoverOnMap, tile: tuple[slice, slice]) -> None:
+        """Judge the stale poses of a tile."""
+        heading, row, column = np.nonzero(self._stale[:, *tile])
+        row, column = row + tile[0].start, column + tile[1].start
+        x, y = on_map.terrain.origin
+        cell = on_map.terrain.resolution
+        poses = np.column_stack([x + cell * column, y + cell * row, self._yaw[heading]])
+        self._classes[heading, row, column] = classify_poses(on_map, poses)
+        self._stale[heading, row, column] = False
+
+
+def _grow(cells: NDArray[np.bool_], reach: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return cells that have a True cell within `reach` rows and columns."""
+    where = ndimage.find_objects(cells.astype(np.int8))[0]
+    box = tuple(
+        slice(max(0, one.start - width), one.stop + width)
+        for one, width in zip(where, reach, strict=True)
+    )
+    size = 2 * reach[0] + 1, 2 * reach[1] + 1
+    grown = np.zeros(cells.shape, bool)
+    grown[box] = ndimage.maximum_filter(cells[box].astype(np.uint8), size, mode="constant")
+    return grown
+
+
+Shift = tuple[int, int]
+"""Rows and columns from cell [0, 0] of a map to that of the next one."""
+
+
+def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
+    """Return how far the grid has moved; None if nothing of the old map can be used."""
+    old, new = before.terrain, now.terrain
+    alike = (
+        before.rover == now.rover
+        and before.options == now.options
+        and before.sigmas == now.sigmas
+        and old.resolution == new.resolution
+        and old.soil_names == new.soil_names
+        and all((getattr(old, name) is None) == (getattr(new, name) is None) for name in LAYERS)
+    )
+    if not alike:
+        return None
+    moved = (np.asarray(new.origin) - np.asarray(old.origin)) / new.resolution
+    cells = np.rint(moved)
+    # A pose of a grid that lies between the cells of the other stands on other heights.
+    if old.origin != new.origin and np.abs(moved - cells).max() > SHIFT_TOLERANCE:
+        return None
+    return int(cells[1]), int(cells[0])
+
+
+Window = tuple[slice, slice]
+"""Rows and columns of a map."""
+
+
+def _overlap(old: Terrain, new: Terrain, shift: Shift) -> tuple[Window, Window]:
+    """Return the cells that two maps have in common, as those of the old and of the new map."""
+    windows = [
+        (
+            slice(max(0, by), max(0, by, min(m, n + by))),
+            slice(max(0, -by), max(0, -by, min(n, m - by))),
+        )
+        for m, n, by in zip(old.elevation.shape, new.elevation.shape, shift, strict=True)
+    ]
+    return (windows[0][0], windows[1][0]), (windows[0][1], windows[1][1])
+
+
+def find_changes(old: Terrain, new: Terrain, shift: Shift) -> NDArray[np.bool_]:
+    """Return where a map differs from the one before.
+
+    Args:
+        old: The map before.
+        new: The map, with the same layers.
+        shift: Rows and columns from cell [0, 0] of the old map to that of the new one.
+
+    Returns:
+        (ny + 2, nx + 2) True for cells that are new or differ, with one more cell at each side,
+        which is True if the map's edge has moved.
+    """
+    ny, nx = new.elevation.shape
+    changed = np.ones((ny + 2, nx + 2), bool)
+    if shift == (0, 0) and old.elevation.shape == new.elevation.shape:
+        changed[:] = False
+    before, now = _overlap(old, new, shift)
+    inside = changed[1:-1, 1:-1]
+    inside[now] = False
+    for name in LAYERS:
+        one, other = getattr(old, name), getattr(new, name)
+        if one is not None:
+            a, b = one[before], other[now]
+            inside[now] |= ~((a == b) | ((a != a) & (b != b)))
+    return changed

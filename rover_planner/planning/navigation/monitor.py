@@ -1,0 +1,219 @@
+"""Watches a drive: judges the rest of the accepted path again, and says when to stop."""
+
+import time
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.service_settings import ServiceSettings
+from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.navigation.drift import SuspensionDrift
+from rover_planner.planning.navigation.watched_path import Place, WatchedPath
+
+IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
+"""States of a monitor."""
+NO_POSE, OFF_PATH, SUSPENSION = "no_pose", "off_path", "suspension"
+"""Codes of a stop besides those of a verdict."""
+NEAR = 10.0
+"""Length of the part of the path that is judged before the whole rest [m]: the rover is told
+early of what is near."""
+SHARE = 0.25
+"""Share of the time that judging may take where the map changes all the time."""
+MAX_PAUSE = 0.2
+"""Longest pause after a judgement [s]."""
+DRIFT_TIME = 1.0
+"""Time for which a difference of the suspension must last to be a reason to stop [s]."""
+
+
+@dataclass(frozen=True)
+class WatchSettings:
+    """Limits of a monitor."""
+
+    max_offset: float = 0.5
+    """Largest distance of the rover from its path [m]."""
+    pose_timeout: float = 1.0
+    """Time without a measured pose after which the rover is to stop [s]."""
+    max_mismatch: float = 0.3
+    """Difference of measured and predicted suspension angles from which the rover is to stop if it
+    lasts [rad]; 0 never stops for it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What a monitor looks at."""
+
+    situation: Situation
+    """Settings, map and measured suspension."""
+    pose: NDArray[np.float64] | None
+    """(3,) x, y [m] and yaw [rad] of the body, measured just now; None if it is not known."""
+    time: float
+    """Time of the steady clock [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What a monitor has found."""
+
+    state: str
+    """IDLE, WATCHING, STOPPED or ARRIVED."""
+    path_hash: str = ""
+    """Hash of the watched path."""
+    judgement: Judgement | None = None
+    """Why the rover is to stop, or the last judgement on the rest of the path."""
+    place: Place | None = None
+    """Where the rover is on the path."""
+    judged: int = 0
+    """Number of times that the rest of this path was judged."""
+    mismatch: dict[str, float] = field(default_factory=dict)
+    """Measured minus predicted suspension angle by joint [rad]; empty if it is not known."""
+
+    @property
+    def drift(self) -> float:
+        """The largest difference of a suspension angle [rad], NaN if it is not known."""
+        return max((abs(value) for value in self.mismatch.values()), default=float("nan"))
+
+
+class PathMonitor:
+    """Watches the path that was accepted last; after a stop it waits for the next one.
+
+    All methods belong to one thread.
+    """
+
+    def __init__(self, settings: WatchSettings):
+        self.settings = settings
+        """The limits."""
+        self._path: WatchedPath | None = None
+        self._drift = SuspensionDrift(DRIFT_TIME)
+        self._finding = Finding(IDLE)
+        self._judged_on: tuple[Terrain | None, ServiceSettings] | None = None
+        self._pose_time = 0.0
+        self._pause_end = 0.0
+
+    @property
+    def finding(self) -> Finding:
+        """What was found last."""
+        return self._finding
+
+    def take_path(self, path: WatchedPath, sight: Sight) -> bool:
+        """Watch a path from now on; return whether it is watched.
+
+        A path that the rover does not stand on answers a question about another place: the path
+        that is watched stays.
+        """
+        if sight.pose is not None:
+            offset = path.find_place(sight.pose).offset
+            if offset > self.settings.max_offset:
+                return False
+        self._path, self._judged_on, self._pose_time = path, None, sight.time
+        self._drift.forget()
+        self._finding = Finding(WATCHING, path.hash)
+        return True
+
+    def forget(self) -> None:
+        """Watch nothing until the next path."""
+        self._path, self._finding = None, Finding(IDLE, mismatch=self._finding.mismatch)
+
+    def stop(self, reason: Judgement) -> Finding:
+        """Stop the rover for a reason that was found elsewhere."""
+        self._finding = replace(self._finding, state=STOPPED, judgement=reason)
+        return self._finding
+
+    def look(self, sight: Sight) -> Finding:
+        """Compare the suspension, look at the rest of the path, and return what was found.
+
+        Raises:
+            PlanningError, RoverError: The rest cannot be judged with these settings.
+        """
+        self._compare_suspension(sight)
+        if self._path is None or self._finding.state != WATCHING:
+            return self._finding
+        refused = self._find_place(self._path, sight) or self._refuse_drift()
+        if refused is None:
+            refused = self._judge_rest(self._path, sight)
+        if refused is not None:
+            return self.stop(refused)
+        if self._has_arrived(self._path):
+            self._finding = replace(self._finding, state=ARRIVED)
+        return self._finding
+
+    def _find_place(self, path: WatchedPath, sight: Sight) -> Judgement | None:
+        """Find the place of the rover; return a refusal if it is unknown or off the path."""
+        if sight.pose is None:
+            missing = sight.time - self._pose_time
+            if missing <= self.settings.pose_timeout:
+                return None
+            return refusal(NO_POSE, f"the rover's pose is not known for {missing:.1f} s")
+        self._pose_time = sight.time
+        last = self._finding.place
+        place = path.find_place(sight.pose, None if last is None else last.index)
+        self._finding = replace(self._finding, place=place)
+        most = self.settings.max_offset
+        if place.offset <= most:
+            return None
+        reason = f"the rover is {place.offset:.2f} m beside its path, limit {most:.2f} m"
+        return refusal(OFF_PATH, reason)
+
+    def _compare_suspension(self, sight: Sight) -> None:
+        """Compare measured and predicted suspension where the rover stands."""
+        self._drift.take(sight.situation.compare_standing(), sight.time)
+        self._finding = replace(self._finding, mismatch=dict(self._drift.latest))
+
+    def _refuse_drift(self) -> Judgement | None:
+        """Return a refusal if the suspension has differed too much for some time."""
+        lasting, most = self._drift.lasting(), self.settings.max_mismatch
+        if not 0.0 < most < lasting:
+            return None
+        latest = self._drift.latest
+        joint = max(latest, key=lambda name: abs(latest[name]))
+        reason = (
+            f"measured and predicted suspension differ by {latest[joint]:+.3f} rad at {joint}, "
+            f"limit {most:.3f} rad: map, pose or model are wrong here"
+        )
+        return refusal(SUSPENSION, reason)
+
+    def _judge_rest(self, path: WatchedPath, sight: Sight) -> Judgement | None:
+        """Judge the rest of the path if map or settings are new; return it if it is refused."""
+        situation = sight.situation
+        missing = situation.refuse_map()
+        if missing is not None:
+            return missing
+        judged_on = situation.terrain, situation.settings
+        before = self._judged_on
+        if before is not None and all(a is b for a, b in zip(before, judged_on, strict=True)):
+            return None
+        if before is not None and sight.time < self._pause_end:
+            return None
+        begin = time.monotonic()
+        judgement = self._check_rest(path, situation)
+        taken = time.monotonic() - begin
+        self._pause_end = sight.time + taken + min(taken * (1.0 / SHARE - 1.0), MAX_PAUSE)
+        self._judged_on = judged_on
+        self._finding = replace(
+            self._finding, judgement=judgement, judged=self._finding.judged + 1
+        )
+        if judgement.traversable:
+            return None
+        assert judgement.candidate is not None
+        away = judgement.candidate.reach * judgement.candidate.length
+        return replace(judgement, reason=f"{away:.2f} m ahead: {judgement.reason}")
+
+    def _check_rest(self, path: WatchedPath, situation: Situation) -> Judgement:
+        """Judge the part of the path just ahead, and the rest if that may be driven."""
+        first = 0 if self._finding.place is None else self._finding.place.index
+        near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
+        if near < len(path.poses):
+            judgement = _check(situation, path.poses[first:near])
+            if not judgement.traversable:
+                return judgement
+        return _check(situation, path.poses[first:])
+
+    def _has_arrived(self, path: WatchedPath) -> bool:
+        place = self._finding.place
+        return place is not None and path.is_end(place.index)
+
+
+def _check(situation: Situation, poses: NDArray[np.float64]) -> Judgement:
+    return replace(situation, path=GivenPath(poses, "")).check_path()

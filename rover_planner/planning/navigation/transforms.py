@@ -1,0 +1,198 @@
+"""Transforms between frames with their times, as on /tf, and what leads from one to another."""
+
+import bisect
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from rover_planner.errors import PlanningError
+
+MEMORY = 10_000_000_000
+"""Time for which transforms are kept [ns], as in tf2."""
+NANOSECONDS = 1_000_000_000
+
+
+class TransformError(PlanningError):
+    """Two frames are not connected, or a transform is not known at the time that is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rigid:
+    """A rotation and a translation: p in the child frame is `rotation p + translation`."""
+
+    translation: NDArray[np.float64]
+    """(3,) x, y, z [m]."""
+    rotation: Rotation
+    """The rotation."""
+
+    @staticmethod
+    def from_rpy(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> "Rigid":
+        """Return a transform of a position [m] and angles [rad]; yaw is applied last."""
+        return Rigid(np.array([x, y, z]), Rotation.from_euler("xyz", [roll, pitch, yaw]))
+
+    @staticmethod
+    def none() -> "Rigid":
+        """Return the transform that changes nothing."""
+        return Rigid(np.zeros(3), Rotation.identity())
+
+    def then(self, inner: "Rigid") -> "Rigid":
+        """Return the transform that applies `inner` first, then this one."""
+        return Rigid(
+            self.rotation.apply(inner.translation) + self.translation,
+            self.rotation * inner.rotation,
+        )
+
+    def inverse(self) -> "Rigid":
+        """Return the transform back."""
+        back = self.rotation.inv()
+        return Rigid(-back.apply(self.translation), back)
+
+    @property
+    def xyyaw(self) -> NDArray[np.float64]:
+        """(3,) x, y [m] and yaw [rad] of the child frame's origin and x axis."""
+        ahead = self.rotation.apply([1.0, 0.0, 0.0])
+        return np.array([*self.translation[:2], np.arctan2(ahead[1], ahead[0])])
+
+
+@dataclass(frozen=True, eq=False)
+class StampedTransform:
+    """Where a child frame is in its parent frame at a time."""
+
+    parent: str
+    """Name of the parent frame."""
+    child: str
+    """Name of the child frame."""
+    stamp: int
+    """Time [ns]."""
+    rigid: Rigid
+    """Position and orientation of the child in the parent frame."""
+
+
+class _Edge:
+    """The transforms of one child frame in the last time, in the order of their stamps."""
+
+    def __init__(self, parent: str, is_static: bool):
+        self.parent, self.is_static = parent, is_static
+        self._stamps: list[int] = []
+        self._rigids: list[Rigid] = []
+
+    def add(self, stamp: int, rigid: Rigid) -> None:
+        if self.is_static:
+            self._stamps, self._rigids = [stamp], [rigid]
+            return
+        at = bisect.bisect_left(self._stamps, stamp)
+        if at < len(self._stamps) and self._stamps[at] == stamp:
+            self._rigids[at] = rigid
+            return
+        self._stamps.insert(at, stamp)
+        self._rigids.insert(at, rigid)
+        old = bisect.bisect_left(self._stamps, self._stamps[-1] - MEMORY)
+        del self._stamps[:old], self._rigids[:old]
+
+    @property
+    def newest(self) -> int:
+        return self._stamps[-1]
+
+    @property
+    def oldest(self) -> int:
+        return self._stamps[0]
+
+    def at(self, time: int) -> Rigid:
+        """Return the transform at a time; beyond the ends that of the nearest stamp."""
+        after = bisect.bisect_left(self._stamps, time)
+        if self.is_static or after == 0:
+            return self._rigids[0]
+        if after == len(self._stamps):
+            return self._rigids[-1]
+        first, last = self._stamps[after - 1], self._stamps[after]
+        share = (time - first) / (last - first)
+        a, b = self._rigids[after - 1], self._rigids[after]
+        turn = Slerp([0.0, 1.0], Rotation.concatenate([a.rotation, b.rotation]))
+        return Rigid((1.0 - share) * a.translation + share * b.translation, turn(share))
+
+
+class TransformTree:
+    """Keeps the transforms of the last seconds; each frame has one parent."""
+
+    def __init__(self, timeout: float):
+        self.timeout = timeout
+        """Age from which a transform is stale [s]."""
+        self._edges: dict[str, _Edge] = {}
+
+    def take(self, transform: StampedTransform, *, is_static: bool = False) -> None:
+        """Keep a transform; with another parent, or a clock set back, the old ones are dropped."""
+        edge = self._edges.get(transform.child)
+        stale = edge is not None and edge.newest - transform.stamp > MEMORY
+        if edge is None or edge.parent != transform.parent or edge.is_static != is_static or stale:
+            edge = self._edges[transform.child] = _Edge(transform.parent, is_static)
+        edge.add(transform.stamp, transform.rigid)
+
+    def knows(self, frame: str) -> bool:
+        """Return whether a frame is the parent or the child of a transform."""
+        return frame in self._edges or any(
+            edge.parent == frame for edge in list(self._edges.values())
+        )
+
+    def has_parent(self, frame: str) -> bool:
+        """Return whether a frame is the child of a transform."""
+        return frame in self._edges
+
+    def find(self, target: str, source: str, time: int | None, now: int) -> Rigid:
+        """Return where the source frame is in the target frame.
+
+        Args:
+            target: Name of the frame to transform to.
+            source: Name of the frame to transform from.
+            time: Time [ns, ROS time]; None is the newest that all transforms between them have.
+            now: Present time [ns, ROS time].
+
+        Raises:
+            TransformError: A frame is not known, the frames are not connected, a transform is
+                older than the timeout, or not kept for so long.
+        """
+        if target == source:
+            return Rigid.none()
+        up, down = self._chain(source), self._chain(target)
+        shared = next((frame for frame in up if frame in down), None)
+        if shared is None:
+            raise TransformError(f"no transforms connect the frames {source!r} and {target!r}")
+        steps = up[: up.index(shared)], down[: down.index(shared)]
+        moving = [c for part in steps for c in part if not self._edges[c].is_static]
+        at = min((self._edges[c].newest for c in moving), default=now) if time is None else time
+        for child in moving:
+            self._check(child, at, now)
+        found = [Rigid.none(), Rigid.none()]
+        for side, part in enumerate(steps):
+            for child in part:
+                found[side] = self._edges[child].at(at).then(found[side])
+        return found[1].inverse().then(found[0])
+
+    def _chain(self, frame: str) -> list[str]:
+        """Return a frame, its parent, the parent of that, and so on."""
+        chain = [frame]
+        while chain[-1] in self._edges:
+            parent = self._edges[chain[-1]].parent
+            if parent in chain:
+                raise TransformError(
+                    f"the transforms of {', '.join(chain)} form a circle; one frame has no parent"
+                )
+            chain.append(parent)
+        return chain
+
+    def _check(self, child: str, time: int, now: int) -> None:
+        """Raise if the transform of a child frame is stale, or not known at a time."""
+        edge = self._edges[child]
+        names = f"the transform from {child!r} to {edge.parent!r}"
+        age = (max(now, time) - edge.newest) / NANOSECONDS
+        if age > self.timeout:
+            raise TransformError(
+                f"{names} is stale: it is {age:.3f} s old, transform_timeout is {self.timeout:g} s"
+            )
+        early = (edge.oldest - time) / NANOSECONDS
+        if early > self.timeout:
+            raise TransformError(
+                f"{names} is not known {early:.3f} s before the oldest that is kept; use stamp 0 "
+                "for the newest"
+            )

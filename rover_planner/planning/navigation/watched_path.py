@@ -1,0 +1,68 @@
+"""The path that is driven, and where on it the rover is."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_planner.planning.angles import wrap
+
+LOOK_AHEAD = 2.0
+"""Distance along the path beyond the last place in which the next one is looked for [m]."""
+LOOK_BACK = 0.3
+"""The same before the last place [m]: a measured pose may jump back."""
+TURN_LENGTH = 0.3
+"""Distance [m] that counts as much as one radian of heading, to tell places where the path
+crosses itself or turns on the spot."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where on a path the rover is."""
+
+    index: int
+    """Index of the nearest waypoint."""
+    offset: float
+    """Distance from it [m]."""
+    remaining: float
+    """Length of the path beyond it [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedPath:
+    """An accepted path."""
+
+    poses: NDArray[np.float64]
+    """(n, 3) x, y [m] and yaw [rad] of the waypoints, map frame."""
+    hash: str = ""
+    """`msg_adapters.identity.path_hash` of the path as it was sent."""
+
+    @cached_property
+    def distances(self) -> NDArray[np.float64]:
+        """Distance (n,) of each waypoint from the start, along the path [m]."""
+        steps = np.hypot(*np.diff(self.poses[:, :2], axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def find_place(self, pose: NDArray[np.float64], last: int | None = None) -> Place:
+        """Return the waypoint that is nearest to a pose.
+
+        Args:
+            pose: (3,) x, y [m] and yaw [rad] of the body.
+            last: Index of the waypoint found last; only those around it are looked at. None looks
+                at all.
+        """
+        along = self.distances
+        first, end = 0, len(self.poses)
+        if last is not None:
+            first = int(np.searchsorted(along, along[last] - LOOK_BACK))
+            end = int(np.searchsorted(along, along[last] + LOOK_AHEAD, side="right"))
+        away = np.hypot(*(self.poses[first:end, :2] - pose[:2]).T)
+        turned = wrap(self.poses[first:end, 2] - pose[2])
+        nearest = int(np.argmin(np.hypot(away, TURN_LENGTH * turned)))
+        index = first + nearest
+        return Place(index, float(away[nearest]), float(along[-1] - along[index]))
+
+    def is_end(self, index: int) -> bool:
+        """Return whether a waypoint is the last one."""
+        return index >= len(self.poses) - 1

@@ -1,0 +1,136 @@
+"""A monitor finds the rest of the path and reasons to stop; a stop lasts until the next path."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.server_health import ERROR, OK, WARN
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.drift import SuspensionDrift
+from rover_planner.planning.navigation.monitor import (
+    ARRIVED,
+    IDLE,
+    STOPPED,
+    WATCHING,
+    PathMonitor,
+    Sight,
+    WatchSettings,
+)
+from rover_planner.planning.navigation.monitor_health import describe_watch
+from rover_planner.planning.navigation.watched_path import WatchedPath
+from rover_planner.planning.verdict_report import SuspensionReport
+from support.grounds import make_terrain, wall_at, waves
+
+STRAIGHT = np.column_stack([np.linspace(-2.0, 2.0, 201), np.zeros(201), np.zeros(201)])
+
+
+@pytest.fixture(scope="module")
+def service():
+    service = TraverseService(load_service_settings(TraverseServerParameters()))
+    service.take_terrain(make_terrain(waves))
+    return service
+
+
+def sight(service, pose, time=0.0, ground=waves):
+    service.take_terrain(make_terrain(ground))
+    pose = None if pose is None else np.array(pose)
+    return Sight(service.situation(), pose, time)
+
+
+def watching(service, **limits):
+    monitor = PathMonitor(WatchSettings(**limits))
+    assert monitor.take_path(WatchedPath(STRAIGHT, "abc"), sight(service, STRAIGHT[0]))
+    assert monitor.look(sight(service, STRAIGHT[0])).state == WATCHING
+    return monitor
+
+
+def test_the_place_follows_a_path_that_crosses_itself():
+    turn = np.linspace(0.0, 2.0 * np.pi, 200)
+    loop = np.column_stack([np.sin(2 * turn), np.sin(turn), turn])
+    path = WatchedPath(loop)
+    crossing = path.find_place(loop[100], last=95)
+    assert crossing.index == 100
+    assert path.find_place(np.array([0.0, 0.0, 0.0]), last=0).index < 10
+    assert path.find_place(loop[-1]).remaining == pytest.approx(0.0, abs=0.1)
+    on_the_spot = np.column_stack([np.zeros(50), np.zeros(50), np.linspace(0.0, 3.0, 50)])
+    assert WatchedPath(on_the_spot).find_place(np.array([0.0, 0.0, 1.5])).index in (24, 25)
+
+
+def test_a_wall_ahead_stops_and_one_behind_does_not(service):
+    monitor = watching(service)
+    assert monitor.look(sight(service, STRAIGHT[50], 1.0)).place.index == 50
+    found = monitor.look(sight(service, STRAIGHT[50], 2.0, wall_at(0.5)))
+    assert found.state == STOPPED and found.judgement.reason[0].isdigit()
+    assert monitor.look(sight(service, STRAIGHT[50], 3.0)).state == STOPPED  # the wall is gone
+    assert monitor.take_path(WatchedPath(STRAIGHT), sight(service, STRAIGHT[120], 4.0))
+    behind = sight(service, STRAIGHT[120], 5.0, lambda x, y: waves(x, y) + (x < -1.5))
+    assert monitor.look(behind).state == WATCHING
+
+
+def test_the_rest_is_judged_once_for_each_map(service):
+    monitor = watching(service)
+    one = sight(service, STRAIGHT[10], 10.0)
+    judged = [monitor.look(replace(one, time=10.0 + 0.1 * k)).judged for k in range(5)]
+    assert judged == [2] * 5
+    settings = service.settings
+    service.settings = replace(settings, query=replace(settings.query, friction=0.6))
+    assert monitor.look(sight(service, STRAIGHT[10], 20.0)).judged == 3
+    service.settings = settings
+
+
+def test_a_map_that_changes_all_the_time_leaves_time_for_others(service):
+    monitor = watching(service)
+    for k in range(20):
+        monitor.look(sight(service, STRAIGHT[10], 10.0 + 1e-3 * k))
+    assert monitor.finding.judged < 10
+
+
+def test_the_end_of_the_path_ends_the_watch(service):
+    monitor = watching(service)
+    for row in (60, 120, 200):
+        found = monitor.look(sight(service, STRAIGHT[row], float(row)))
+    assert found.state == ARRIVED
+    assert monitor.look(sight(service, STRAIGHT[200], 300.0, wall_at(0.5))).state == ARRIVED
+    monitor.forget()
+    assert monitor.look(sight(service, STRAIGHT[0], 301.0)).state == IDLE
+
+
+def test_a_rover_off_its_path_or_lost_is_to_stop(service):
+    monitor = watching(service, max_offset=0.3)
+    found = monitor.look(sight(service, (-2.0, 0.4, 0.0), 1.0))
+    assert (found.state, found.judgement.code) == (STOPPED, "off_path")
+    monitor = watching(service, pose_timeout=1.0)
+    assert monitor.look(sight(service, None, 0.9)).state == WATCHING
+    found = monitor.look(sight(service, None, 1.1))
+    assert found.judgement.code == "no_pose" and "1.1 s" in found.judgement.reason
+    assert not monitor.take_path(WatchedPath(STRAIGHT), sight(service, (0.0, 3.0, 0.0), 2.0))
+    assert monitor.finding.state == STOPPED
+
+
+def test_a_difference_counts_once_it_has_lasted():
+    drift = SuspensionDrift(1.0)
+    assert np.isnan(drift.size) and drift.lasting() == 0.0
+    for k in range(11):
+        size = 0.4 if k != 5 else 0.1
+        drift.take(SuspensionReport({"bogie_left": -size, "bogie_right": 0.0}, False), 0.1 * k)
+    assert drift.lasting() == pytest.approx(0.1)
+    for k in range(11, 18):
+        drift.take(SuspensionReport({"bogie_left": -0.4}, False), 0.1 * k)
+    assert drift.lasting() == pytest.approx(0.4) and drift.size == pytest.approx(0.4)
+    drift.take(None, 9.0)
+    assert drift.latest == {} and drift.lasting() == 0.0
+
+
+def test_health_tells_a_stop_then_drift_with_its_size(service):
+    monitor = watching(service)
+    found = replace(monitor.finding, mismatch={"bogie_left": -0.25})
+    assert describe_watch(monitor.finding, True, 0.1).level == OK
+    health = describe_watch(found, True, 0.1)
+    assert health.level == WARN and "0.250 rad" in health.message
+    assert health.values["mismatch bogie_left"] == "-0.2500 rad"
+    assert describe_watch(found, False, 0.3).level == OK
+    stopped = monitor.look(sight(service, None, 9.0))
+    assert describe_watch(stopped, True, 0.1).level == ERROR

@@ -1,0 +1,93 @@
+"""Transforms between frames are those of their time, and stale ones are refused with their age."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rover_planner.planning.navigation.transforms import (
+    Rigid,
+    StampedTransform,
+    TransformError,
+    TransformTree,
+)
+
+SECOND = 1_000_000_000
+NOW = 1000 * SECOND
+MAP_ODOM = Rigid.from_rpy(10.0, -4.0, 0.3, 0.02, -0.01, 1.2)
+ODOM_BASE = Rigid.from_rpy(2.0, 1.0, 0.1, 0.0, 0.1, -0.4)
+BASE_CAMERA = Rigid.from_rpy(0.3, 0.0, 0.5, 0.0, 0.6, 0.0)
+
+
+def matrix(rigid):
+    whole = np.eye(4)
+    whole[:3, :3], whole[:3, 3] = rigid.rotation.as_matrix(), rigid.translation
+    return whole
+
+
+def stamped(parent, child, rigid, stamp=NOW):
+    return StampedTransform(parent, child, stamp, rigid)
+
+
+@pytest.fixture
+def tree():
+    tree = TransformTree(0.5)
+    tree.take(stamped("map", "odom", MAP_ODOM))
+    tree.take(stamped("odom", "base_link", ODOM_BASE))
+    tree.take(stamped("base_link", "camera", BASE_CAMERA, 5), is_static=True)
+    return tree
+
+
+def test_chains_up_and_down_are_products_of_their_matrices(tree):
+    whole = matrix(MAP_ODOM) @ matrix(ODOM_BASE) @ matrix(BASE_CAMERA)
+    np.testing.assert_allclose(matrix(tree.find("map", "camera", None, NOW)), whole, atol=1e-12)
+    back = tree.find("camera", "map", None, NOW)
+    np.testing.assert_allclose(matrix(back) @ whole, np.eye(4), atol=1e-12)
+    tree.take(stamped("base_link", "wheel", ODOM_BASE, 7), is_static=True)
+    side = np.linalg.inv(matrix(BASE_CAMERA)) @ matrix(ODOM_BASE)
+    found = matrix(tree.find("camera", "wheel", None, NOW + 9 * SECOND))
+    np.testing.assert_allclose(found, side, atol=1e-12)  # static ones never age
+    assert matrix(tree.find("odom", "odom", None, NOW)).tolist() == np.eye(4).tolist()
+
+
+def test_a_time_between_two_stamps_is_interpolated(tree):
+    later = Rigid.from_rpy(3.0, 1.0, 0.1, 0.0, 0.1, -0.2)
+    tree.take(stamped("odom", "base_link", later, NOW + SECOND // 10))
+    half = tree.find("odom", "base_link", NOW + SECOND // 20, NOW + SECOND // 10)
+    np.testing.assert_allclose(half.translation, (2.5, 1.0, 0.1), atol=1e-12)
+    turn = (half.rotation * ODOM_BASE.rotation.inv()).magnitude()
+    assert turn == pytest.approx(0.5 * (later.rotation * ODOM_BASE.rotation.inv()).magnitude())
+
+
+def test_a_stale_transform_is_refused_with_its_age(tree):
+    tree.find("map", "base_link", None, NOW + SECOND // 2)
+    stale = r"'base_link' to 'odom' is stale: it is 0\.700 s old"
+    with pytest.raises(TransformError, match=stale):
+        tree.find("map", "base_link", None, NOW + 7 * SECOND // 10)
+    with pytest.raises(TransformError, match=r"0\.600 s old, transform_timeout is 0\.5 s"):
+        tree.find("map", "base_link", NOW + 6 * SECOND // 10, NOW)
+    with pytest.raises(TransformError, match=r"1\.000 s before the oldest"):
+        tree.find("map", "base_link", NOW - SECOND, NOW)
+
+
+def test_frames_without_a_connection_or_in_a_circle_are_refused(tree):
+    with pytest.raises(TransformError, match="no transforms connect the frames 'moon' and 'map'"):
+        tree.find("map", "moon", None, NOW)
+    assert tree.knows("map") and tree.knows("camera") and not tree.knows("moon")
+    tree.take(stamped("camera", "map", MAP_ODOM))
+    with pytest.raises(TransformError, match="circle"):
+        tree.find("map", "camera", None, NOW)
+
+
+def test_old_transforms_are_dropped_and_a_clock_set_back_starts_anew(tree):
+    for k in range(400):
+        tree.take(stamped("map", "odom", MAP_ODOM, NOW + k * SECOND // 10))
+    with pytest.raises(TransformError, match="before the oldest"):
+        tree.find("map", "odom", NOW + SECOND, NOW + 40 * SECOND)
+    tree.take(stamped("map", "odom", ODOM_BASE, 3 * SECOND))
+    found = tree.find("map", "odom", None, 3 * SECOND)
+    np.testing.assert_allclose(found.translation, ODOM_BASE.translation)
+
+
+def test_x_y_and_yaw_are_those_of_the_x_axis():
+    rigid = Rigid(np.array([1.0, 2.0, 3.0]), Rotation.from_euler("xyz", [0.2, 0.3, 2.0]))
+    np.testing.assert_allclose(rigid.xyyaw, (1.0, 2.0, 2.0), atol=1e-12)

@@ -1,0 +1,232 @@
+"""A robot with its own joint names, mirrored motors and an encoder offset is driven over DDS.
+
+The mock hardware takes commands as forward_command_controllers of the shipped controllers.yaml do,
+and sends joint states as their broadcaster does.
+"""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from geometry_msgs.msg import TwistStamped
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray
+
+from rover_physics.names import WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steered_drive import SteeredDrive
+from rover_physics.terrain.grid import save_terrain
+from rover_planner.nodes.rover_simulator import RoverSimulator
+from rover_planner.nodes.traction_controller import TractionController
+from rover_planner.ros.qos import sensor_qos, topic_qos
+from support.grounds import make_terrain
+from support.ros_fixtures import wait_until
+
+CONFIG = Path(__file__).resolve().parents[3] / "config" / "ros2_control"
+HARDWARE = {
+    "rocker_r": ("rocker_right", 1, 0.02),
+    "rocker_l": ("rocker_left", -1, 0.0),
+    "bogie_r": ("bogie_right", 1, 0.0),
+    "bogie_l": ("bogie_left", -1, 0.0),
+    "rr_drive": ("rear_right_wheel", 1, 0.0),
+    "mr_drive": ("middle_right_wheel", 1, 0.0),
+    "fr_drive": ("front_right_wheel", 1, 0.0),
+    "rl_drive": ("rear_left_wheel", -1, 0.0),
+    "ml_drive": ("middle_left_wheel", -1, 0.0),
+    "fl_drive": ("front_left_wheel", -1, 0.0),
+    "rr_steer": ("rear_right_steering", 1, 0.0),
+    "fr_steer": ("front_right_steering", 1, 0.0),
+    "rl_steer": ("rear_left_steering", -1, 0.0),
+    "fl_steer": ("front_left_steering", -1, 0.0),
+}
+"""How the robot is built: robot joint, model joint, sign and offset of the model's angle."""
+
+
+def read_config(name, node):
+    return yaml.safe_load((CONFIG / name).read_text())[node]["ros__parameters"]
+
+
+class MockHardware(Node):
+    """The joints of a robot and the controllers of a group of them."""
+
+    def __init__(self, ros):
+        super().__init__("hardware", context=ros.context)
+        self.angles = dict.fromkeys((model for model, _, _ in HARDWARE.values()), 0.0)
+        self.rates = dict.fromkeys(self.angles, 0.0)
+        self.commands: dict[str, dict[str, float]] = {}
+        """Last values of each group by model joint."""
+        self._states = self.create_publisher(JointState, "joint_states", sensor_qos())
+        self._imu = self.create_publisher(Imu, "imu", sensor_qos())
+        for group in ("wheel_efforts", "wheel_velocities", "steering_positions"):
+            joints = read_config("controllers.yaml", group)["joints"]
+            self.create_subscription(
+                Float64MultiArray, f"/{group}/commands", self._taker(group, joints), topic_qos()
+            )
+
+    def _taker(self, group, joints):
+        def take(message):
+            assert len(message.data) == len(joints)  # else a controller is deactivated
+            values = {}
+            for robot, value in zip(joints, message.data, strict=True):
+                model, sign, offset = HARDWARE[robot]
+                values[model] = sign * value + (offset if group == "steering_positions" else 0.0)
+            self.commands[group] = values
+
+        return take
+
+    def send(self, imu=None):
+        """Send the state of all joints as the robot names them, in an order of its own."""
+        state = JointState(name=sorted(HARDWARE))
+        for robot in state.name:
+            model, sign, offset = HARDWARE[robot]
+            state.position.append(sign * (self.angles[model] - offset))
+            state.velocity.append(sign * self.rates[model])
+        self._states.publish(state)
+        self._imu.publish(imu or Imu())
+
+
+class SimulatedRobot(MockHardware):
+    """Hardware whose physics is the simulator in the namespace /plant."""
+
+    def __init__(self, ros):
+        super().__init__(ros)
+        self._last_imu = None
+        self._torques = self.create_publisher(
+            Float64MultiArray, "/plant/traction_controller/commands", topic_qos()
+        )
+        self._twist = self.create_publisher(TwistStamped, "/plant/cmd_vel", sensor_qos())
+        self.wanted = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
+        self.speed = 0.06
+        self.create_subscription(JointState, "/plant/joint_states", self._pass_on, sensor_qos())
+        self.create_subscription(Imu, "/plant/imu", self._keep_imu, sensor_qos())
+
+    def _keep_imu(self, imu):
+        self._last_imu = imu
+
+    def _pass_on(self, state):
+        for name, angle, rate in zip(state.name, state.position, state.velocity, strict=True):
+            if name in self.angles:
+                self.angles[name], self.rates[name] = angle, rate
+        self.send(self._last_imu)
+        twist = TwistStamped()
+        twist.twist.linear.x = self.speed
+        self.wanted.publish(twist)
+        self._twist.publish(twist)
+        efforts = self.commands.get("wheel_efforts")
+        if efforts:
+            torques = [efforts[wheel] for wheel in WHEEL_JOINTS]
+            self._torques.publish(Float64MultiArray(data=torques))
+
+
+class KinematicRobot(MockHardware):
+    """Hardware whose motors reach every commanded rate and angle at once."""
+
+    def __init__(self, ros, speed, yaw_rate):
+        super().__init__(ros)
+        self._wanted = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
+        self.twist = TwistStamped()
+        self.twist.twist.linear.x, self.twist.twist.angular.z = speed, yaw_rate
+        self.create_timer(0.02, self._step)
+
+    def _step(self):
+        self.angles |= self.commands.get("steering_positions", {})
+        self.rates |= self.commands.get("wheel_velocities", {})
+        self.send()
+        self._wanted.publish(self.twist)
+
+
+@pytest.fixture
+def start(ros):
+    """Return a function that starts a controller of the shipped configuration."""
+
+    def start_controller(**others):
+        values = {
+            "joint_map": read_config("joints.yaml", "/**")["joint_map"],
+            "joints": read_config("joints.yaml", "traction_controller")["joints"],
+            "enabled_at_start": True,
+            "joint_states_timeout": 1.0,
+            "imu_timeout": 1.0,
+            "watchdog_timeout": 1.0,
+            "stamp_tolerance": 1.0,
+        } | others
+        groups = {
+            "commands": "wheel_efforts",
+            "velocity_commands": "wheel_velocities",
+            "steering_commands": "steering_positions",
+        }
+        words = ["--ros-args"]
+        for topic, group in groups.items():
+            words += ["-r", f"~/{topic}:=/{group}/commands"]
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        return ros.spin(
+            TractionController(context=ros.context, parameter_overrides=parameters, cli_args=words)
+        )
+
+    return start_controller
+
+
+def start_plant(ros, tmp_path):
+    save_terrain(tmp_path / "flat.npz", make_terrain(lambda x, y: 0.0 * x, half=4.0))
+    values = {"terrain_file": str(tmp_path / "flat.npz"), "follow_commands": True, "start_x": -1.0}
+    parameters = [Parameter(name, value=value) for name, value in values.items()]
+    return ros.spin(
+        RoverSimulator(context=ros.context, namespace="plant", parameter_overrides=parameters)
+    )
+
+
+def test_efforts_drive_the_robot_straight_ahead(ros, start, tmp_path):
+    plant = start_plant(ros, tmp_path)
+    ros.spin(SimulatedRobot(ros))
+    controller = start()
+    place = plant.simulation.plant.pose()
+    wait_until(lambda: plant.simulation.plant.pose()[0] > place[0] + 0.15, "the robot to drive")
+    moved = plant.simulation.plant.pose() - place
+    assert abs(moved[1]) < 0.02 and abs(moved[2]) < 0.05
+    assert controller.state == "driving"
+    angles = controller.service._suspension_angles
+    assert np.abs(angles).max() < 0.01  # the offset of the rocker's encoder is taken off
+
+
+def test_the_signs_matter(ros, start, tmp_path):
+    plant = start_plant(ros, tmp_path)
+    robot = ros.spin(SimulatedRobot(ros))
+    entries = read_config("joints.yaml", "/**")["joint_map"]
+    wrong = [entry.replace(":-1", "") if "_wheel" in entry else entry for entry in entries]
+    start(joint_map=wrong)
+    place = plant.simulation.plant.pose()
+    wait_until(lambda: any(robot.commands.get("wheel_efforts", {}).values()), "efforts")
+    time.sleep(4.0)  # with the right signs it drives 0.2 m
+    assert np.hypot(*(plant.simulation.plant.pose() - place)[:2]) < 0.1
+
+
+def test_without_names_the_joints_are_missed(ros, start):
+    ros.spin(KinematicRobot(ros, 0.03, 0.0))
+    names = ["rocker_right:rocker_right"]
+    controller = start(joint_map=names, joints=list(WHEEL_JOINTS))
+    time.sleep(1.0)
+    assert controller.state == "fault"
+    assert "joint_states" in controller._command.update.fault
+
+
+@pytest.mark.parametrize(("speed", "yaw_rate"), [(0.03, 0.03), (0.0, 0.05), (-0.03, 0.0)])
+def test_rates_and_steering_angles_are_those_of_the_commanded_motion(ros, start, speed, yaw_rate):
+    robot = ros.spin(KinematicRobot(ros, speed, yaw_rate))
+    start()
+    aims = SteeredDrive(load_rover("lsr1")).aim(speed, yaw_rate)
+    rates = aims.speeds / load_rover("lsr1").wheel.radius
+
+    def is_there():
+        found = robot.commands.get("wheel_velocities", {})
+        return found and np.allclose([found[one] for one in WHEEL_JOINTS], rates, atol=1e-6)
+
+    wait_until(is_there, "the rates")
+    for wheel, angle in zip(WHEEL_JOINTS, aims.angles, strict=True):
+        joint = wheel.replace("_wheel", "_steering")
+        if joint in robot.angles:
+            assert robot.angles[joint] == pytest.approx(angle, abs=1e-9)
+    robot.twist.twist.linear.x = robot.twist.twist.angular.z = 0.0
+    wait_until(lambda: not any(robot.commands["wheel_velocities"].values()), "the end")

@@ -1,0 +1,187 @@
+"""Questions in another frame, from where the rover is, and about a robot with another origin."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
+from rover_planner.nodes.nav2_services import PathValidity
+from rover_planner.nodes.navigation import frames
+from rover_planner.planning.navigation.transforms import Rigid
+from support.grounds import make_terrain, rocky
+from support.planner_client import GOAL, START, ask, verdict_of
+from support.ros_fixtures import wait_until
+
+MAP_ODOM = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
+"""Where odometry began, on the map."""
+
+
+def transform(parent, child, rigid, stamp):
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = parent, stamp
+    place, turn = message.transform.translation, message.transform.rotation
+    place.x, place.y, place.z = rigid.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
+    return message
+
+
+def send(server, *edges, age=0.0, take="take"):
+    """Give the server transforms of an age [s], as a TFMessage; tf2_msgs is not on PyPI."""
+    stamp = (server.get_clock().now() - Duration(seconds=age)).to_msg()
+    made = [transform(*edge, stamp) for edge in edges]
+    getattr(server.frames, take)(SimpleNamespace(transforms=made))
+
+
+def on_map(pose):
+    """Return a pose (3,) in odom as a PoseStamped in the frame map."""
+    level = Rigid.from_rpy(pose[0], pose[1], 0.0, 0.0, 0.0, pose[2])
+    return stamped_pose(MAP_ODOM.then(level).xyyaw, "map")
+
+
+@pytest.fixture
+def in_odom(start_server):
+    """Return a server whose map is in odom."""
+    server = start_server(map_frame="odom", transform_timeout=2.0)
+    server.service.take_terrain(make_terrain(rocky))
+    return server
+
+
+def test_a_goal_on_the_map_gets_the_answer_of_one_frame(in_odom, client):
+    single, _ = client.next_results(lambda: client.can_traverse(START, GOAL, frame="odom"))
+    send(in_odom, ("map", "odom", MAP_ODOM))
+    both, _ = client.next_results(lambda: client.plan(on_map(START), on_map(GOAL)))
+    assert single.poses and both.header.frame_id == "odom"
+    one, other = path_to_poses(single, "odom"), path_to_poses(both, "odom")
+    assert one.shape == other.shape
+    assert np.abs(one - other)[:, :2].max() < 1e-3
+    assert np.abs(one - other)[:, 2].max() < 1e-4
+    mixed, _ = client.next_results(lambda: client.plan(stamped_pose(START, "odom"), on_map(GOAL)))
+    assert np.abs(path_to_poses(mixed, "odom") - one)[:, :2].max() < 1e-3
+
+
+def test_a_path_on_the_map_is_judged_in_odom(in_odom, client):
+    send(in_odom, ("map", "odom", MAP_ODOM))
+    poses = [(x, 0.0, 0.0) for x in (-1.0, 0.0, 1.0)]
+    path = poses_path([(0.0, 0.0, 0.0)] * 3, "map")
+    path.poses = [on_map(pose) for pose in poses]
+    client.send_path(path)
+    wait_until(lambda: in_odom.service.path is not None, "the path")
+    np.testing.assert_allclose(in_odom.service.path, poses, atol=1e-9)
+    replies = []
+    validity = PathValidity(in_odom.desk, "odom", in_odom.publish, in_odom.frames.localise_path)
+    validity.take(SimpleNamespace(path=path), SimpleNamespace(), replies.append)
+    wait_until(lambda: replies, "the reply")
+    assert replies[0].is_valid
+
+
+def test_a_stale_or_missing_transform_is_refused_with_the_reason(in_odom, client):
+    send(in_odom, ("map", "odom", MAP_ODOM), age=7.5)
+    plan, results = client.next_results(lambda: client.plan(on_map(START), on_map(GOAL)))
+    verdict = verdict_of(results)
+    assert plan.poses == [] and verdict["code"] == "bad_request"
+    assert "the transform from 'odom' to 'map' is stale: it is 7.5" in verdict["reason"]
+    assert "transform_timeout is 2 s" in verdict["reason"]
+    _, results = client.next_results(lambda: client.can_traverse(START, GOAL, frame="moon"))
+    assert "it must be in 'odom'" in verdict_of(results)["reason"]
+
+
+def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client):
+    plan, results = client.next_results(
+        lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "map"))
+    )
+    assert "start is empty, which means where the rover is" in verdict_of(results)["reason"]
+    client.send_odometry(START)
+    wait_until(lambda: mapped.service.fresh_pose() is not None, "odometry")
+    plan, _ = client.next_results(lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "map")))
+    np.testing.assert_allclose(path_to_poses(plan, "map")[0], START, atol=1e-9)
+    nowhere = stamped_pose((1.0, 0.0, 0.0), "")  # has no frame, but is not empty
+    _, results = client.next_results(lambda: client.plan(nowhere, stamped_pose(GOAL, "map")))
+    assert "start is without a frame_id" in verdict_of(results)["reason"]
+
+
+def test_an_empty_start_is_where_tf_says_the_rover_is(in_odom, client):
+    client.send_odometry((0.5, 0.5, 0.0), "odom")  # less sure than /tf
+    wait_until(lambda: in_odom.service.fresh_pose() is not None, "odometry")
+    here = Rigid.from_rpy(*START[:2], 0.1, 0.05, 0.02, START[2])
+    send(in_odom, ("odom", "base_link", here))
+    plan, _ = client.next_results(lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "odom")))
+    np.testing.assert_allclose(path_to_poses(plan, "odom")[0], START, atol=1e-9)
+
+
+def test_the_monitor_follows_tf_without_odometry(start_server, client):
+    server = start_server(monitor=True, planner="fan", transform_timeout=5.0)
+    server.service.take_terrain(make_terrain(rocky))
+    send(server, ("map", "base_link", Rigid.from_rpy(*START[:2], 0.0, 0.0, 0.0, START[2])))
+    assert client.can_traverse(START, GOAL).poses
+    wait_until(lambda: server.watch.finding.place is not None, "the place")
+    assert server.watch.finding.place.index == 0 and server.watch.finding.state == "watching"
+    assert server.service.fresh_pose() is None
+
+
+def test_odometry_in_another_frame_is_transformed(mapped, client):
+    send(mapped, ("map", "odom", MAP_ODOM), take="take_static")
+    client.send_odometry((1.0, 2.0, 0.5), "odom")
+    wait_until(lambda: mapped.service.fresh_pose() is not None, "odometry")
+    right = MAP_ODOM.then(Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.5)).xyyaw
+    np.testing.assert_allclose(mapped.service.fresh_pose(), right, atol=1e-9)
+
+
+def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, client):
+    offset = [0.3, 0.0, 0.25, 0.0, 0.0, 0.0]
+    shifted = start_server(base_offset=offset)
+    shifted.service.take_terrain(make_terrain(lambda x, y: 0.0 * x))
+    plan, _, _ = ask(client, (-1.3, 0.0, 0.0), (0.7, 0.0, 0.0))
+    poses = path_to_poses(plan, "map")
+    np.testing.assert_allclose(poses[[0, -1]], [(-1.3, 0.0, 0.0), (0.7, 0.0, 0.0)], atol=1e-9)
+    body = shifted.watch._last_path.poses
+    np.testing.assert_allclose(body[[0, -1], 0], (-1.0, 1.0), atol=1e-9)
+    wheels = shifted.service.settings.rover.suspension.wheels["rear"]
+    stands = shifted.service.settings.rover.wheel.radius - wheels[2]  # of the body over the ground
+    assert plan.poses[0].pose.position.z == pytest.approx(stands - 0.25, abs=1e-3)
+    client.send_odometry((1.0, 0.0, np.pi / 2))
+    wait_until(lambda: shifted.service.fresh_pose() is not None, "odometry")
+    np.testing.assert_allclose(shifted.service.fresh_pose(), (1.0, 0.3, np.pi / 2), atol=1e-9)
+    client.send_path(poses_path([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], "map"))
+    wait_until(lambda: shifted.service.path is not None, "the path")
+    np.testing.assert_allclose(shifted.service.path[:, 0], (0.3, 1.3), atol=1e-9)
+    assert json.loads(client.check_path().message)["traversable"]
+
+
+def test_tf_topics_are_heard_where_their_type_is_installed(monkeypatch, start_server, client, ros):
+    monkeypatch.setattr(frames, "tf_message", lambda: TransformStamped)  # stands for TFMessage
+    monkeypatch.setattr(
+        frames.Frames, "take", lambda self, one: self._take([one], is_static=False)
+    )
+    monkeypatch.setattr(
+        frames.Frames, "take_static", lambda self, one: self._take([one], is_static=True)
+    )
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    static = client.create_publisher(TransformStamped, "/tf_static", latched)
+    moving = client.create_publisher(TransformStamped, "/tf", 10)
+    stamp = client.get_clock().now().to_msg()
+    static.publish(transform("base_link", "camera", MAP_ODOM, stamp))
+    server = start_server()
+    wait_until(lambda: moving.get_subscription_count(), "the subscription")
+    here = Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.3)
+    moving.publish(transform("map", "base_link", here, client.get_clock().now().to_msg()))
+    wait_until(lambda: server.frames._tree.has_parent("base_link"), "/tf")
+    wait_until(lambda: server.frames._tree.has_parent("camera"), "/tf_static")
+    np.testing.assert_allclose(server.frames.find_here(), (1.0, 2.0, 0.3), atol=1e-9)
+
+
+@pytest.mark.parametrize("wrong", ["nan", "length", "name"])
+def test_a_transform_that_is_none_is_refused(server, wrong):
+    message = transform("map", "odom", MAP_ODOM, server.get_clock().now().to_msg())
+    if wrong == "nan":
+        message.transform.translation.x = np.nan
+    elif wrong == "length":
+        message.transform.rotation.w += 0.5
+    else:
+        message.child_frame_id = ""
+    server.frames.take(SimpleNamespace(transforms=[message]))
+    assert not server.frames._tree.knows("map")

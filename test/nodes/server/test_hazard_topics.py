@@ -1,0 +1,88 @@
+"""The hazard map over real DDS: latched, followed by changes, and the same as the service's."""
+
+import numpy as np
+import pytest
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import GetMap
+from rclpy.node import Node
+
+from msg_adapters.results.hazard_grids import VALUES
+from rover_planner.ros.qos import latched_qos
+from support.grounds import make_terrain, waves
+from support.planner_client import SERVER
+from support.ros_fixtures import call, wait_until
+
+PASSABLE, IMPASSABLE, UNKNOWN = VALUES[0], VALUES[-1], -1
+
+
+def slope_and_rock(x, y):
+    """Return waves with a rock of 0.5 m at (2, 2)."""
+    return waves(x, y) + 0.5 * ((abs(x - 2.0) < 0.3) & (abs(y - 2.0) < 0.3))
+
+
+class Costmap(Node):
+    """A subscriber such as the static layer of a costmap."""
+
+    def __init__(self, ros, names):
+        super().__init__("costmap", context=ros.context)
+        self.grids: dict[str, list[OccupancyGrid]] = {name: [] for name in names}
+        for name, heard in self.grids.items():
+            self.create_subscription(
+                OccupancyGrid, f"{SERVER}/hazard_map/{name}", heard.append, latched_qos()
+            )
+        self.ask = self.create_client(GetMap, f"{SERVER}/get_hazard_map")
+
+
+def cells(grid, x=(-1.0, 1.0), y=(-1.0, 1.0)):
+    """Return the values of the cells in a part of the map [m]; the map may reach beyond."""
+    values = np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width)
+    cell, corner = grid.info.resolution, grid.info.origin.position
+    rows, columns = (
+        slice(*(round((end - first) / cell) for end in ends))
+        for ends, first in ((y, corner.y), (x, corner.x))
+    )
+    return values[rows, columns]
+
+
+def is_free(grids):
+    return bool(grids) and (cells(grids[-1]) == PASSABLE).all()
+
+
+@pytest.fixture
+def mapping(start_server, client):
+    server = start_server(hazard_map=True, hazard_headings=4)
+    client.send_terrain(make_terrain(waves, half=3.0))
+    return server
+
+
+def test_a_late_subscriber_gets_worst_best_and_one_heading(mapping, client, ros):
+    costmap = ros.spin(Costmap(ros, ("worst", "best", "heading_1")))
+    for grids in costmap.grids.values():
+        wait_until(lambda grids=grids: is_free(grids), "the whole map", 60.0)
+    grid, terrain = costmap.grids["worst"][-1], mapping.service.terrain
+    assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(0.05)
+    assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.025)
+    assert (grid.info.height, grid.info.width) == terrain.elevation.shape
+    assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
+    wait_until(
+        lambda: call(costmap.ask, GetMap.Request()).map.data == costmap.grids["worst"][-1].data,
+        "the same map from the service",
+    )
+
+
+def test_a_change_of_the_map_changes_the_grid_around_it(mapping, client, ros):
+    costmap = ros.spin(Costmap(ros, ("worst", "best")))
+    worst, best = costmap.grids["worst"], costmap.grids["best"]
+    wait_until(lambda: is_free(worst) and is_free(best), "the map", 60.0)
+    there, away = ((1.5, 2.5), (1.5, 2.5)), ((-2.0, 0.5), (-2.0, 0.5))
+    before = cells(worst[-1], *away)
+    client.send_terrain(make_terrain(slope_and_rock, half=3.0))
+    wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
+    np.testing.assert_array_equal(cells(worst[-1], *away), before)
+    wait_until(lambda: (cells(best[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
+
+
+def test_without_the_parameter_there_is_no_map(mapped, ros):
+    costmap = ros.spin(Costmap(ros, ("worst",)))
+    assert len(call(costmap.ask, GetMap.Request()).map.data) == 0
+    assert costmap.grids["worst"] == []

@@ -1,0 +1,113 @@
+"""Nav2's questions: which poses of a path are not passable, and a path to a pose."""
+
+from types import SimpleNamespace
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+
+from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
+from rover_planner.nodes.nav2_services import (
+    NO_VALID_PATH,
+    PathComputation,
+    PathValidity,
+    find_invalid_poses,
+)
+from rover_planner.planning.path_geometry import densify, next_given_poses
+from support.grounds import make_terrain, wall_at, waves
+from support.ros_fixtures import wait_until
+
+
+def ask(server, poses):
+    """Put a request to the handler of the service, as rclpy would; nav2_msgs is not on PyPI."""
+    replies = []
+    validity = PathValidity(server.desk, "map", server.publish)
+    request, response = SimpleNamespace(path=poses_path(poses, "map")), SimpleNamespace()
+    validity.take(request, response, replies.append)
+    wait_until(lambda: replies, "the reply")
+    return replies[0]
+
+
+def test_a_passable_path_is_valid_and_has_no_bad_pose(server):
+    server.service.take_terrain(make_terrain(waves))
+    answer = ask(server, [(-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    assert answer.is_valid and answer.invalid_pose_indices == []
+
+
+def test_the_poses_behind_a_wall_are_named(server):
+    server.service.take_terrain(make_terrain(wall_at(0.5)))
+    poses = [(x, 0.0, 0.0) for x in np.arange(-2.0, 0.6, 0.25)]
+    answer = ask(server, poses)
+    assert not answer.is_valid and answer.invalid_pose_indices
+    assert min(answer.invalid_pose_indices) > 4
+    assert all(0 <= index < len(poses) for index in answer.invalid_pose_indices)
+
+
+def test_a_path_that_cannot_be_judged_has_only_bad_poses(server):
+    answer = ask(server, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])  # there is no map
+    assert not answer.is_valid and answer.invalid_pose_indices == [0, 1]
+
+
+def test_each_waypoint_knows_the_given_pose_at_or_after_it():
+    poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.3, 1.0]])
+    given = next_given_poses(poses, 0.1)
+    dense = densify(poses, 0.1)
+    assert len(given) == len(dense) and given[0] == 0 and given[-1] == 3
+    places = [int(np.argmin(np.abs(dense - pose).sum(axis=1))) for pose in poses]
+    np.testing.assert_array_equal(given[places], range(4))
+    assert np.all(np.diff(given) >= 0)
+    codes = [""] * len(given)
+    codes[places[1] - 1] = "friction"
+    assert find_invalid_poses(codes, given) == [1]
+
+
+class GoalHandle:
+    """Stands for rclpy's ServerGoalHandle: it executes a goal by calling the server's callback."""
+
+    def __init__(self, computation, start, goal):
+        self.request = SimpleNamespace(
+            goal=stamped_pose(goal, "map"), start=PoseStamped(), use_start=start is not None
+        )
+        if start is not None:
+            self.request.start = stamped_pose(start, "map")
+        self.ends, self.result, self._computation = [], None, computation
+
+    def execute(self):
+        self.result = self._computation.finish(self)
+
+    def succeed(self):
+        self.ends.append("succeeded")
+
+    def abort(self):
+        self.ends.append("aborted")
+
+
+def compute(server, start, goal):
+    """Hand a goal to the handlers of the action, as rclpy would."""
+    result = SimpleNamespace
+    computation = PathComputation(server.desk, server._read_ends, server.publish, result)
+    handle = GoalHandle(computation, start, goal)
+    computation.take(handle)
+    wait_until(lambda: handle.ends, "the end of the goal")
+    return handle
+
+
+def test_a_path_to_a_pose_is_the_plan_of_can_traverse(server, client):
+    server.service.take_terrain(make_terrain(waves))
+    plan = path_to_poses(client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)), "map")
+    handle = compute(server, (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0))
+    assert handle.ends == ["succeeded"] and handle.result.error_code == 0
+    np.testing.assert_array_equal(path_to_poses(handle.result.path, "map"), plan)
+    client.send_odometry((-1.0, 0.0, 0.0))
+    wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
+    here = compute(server, None, (1.0, 0.2, 0.0))
+    np.testing.assert_allclose(path_to_poses(here.result.path, "map"), plan, atol=1e-9)
+
+
+def test_a_goal_without_a_path_is_aborted_with_a_code(start_server):
+    server = start_server(planner="fan")
+    assert compute(server, (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)).result.error_code == 201  # no map
+    server.service.take_terrain(make_terrain(wall_at(0.5)))
+    handle = compute(server, (-1.0, 0.0, 0.0), (1.5, 0.0, 0.0))
+    assert handle.ends == ["aborted"] and handle.result.error_code == NO_VALID_PATH
+    assert handle.result.path.poses == []
+    assert compute(server, None, (1.5, 0.0, 0.0)).result.error_code == 201  # nobody knows where

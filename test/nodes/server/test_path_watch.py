@@ -1,0 +1,219 @@
+"""The monitor stops the rover in time over real DDS, says why, and tells drift of the model."""
+
+import json
+import time
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry
+from nav_msgs.srv import GetPlan
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.paths import stamped_pose
+from rover_physics.prediction.sweep import sweep_path
+from rover_planner.ros.qos import latched_qos
+from support.grounds import make_terrain, wall_at, waves
+from support.planner_client import SERVER, verdict_of
+from support.ros_fixtures import call, wait_until
+
+START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
+
+
+def rock_ahead(x, y):
+    """Return waves with a rock of 0.4 m across the way from START to GOAL."""
+    return waves(x, y) + 0.4 * ((abs(x - 1.2) < 0.15) & (abs(y) < 2.0))
+
+
+def rock_behind(x, y):
+    """Return waves with such a rock behind the rover."""
+    return waves(x, y) + 0.4 * (x < -3.3)
+
+
+class Rover(Node):
+    """Publishes odometry and joints of a rover that stands, and hears ~/stop."""
+
+    def __init__(self, ros):
+        super().__init__("rover", context=ros.context)
+        self.pose, self.angles = START, {}
+        self._odometry = self.create_publisher(Odometry, "odometry", 10)
+        self._joints = self.create_publisher(JointState, "joint_states", 10)
+        self.stops: list[tuple[bool, float]] = []
+        self.statuses: list[DiagnosticStatus] = []
+        self.create_subscription(Bool, f"{SERVER}/stop", self._hear, latched_qos())
+        self.create_subscription(DiagnosticArray, "diagnostics", self._note, 10)
+        self.create_timer(0.05, self._publish)
+
+    def _hear(self, stop):
+        self.stops.append((stop.data, time.monotonic()))
+
+    def _note(self, message):
+        self.statuses += [one for one in message.status if one.name.endswith(": monitor")]
+
+    def _publish(self):
+        if self.pose is not None:
+            odometry = Odometry(child_frame_id="base_link")
+            odometry.header.frame_id = "map"
+            odometry.pose.pose = stamped_pose(self.pose, "map").pose
+            self._odometry.publish(odometry)
+        if self.angles:
+            angles = [float(angle) for angle in self.angles.values()]
+            self._joints.publish(JointState(name=list(self.angles), position=angles))
+
+    def wait_for_stop(self, value=True):
+        wait_until(lambda: self.stops and self.stops[-1][0] == value, f"stop {value}")
+        return self.stops[-1][1]
+
+    def wait_for_status(self, level, text):
+        def said():
+            last = self.statuses[-1:]
+            return last and last[0].level == level and text in last[0].message
+
+        wait_until(said, f"a status with {text!r}")
+
+    def monitor_values(self):
+        return {entry.key: entry.value for entry in self.statuses[-1].values}
+
+
+@pytest.fixture
+def watched(start_server, client, ros):
+    """Return a server that watches the way from START to GOAL, and its rover."""
+    server = start_server(monitor=True, planner="fan", candidate_count=1)
+    rover = ros.spin(Rover(ros))
+    client.send_terrain(make_terrain(waves))
+    wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
+    plan, _ = client.next_results(lambda: client.can_traverse(START, GOAL))
+    assert plan.poses
+    wait_until(lambda: server.watch.finding.state == "watching", "the watch")
+    rover.wait_for_stop(False)
+    return server, rover
+
+
+def test_a_rock_put_across_the_path_stops_the_rover_in_half_a_second(watched, client):
+    server, rover = watched
+    client.heard["verdict"].clear()
+    cloud = terrain_to_point_cloud(make_terrain(rock_ahead), "map")
+    sent = time.monotonic()
+    client.send_cloud(cloud)
+    assert rover.wait_for_stop() - sent < 0.5
+    wait_until(lambda: client.heard["verdict"], "the verdict")
+    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+    assert verdict["service"] == "monitor" and verdict["traversable"] == "false"
+    assert " m ahead: " in verdict["reason"]
+    assert verdict["map_hash"] == server.service.known_map.fingerprint
+    # The way from the front wheel at the start to the rock.
+    assert 2.0 < float(verdict["failure_distance"]) < 3.0
+    rover.wait_for_status(DiagnosticStatus.ERROR, verdict["reason"])
+
+
+def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros):
+    server, rover = watched
+    for name, value in (("waypoint_spacing", 0.005), ("candidate_count", 99)):
+        assert client.set_parameter(name, value)[0]
+    assert client.set_parameter("time_budget", 60.0)[0]
+    asker = ros.spin(Node("asker", context=ros.context))
+    service = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
+    assert service.wait_for_service(20.0)
+    there = stamped_pose(START, "map"), stamped_pose((3.0, 0.5, 0.0), "map")
+    future = service.call_async(GetPlan.Request(start=there[0], goal=there[1]))
+    wait_until(lambda: server.desk.open_count == 1, "the question")
+    time.sleep(0.2)
+    sent = time.monotonic()
+    client.send_cloud(terrain_to_point_cloud(make_terrain(rock_ahead), "map"))
+    assert rover.wait_for_stop() - sent < 0.5
+    assert not future.done()
+    server.desk.cancel("cancelled", "the end of the test")
+
+
+def test_a_stop_lasts_until_another_path_is_accepted(watched, client):
+    _, rover = watched
+    client.send_terrain(make_terrain(rock_ahead))
+    rover.wait_for_stop()
+    client.send_terrain(make_terrain(waves))
+    time.sleep(0.5)
+    assert rover.stops[-1][0]
+    assert client.can_traverse(START, GOAL).poses
+    rover.wait_for_stop(False)
+
+
+def test_a_rock_behind_the_rover_stops_nothing(watched, client):
+    server, rover = watched
+    judged = server.watch.finding.judged
+    client.send_terrain(make_terrain(rock_behind))
+    wait_until(lambda: server.watch.finding.judged > judged, "the judgement on the new map")
+    assert server.watch.finding.state == "watching" and not rover.stops[-1][0]
+
+
+def test_only_the_rest_of_the_path_counts(start_server, client, ros, watched):
+    server, rover = watched
+    for x in (-1.0, 0.0, 1.0, 1.8):
+        rover.pose = (x, 0.0, 0.0)
+        wait_until(
+            lambda x=x: server.watch.finding.place.remaining < 2.1 - x, f"the rover at {x} m"
+        )
+    judged = server.watch.finding.judged
+    client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.4 * (abs(x + 1.0) < 0.1)))
+    wait_until(lambda: server.watch.finding.judged > judged, "the judgement on the new map")
+    assert not rover.stops[-1][0]
+    rover.pose = GOAL
+    wait_until(lambda: server.watch.finding.state == "arrived", "the end of the path")
+
+
+def test_a_rover_beside_its_path_or_without_a_pose_is_stopped(watched, client):
+    _, rover = watched
+    rover.pose = (-2.0, 0.8, 0.0)
+    rover.wait_for_stop()
+    rover.wait_for_status(DiagnosticStatus.ERROR, "off_path")
+    rover.pose = START
+    time.sleep(0.3)
+    assert client.can_traverse(START, GOAL).poses
+    rover.wait_for_stop(False)
+    rover.pose = None
+    rover.wait_for_stop()
+    rover.wait_for_status(DiagnosticStatus.ERROR, "no_pose")
+
+
+def test_a_question_about_another_place_does_not_replace_the_watched_path(watched, client):
+    server, rover = watched
+    path = server.watch.finding.path_hash
+    assert client.can_traverse((-1.0, 2.0, 0.0), (1.0, 2.0, 0.0)).poses
+    time.sleep(0.5)
+    assert server.watch.finding.path_hash == path and not rover.stops[-1][0]
+
+
+def test_drift_of_the_suspension_is_a_warning_with_its_size_then_a_stop(watched):
+    server, rover = watched
+    standing = sweep_path(server.service.settings.rover, server.service.terrain, [START])
+    right = {"bogie_left": standing.bogie_angle[0, 1], "bogie_right": standing.bogie_angle[0, 0]}
+    rover.angles = right
+    wait_until(lambda: rover.statuses and "suspension_drift" in rover.monitor_values(), "drift")
+    assert float(rover.monitor_values()["suspension_drift"].split()[0]) < 1e-3
+    assert rover.statuses[-1].level == DiagnosticStatus.OK
+    rover.angles = right | {"bogie_left": right["bogie_left"] + 0.2}
+    rover.wait_for_status(DiagnosticStatus.WARN, "differ by 0.200 rad")
+    assert rover.monitor_values()["mismatch bogie_left"].startswith("+0.200")
+    assert not rover.stops[-1][0]
+    rover.angles = right | {"bogie_left": right["bogie_left"] + 0.4}
+    rover.wait_for_stop()
+    rover.wait_for_status(DiagnosticStatus.ERROR, "suspension")
+
+
+def test_the_service_turns_the_monitor_on_and_off(start_server, client, ros):
+    server = start_server(planner="fan", candidate_count=1)
+    rover = ros.spin(Rover(ros))
+    client.send_terrain(make_terrain(waves))
+    wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
+    assert client.can_traverse(START, GOAL).poses
+    switch = rover.create_client(SetBool, f"{SERVER}/monitor")
+    assert call(switch, SetBool.Request(data=True)).success
+    assert server.get_parameter("monitor").value is True
+    rover.wait_for_stop(False)
+    wait_until(lambda: server.watch.finding.state == "watching", "the watch")
+    client.send_terrain(make_terrain(wall_at(0.5)))
+    rover.wait_for_stop()
+    assert call(switch, SetBool.Request(data=False)).success
+    rover.wait_for_stop(False)
+    assert json.loads(client.check_poses(server, [START, GOAL]).message)["traversable"] is False
