@@ -160,6 +160,7 @@ class _Results:
 
     def _write_messages(self, answer: "Answer") -> None:
         """Write the messages that a server would publish, under its topics."""
+        from msg_adapters.joint_map import OWN_NAMES
         from msg_adapters.paths import PoseStock
         from msg_adapters.stamps import ns_to_stamp
         from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
@@ -175,6 +176,8 @@ class _Results:
             poses=PoseStock(),
             points=[],
             positive_steering=values.steering_sign,
+            joint_names=OWN_NAMES,
+            to_base=lambda plan: plan,
         )
         for topic in RESULT_KINDS:
             self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
