@@ -34,6 +34,13 @@ EXTRAS = {
     "plots": ["matplotlib>=3.6,<4"],
     "view": ["viser>=1.1,<2", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
     "bags": ["rosbags>=0.11,<1"],
+    "survey": [
+        "dask>=2024.8,<2027",
+        "distributed>=2024.8,<2027",
+        "zarr>=3.0,<4",
+        "rasterio>=1.4,<2",
+        "matplotlib>=3.6,<4",
+    ],
     "test": [
         "pytest>=7.4,<10",
         "pytest-xdist>=3.4,<4",
@@ -47,7 +54,9 @@ EXTRAS = {
         "mypy>=1.14,<3",
     ],
 }
-EXTRAS["all"] = EXTRAS["ros"] + EXTRAS["plots"] + EXTRAS["view"] + EXTRAS["bags"] + EXTRAS["test"]
+EXTRAS["all"] = [
+    one for name in ("ros", "plots", "view", "bags", "survey", "test") for one in EXTRAS[name]
+]
 
 
 def read_version() -> str:

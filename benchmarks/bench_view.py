@@ -20,7 +20,7 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.scenario import Pose
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
-from support.viewer_sessions import tolerant_rover
+from support.viewer.sessions import tolerant_rover
 
 LENGTH = 10.0
 """Distance between start and goal [m], or the longest that fits on the map."""

@@ -9,8 +9,10 @@ from rover_planner.command.figure4 import figure4
 from rover_planner.command.plan import plan, replay_plan
 from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
+from rover_planner.command.reachable import reachable
 from rover_planner.command.replay import replay
 from rover_planner.command.study import study
+from rover_planner.command.survey import survey
 from rover_planner.command.terrain import terrain
 from rover_planner.command.urdf import rover, urdf
 from rover_planner.command.view import view
@@ -32,6 +34,8 @@ app.command()(predict)
 app.command()(plan)
 app.command()(replay_plan)
 app.command(context_settings=NEGATIVE_ARGUMENTS)(reach)
+app.command()(survey)
+app.command()(reachable)
 app.command()(study)
 app.command()(view)
 app.command()(terrain)

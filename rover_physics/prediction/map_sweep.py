@@ -158,11 +158,11 @@ def score_all(models, places, works, scores, part):
             set_pose(models[0], poses, motions, i, works[chunk])
             evaluate_pose(models[0], works[chunk], works[chunk].result)
             status[i] = works[chunk].result.status
-            _write_score(works[chunk].result, i, numbers)
+            write_score(works[chunk].result, i, numbers)
 
 
 @kernel
-def _write_score(result, i, numbers):
+def write_score(result, i, numbers):
     """Write the score of a RESULT into column i of numbers (NUMBERS, n), as in `PoseScores`."""
     if result.status != PoseStatus.SETTLED:
         for k in range(NUMBERS):

@@ -19,7 +19,7 @@ def figure4(
     need("matplotlib", "the picture")
     from rover_physics.rover.rover_file import load_rover
     from rover_planner.figures.figure4 import draw_figure4
-    from rover_planner.progress import show_progress
+    from rover_planner.shell.progress import show_progress
 
     model = load_rover(rover)
     with show_progress() as progress:

@@ -122,7 +122,7 @@ def _ask(
     from rover_planner.nodes.warm_up import search_ways
     from rover_planner.planning.ways.way_report import report_way
     from rover_planner.planning.ways.way_search import find_way
-    from rover_planner.progress import show_progress
+    from rover_planner.shell.progress import show_progress
 
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")

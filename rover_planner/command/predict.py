@@ -96,7 +96,7 @@ def predict(
         write_prediction,
         writing_parts,
     )
-    from rover_planner.progress import show_progress
+    from rover_planner.shell.progress import show_progress
 
     model = load_rover(rover)
     ground = load_terrain(terrain, max_cells)

@@ -51,7 +51,7 @@ def reach(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_physics.traversability.reach import judge_reach
-    from rover_planner.progress import show_progress
+    from rover_planner.shell.progress import show_progress
 
     model, ground = load_rover(rover), load_terrain(terrain, max_cells)
     with show_progress() as progress:

@@ -23,7 +23,7 @@ def study(
     Exit code 0: it ran. 2: bad input.
     """
     need("matplotlib", "the picture of a study")
-    from rover_planner.progress import show_bar
+    from rover_planner.shell.progress import show_bar
     from rover_planner.studies.runner import count_trials, run_study
     from rover_planner.studies.study_file import load_study
     from rover_planner.studies.study_plot import draw_study

@@ -98,7 +98,7 @@ def _compile() -> None:
     from rover_physics.compilation import Compilation
     from rover_physics.warm_up import EXACT, UNCERTAIN
     from rover_planner.nodes.warm_up import WAYS
-    from rover_planner.progress import show_progress
+    from rover_planner.shell.progress import show_progress
 
     steps = (*EXACT, *UNCERTAIN, *WAYS)
     with show_progress() as progress, Compilation(steps) as compilation:

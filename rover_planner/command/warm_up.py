@@ -17,7 +17,7 @@ def warm_up(
     from rover_physics.numerics.kernel_cache import can_save_kernels, kernel_folder
     from rover_planner.errors import PlanningError
     from rover_planner.nodes.warm_up import GROUPS
-    from rover_planner.progress import show_names
+    from rover_planner.shell.progress import show_names
 
     if not can_save_kernels():
         raise PlanningError(

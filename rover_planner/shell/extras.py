@@ -10,6 +10,9 @@ INSTALL = {
     "matplotlib": "matplotlib: pip install 'rover_planner[plots]'",
     "rosbags": "rosbags: pip install 'rover_planner[bags]'",
     "viser": "viser: pip install 'rover_planner[view]'",
+    "distributed": "Dask: pip install 'rover_planner[survey]'",
+    "zarr": "Zarr: pip install 'rover_planner[survey]'",
+    "rasterio": "rasterio: pip install 'rover_planner[survey]'",
 }
 """Name of each optional module's package, and how to install it."""
 

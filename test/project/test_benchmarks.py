@@ -28,6 +28,7 @@ SMALL = {
     "poses": {"POSES": 20, "FLOOR_POSES": 10, "LINES": 2, "SPACING": 0.2},
     "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2},
     "start": {"STARTS": 1, "COLD_STARTS": 0},
+    "survey": {"CELLS": 96, "REPEATS": 1, "WORKERS": (1, 1), "TURNS": 1, "TASKS": 20},
     "traction": {"ALONE_TIME": 0.5, "TOGETHER_TIME": 1.0},
     "view": {},
     "walls": {"POSES": 5, "HEIGHTS": (0.3,)},
@@ -55,6 +56,8 @@ def params_of_topics():
 def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, capsys, threads):
     if topic == "mujoco":
         pytest.importorskip("mujoco", reason="install the extra bench")
+    if topic == "survey":
+        pytest.importorskip("distributed", reason="install the extra survey")
     module = importlib.import_module(f"benchmarks.bench_{topic}")
     for name, value in SMALL[topic].items():
         monkeypatch.setattr(module, name, value)

@@ -119,7 +119,9 @@ def programs(tmp_path) -> Path:
     folder = tmp_path / "programs"
     folder.mkdir()
     for name, (module, function) in console_scripts().items():
-        text = f"import sys\nfrom {module} import {function}\nsys.exit({function}())\n"
+        # As pip writes it: processes that are started import it again.
+        text = f"import sys\nfrom {module} import {function}\n"
+        text += f"if __name__ == '__main__':\n    sys.exit({function}())\n"
         (folder / name).write_text(f"#!{sys.executable}\n{text}")
     (folder / "python").write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
     for path in folder.iterdir():

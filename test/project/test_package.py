@@ -117,7 +117,7 @@ def test_every_configuration_file_is_installed_with_the_ament_marker(setup_argum
 
 def test_every_requirement_is_bounded_on_both_sides_and_locked(setup_arguments):
     extras = setup_arguments["extras_require"]
-    names = ("ros", "plots", "view", "bags", "test")
+    names = ("ros", "plots", "view", "bags", "survey", "test")
     assert extras["all"] == [line for name in names for line in extras[name]]
     locked = (TOP / "constraints.txt").read_text(encoding="utf-8")
     names = set(re.findall(r"^([a-z0-9.-]+)==", locked, re.MULTILINE))

@@ -21,7 +21,7 @@ from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import waves
 from support.ros_fixtures import wait_until
-from support.viewer_sessions import LSR1, ramp, session_on, slow_scenario
+from support.viewer.sessions import LSR1, ramp, session_on, slow_scenario
 
 STOP_TIME = 2.0
 """Longest time until work stops [s]; most steps take 0.05 s, few 0.4 s."""
@@ -188,7 +188,7 @@ def test_a_process_ends_although_work_runs_in_it():
         "import time\n"
         "from rover_planner.viewer.state.background_work import BackgroundWork\n"
         "from rover_planner.viewer.state.judging import JudgeRequest, judge_request\n"
-        "from support.viewer_sessions import slow_scenario\n"
+        "from support.viewer.sessions import slow_scenario\n"
         "work = BackgroundWork(judge_request, lambda: None)\n"
         "work.ask(JudgeRequest(slow_scenario()))\n"
         "while not work.progress.what: time.sleep(0.01)\n"

@@ -8,7 +8,7 @@ from rover_planner.viewer.panel.dashboard import describe_verdict
 from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain
-from support.viewer_sessions import LSR1, ramp, session_on
+from support.viewer.sessions import LSR1, ramp, session_on
 
 
 def verdicts(session) -> dict[str, bool | None]:

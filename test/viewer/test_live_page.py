@@ -14,8 +14,8 @@ from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.viewer.live.listener import LiveLink
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.state.session import ViewSession
-from support.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
 from support.grounds import make_terrain, waves
+from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
 
 pytestmark = [needs_browser, pytest.mark.slow]
 

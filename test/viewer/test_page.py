@@ -11,7 +11,8 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.studies.rover_values import read_rover
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession
-from support.browser import (
+from support.grounds import make_terrain, waves
+from support.viewer.browser import (
     ARGUMENTS,
     PROGRAM,
     WAIT,
@@ -20,8 +21,7 @@ from support.browser import (
     sync_api,
     wait_until,
 )
-from support.grounds import make_terrain, waves
-from support.viewer_sessions import ramp
+from support.viewer.sessions import ramp
 
 pytestmark = [needs_browser, pytest.mark.slow]
 

@@ -9,8 +9,8 @@ from rover_physics.traversability.judge_path import judge_path
 from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession
-from support.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
-from support.viewer_sessions import (
+from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
+from support.viewer.sessions import (
     GOAL,
     START,
     lowered_reef,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from support.ros_fixtures import wait_until
-from support.viewer_sessions import ramp, session_on
+from support.viewer.sessions import ramp, session_on
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 

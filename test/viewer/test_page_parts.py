@@ -23,7 +23,7 @@ from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer_sessions import LSR1, session_on, straight
+from support.viewer.sessions import LSR1, session_on, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 

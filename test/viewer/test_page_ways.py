@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rover_planner.viewer.pages.page import Page
-from support.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
 from support.grounds import wall_with_gap
-from support.viewer_sessions import walled_session
+from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
+from support.viewer.sessions import walled_session
 
 pytestmark = [needs_browser, pytest.mark.slow]
 

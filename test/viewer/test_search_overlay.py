@@ -7,7 +7,7 @@ import pytest
 
 from support.grounds import gap, make_terrain, wall_with_gap, whole_wall
 from support.ros_fixtures import wait_until
-from support.viewer_sessions import LSR1, walled_session
+from support.viewer.sessions import LSR1, walled_session
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 

@@ -22,7 +22,7 @@ from rover_planner.studies.rover_values import (
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import make_terrain, wall_at, waves
-from support.viewer_sessions import LSR1, session_on, straight
+from support.viewer.sessions import LSR1, session_on, straight
 
 # The values of a rover.
 

@@ -15,7 +15,7 @@ from rover_planner.viewer.state.judging import PATH, POLICY, WAY, JudgeRequest, 
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
 from support.ros_fixtures import wait_until
-from support.viewer_sessions import LSR1, walled_session
+from support.viewer.sessions import LSR1, walled_session
 
 GOAL = (1.6, 0.0, 0.0)
 """A pose on the other side of the wall."""

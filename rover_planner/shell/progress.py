@@ -52,6 +52,32 @@ def show_bar(name: str, total: int) -> Iterator[Callable[[], None]]:
 
 
 @contextmanager
+def show_rate(name: str, total: int, unit: str) -> Iterator[Callable[[int], None]]:
+    """Show a progress bar with the rate of the work; show nothing if stderr is not a terminal.
+
+    Yields:
+        A function to call with the number of pieces of work that are done, of `total`.
+    """
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda count: None
+        return
+    rate = TextColumn("{task.fields[rate]}")
+    columns = (*Progress.get_default_columns()[:3], rate, TimeRemainingColumn())
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(name, total=total, rate="")
+        began, done = time.monotonic(), 0
+
+        def advance(count: int) -> None:
+            nonlocal done
+            done += count
+            rate = done / max(time.monotonic() - began, 1e-9)
+            progress.update(task, completed=done, rate=f"{rate:,.0f} {unit}/s")
+
+        yield advance
+
+
+@contextmanager
 def show_names(total: int) -> Iterator[Callable[[str], None]]:
     """Show a progress bar with the name of the current piece of work; lines if no terminal.
 

@@ -1,0 +1,91 @@
+"""The command `rover_planner reachable`: where a rover can go on a survey and return from."""
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rover_planner.errors import PlanningError
+from rover_planner.shell.extras import need
+
+if TYPE_CHECKING:
+    from rover_planner.survey.reachable import ReachableArea
+    from rover_planner.survey.store import SurveyStore
+
+
+def reachable(
+    store: Annotated[Path, typer.Argument(metavar="OUT", help="Zarr store of a survey.")],
+    start: Annotated[
+        str, typer.Option("--from", metavar="X,Y", help="Start in m, in the map's coordinates.")
+    ],
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the area on the map, .png.")
+    ] = None,
+    geotiff: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the length of the ways as GeoTIFF (COG)."),
+    ] = None,
+) -> None:
+    """Find the cells that the rover can reach from a place and return from.
+
+    Exit code 0: it ran, with any answer. 2: bad input.
+    """
+    need("zarr", "a survey")
+    if geotiff is not None:
+        need("rasterio", "a GeoTIFF")
+    if picture is not None:
+        need("matplotlib", "the picture of a survey")
+    x, y = _read_place(start)
+    from rover_planner.shell.progress import show_progress
+    from rover_planner.survey.reachable import find_reachable
+    from rover_planner.survey.store import SurveyStore
+
+    opened = SurveyStore(store)
+    with show_progress() as progress:
+        progress("search what can be reached")
+        area = find_reachable(opened, x, y)
+    if geotiff is not None:
+        from rover_planner.survey.geotiff import write_cog
+
+        write_cog(geotiff, area.distance, opened.notes.frame, opened.notes.layout.step)
+    if picture is not None:
+        from rover_planner.figures.survey_picture import draw_reachable
+
+        draw_reachable(picture, opened, area)
+    typer.echo(json.dumps(_report(opened, area)))
+
+
+def _report(store: "SurveyStore", area: "ReachableArea") -> dict[str, Any]:
+    """Return what is printed."""
+    notes = store.notes
+    farthest = area.farthest
+    place, longest = None, None
+    if farthest is not None:
+        left, low = notes.frame.origin
+        place = [left + farthest[1] * notes.cell, low + farthest[0] * notes.cell]
+        longest = round(float(area.distance[farthest]), 3)
+    return {
+        "cells": area.cells,
+        "area": round(area.area, 6),
+        "cells_without_return": area.reached - area.cells,
+        "longest": longest,
+        "farthest": place,
+        "turns": "judged" if notes.turns else "assumed",
+    }
+
+
+def _read_place(text: str) -> tuple[float, float]:
+    """Return the place of the option --from.
+
+    Raises:
+        PlanningError: It is not two numbers.
+    """
+    try:
+        x, y = map(float, text.split(","))
+    except ValueError:
+        x = y = math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise PlanningError(f"--from is {text!r}; it must be two numbers with a comma: x,y")
+    return x, y

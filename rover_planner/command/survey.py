@@ -1,0 +1,168 @@
+"""The command `rover_planner survey`: judges a rover all over a map, on one machine or many."""
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rover_planner.command.options import (
+    MAX_CELLS,
+    Friction,
+    MaxCells,
+    MaxGap,
+    Policy,
+    RoverName,
+    Sigmas,
+)
+from rover_planner.shell.exit_codes import EXIT_FAILED, EXIT_OK
+from rover_planner.shell.extras import need
+from rover_planner.shell.one_line import MAX_LINE, one_line
+
+if TYPE_CHECKING:
+    from rover_planner.survey.runner import SurveyOutcome
+    from rover_planner.survey.survey import PreparedSurvey
+
+
+def survey(
+    rover: RoverName,
+    map_name: Annotated[
+        str,
+        typer.Argument(
+            metavar="MAP", help="Preset (spirit), elevation map, .npz, or GeoTIFF, .tif."
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Argument(metavar="OUT", help="Zarr store; goes on with one of the same survey."),
+    ],
+    headings: Annotated[int, typer.Option(metavar="N", help="Number of headings.")] = 16,
+    step: Annotated[
+        int, typer.Option(metavar="CELLS", help="Distance of surveyed cells in map cells.")
+    ] = 1,
+    policy: Policy = "equal",
+    friction: Friction = None,
+    turns: Annotated[
+        bool, typer.Option("--turns", help="Judge turns on the spot, too; takes up to 3 x.")
+    ] = False,
+    sigmas: Sigmas = 3.0,
+    max_gap: MaxGap = 0.0,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Dask scheduler, tcp://...; default: this machine's cores."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Worker processes on this machine.")
+    ] = None,
+    memory_limit: Annotated[
+        str | None, typer.Option(metavar="SIZE", help="Memory of a worker, such as 1GiB.")
+    ] = None,
+    chunk: Annotated[
+        int | None,
+        typer.Option(metavar="CELLS", help="Side of a chunk in surveyed cells."),
+    ] = None,
+    geotiff: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write each layer as GeoTIFF (COG), too."),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the classes on the map, .png.")
+    ] = None,
+    max_cells: MaxCells = MAX_CELLS,
+) -> int:
+    """Judge a rover at all cells of a map and all headings; write the results to a Zarr store.
+
+    Exit code 0: it ran. 1: some chunks failed, the rest stands. 2: bad input.
+    """
+    for module in ("distributed", "zarr"):
+        need(module, "a survey")
+    if geotiff is not None or Path(map_name).suffix.lower() in (".tif", ".tiff"):
+        need("rasterio", "a GeoTIFF")
+    if picture is not None:
+        need("matplotlib", "the picture of a survey")
+    from rover_physics.prediction.sweep_options import SweepOptions
+    from rover_physics.rover.rover_file import load_rover
+    from rover_planner.survey.request import SurveyRequest
+    from rover_planner.survey.runner import ClusterSettings, check_settings
+    from rover_planner.survey.survey import prepare_survey
+
+    settings = ClusterSettings(scheduler, workers, memory_limit)
+    check_settings(settings)
+    request = SurveyRequest(
+        load_rover(rover),
+        SweepOptions(policy=policy, friction=friction),
+        headings=headings,
+        step=step,
+        turns=turns,
+        sigmas=sigmas,
+    )
+    prepared = prepare_survey(request, map_name, out, chunk, max_cells, max_gap)
+    began = time.monotonic()
+    with prepared.store.locked():
+        outcome = _run(prepared, settings)
+    if geotiff is not None:
+        from rover_planner.survey.geotiff import write_layers
+
+        write_layers(prepared.store, geotiff)
+    if picture is not None:
+        from rover_planner.figures.survey_picture import draw_survey
+
+        draw_survey(picture, prepared.store)
+    typer.echo(json.dumps(_report(prepared, outcome, time.monotonic() - began)))
+    if outcome is None or not outcome.failed:
+        return EXIT_OK
+    typer.echo(one_line(_name_failures(outcome), MAX_LINE), err=True)
+    return EXIT_FAILED
+
+
+def _run(prepared: "PreparedSurvey", settings: Any) -> "SurveyOutcome | None":
+    """Survey what is not finished; None if all is."""
+    from rover_planner.shell.progress import show_progress, show_rate
+    from rover_planner.survey.runner import run_survey
+    from rover_planner.survey.warm_up import warm_up_survey
+
+    if not prepared.chunks:
+        return None
+    job = prepared.job
+    with show_progress() as progress:
+        progress("load the model (the first run compiles it)")
+        warm_up_survey(job.request)
+    layout, headings = job.layout, job.request.headings
+    total = sum(_poses(layout.cells_of(chunk), headings) for chunk in prepared.chunks)
+    with show_rate("survey", total, "poses") as advance:
+        return run_survey(job, prepared.chunks, settings, lambda report: advance(report.poses))
+
+
+def _poses(cells: tuple[slice, slice], headings: int) -> int:
+    rows, columns = cells
+    return (rows.stop - rows.start) * (columns.stop - columns.start) * headings
+
+
+def _report(
+    prepared: "PreparedSurvey", outcome: "SurveyOutcome | None", seconds: float
+) -> dict[str, Any]:
+    """Return what is printed at the end."""
+    from rover_planner.survey.summary import summarise
+
+    poses = 0 if outcome is None else outcome.poses
+    return {
+        "out": str(prepared.store.path),
+        **summarise(prepared.store),
+        "chunks": prepared.finished + len(prepared.chunks),
+        "chunks_found": prepared.finished,
+        "chunks_done": 0 if outcome is None else outcome.done,
+        "chunks_failed": [] if outcome is None else [list(chunk) for chunk in outcome.failed],
+        "poses": poses,
+        "seconds": round(seconds, 3),
+        "poses_per_second": round(poses / seconds, 1) if seconds > 0.0 else None,
+    }
+
+
+def _name_failures(outcome: "SurveyOutcome") -> str:
+    names = ", ".join(f"[{i}, {j}]" for i, j in list(outcome.failed)[:5])
+    more = f" and {len(outcome.failed) - 5} more" if len(outcome.failed) > 5 else ""
+    why = next(iter(outcome.failed.values()))
+    return f"rover_planner: chunks {names}{more} failed: {why}"

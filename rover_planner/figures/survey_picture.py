@@ -1,0 +1,152 @@
+"""Draws a survey: classes, or what can be reached, on the shaded map with legend and scale bar."""
+
+import math
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+
+from rover_physics.traversability.classification import IMPASSABLE, TRAVERSABILITY_CLASSES
+from rover_planner.figures.pictures import STYLE, save_figure
+from rover_planner.figures.plots import REFUSED, hill_shade
+from rover_planner.survey.chunk_survey import open_map
+from rover_planner.survey.layers import CLASS_NUMBERS, LIMIT_NUMBERS, NOT_SURVEYED
+from rover_planner.survey.reachable import ReachableArea
+from rover_planner.survey.store import SurveyStore
+
+# The palette of Okabe and Ito, from best to worst class, and where the heading decides.
+_COLOURS = ("#009E73", "#56B4E9", "#E69F00", REFUSED, "#F0E442")
+_IMPASSABLE, _SOME_HEADINGS = CLASS_NUMBERS[IMPASSABLE], len(CLASS_NUMBERS)
+_OFF_GROUND = [LIMIT_NUMBERS[code] for code in ("off_map", "unknown_ground")]
+_UNKNOWN, _INK = "#CCD6E6", "#222222"
+_MAX_CELLS = 1200
+_STRENGTH = 0.55
+_Extent = tuple[float, float, float, float]
+
+
+def draw_survey(path: Path, store: SurveyStore) -> None:
+    """Draw the worst class of each cell over the headings, and where the heading decides.
+
+    Args:
+        path: Picture to write; its suffix sets the format, such as .png.
+        store: The survey.
+
+    Raises:
+        PlanningError: The file cannot be written, or the map cannot be read any more.
+    """
+    every = _thinning(store)
+    worst, best = (store.layer(name)[::every, ::every] for name in ("worst_class", "best_class"))
+    decides = (worst == _IMPASSABLE) & (best < _IMPASSABLE)
+    shown = np.where(decides, _SOME_HEADINGS, worst).astype(float)
+    limits = store.layer("first_limit")[::every, ::every]
+    shown[(worst == NOT_SURVEYED) | ((best == _IMPASSABLE) & np.isin(limits, _OFF_GROUND))] = (
+        np.nan
+    )
+    names = (*TRAVERSABILITY_CLASSES, "passable at some headings")
+    labels = [*zip(names, _COLOURS, strict=True), ("unknown ground or edge", _UNKNOWN)]
+    rover = store.notes.description["rover"]["name"]
+    title = f"{rover}: worst class over {store.notes.headings} headings"
+    _draw(path, store, shown, (ListedColormap(_COLOURS), 0.0, len(_COLOURS) - 1.0), labels, title)
+
+
+def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
+    """Draw the cells that can be reached and returned from, coloured by the length of the way.
+
+    Args:
+        path: Picture to write; its suffix sets the format, such as .png.
+        store: The survey.
+        area: What can be reached.
+
+    Raises:
+        PlanningError: As `draw_survey`.
+    """
+    every = _thinning(store)
+    distance = area.distance[::every, ::every]
+    shown = np.where(np.isfinite(distance), distance, np.nan)
+    farthest = area.farthest
+    longest = 0.0 if farthest is None else float(area.distance[farthest])
+    title = f"reached and returned from: {area.area:.0f} m2, longest way {longest:.1f} m"
+    colours = matplotlib.colormaps["viridis"]
+    labels = [(f"way of {share * longest:.0f} m", colours(share)) for share in (0.0, 0.5, 1.0)]
+    left, low = store.notes.frame.origin
+    start = left + area.start[1] * area.cell, low + area.start[0] * area.cell
+    _draw(path, store, shown, (colours, 0.0, max(longest, 1e-9)), labels, title, start)
+
+
+def _draw(path, store, shown, scale, labels, title, start=None) -> None:
+    """Draw values (rows, columns) over the map.
+
+    Args:
+        path: The picture.
+        store: The survey.
+        shown: Values, NaN where nothing is drawn.
+        scale: Colour map, and the values at its ends.
+        labels: Text and colour of each entry of the legend.
+        title: Title.
+        start: x, y of the start [m] (default: none).
+    """
+    colours, least, most = scale
+    frame, (rows, columns) = store.notes.frame, store.notes.layout.map_shape
+    half = 0.5 * frame.resolution
+    x, y = frame.origin[0] - half, frame.origin[1] - half
+    extent = x, x + columns * frame.resolution, y, y + rows * frame.resolution
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(8.5, 7.5), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots()
+        axes.grid(False)
+        axes.set_facecolor(_UNKNOWN)
+        _draw_ground(axes, store, extent)
+        axes.imshow(shown, origin="lower", extent=_extent_of_cells(store, shown.shape),
+                    cmap=colours, vmin=least, vmax=most, alpha=_STRENGTH,
+                    interpolation="nearest")  # fmt: skip
+        if start is not None:
+            axes.plot(*start, "o", color=_INK, markersize=7, markeredgecolor="white")
+        axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=extent[:2], ylim=extent[2:])
+        axes.set_title(title, loc="left")
+        axes.legend(
+            handles=[Patch(color=colour, label=text) for text, colour in labels],
+            loc="upper left", frameon=True, framealpha=0.85,
+        )  # fmt: skip
+        _draw_scale_bar(axes, extent)
+        save_figure(path, figure)
+
+
+def _draw_ground(axes: Axes, store: SurveyStore, extent: _Extent) -> None:
+    rows, columns = store.notes.layout.map_shape
+    every = max(1, -(-max(rows, columns) // _MAX_CELLS))
+    box = slice(0, rows), slice(0, columns)
+    heights = open_map(store.path, store.notes.map_file).read(box, every)["elevation"]
+    if min(heights.shape) < 2:
+        return
+    shade = hill_shade(heights, store.notes.frame.resolution * every)
+    axes.imshow(shade, origin="lower", extent=extent, cmap="gray", vmin=0.0, vmax=1.1)
+
+
+def _draw_scale_bar(axes: Axes, extent: _Extent) -> None:
+    """Draw a bar of a round length, about a fifth of the map's width."""
+    width, height = extent[1] - extent[0], extent[3] - extent[2]
+    length = 10.0 ** math.floor(math.log10(0.25 * width))
+    length *= max(k for k in (1, 2, 5) if k * length <= 0.25 * width)
+    x, y = extent[1] - 0.05 * width - length, extent[2] + 0.04 * height
+    axes.add_patch(Rectangle((x, y), length, 0.012 * height, color=_INK))
+    plate = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
+    middle, above = x + 0.5 * length, y + 0.02 * height
+    axes.text(middle, above, f"{length:g} m", ha="center", color=_INK, bbox=plate)
+
+
+def _thinning(store: SurveyStore) -> int:
+    """Return every how many cells are drawn."""
+    return max(1, -(-max(store.notes.layout.shape) // _MAX_CELLS))
+
+
+def _extent_of_cells(store: SurveyStore, shape: tuple[int, ...]) -> _Extent:
+    """Return the edges of the drawn cells [m]."""
+    notes, size = store.notes, store.notes.cell * _thinning(store)
+    x, y = (start - 0.5 * size for start in notes.frame.origin)
+    return x, x + shape[1] * size, y, y + shape[0] * size

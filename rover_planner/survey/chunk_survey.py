@@ -1,0 +1,151 @@
+"""The survey of one chunk: the work of one task, in whatever process it runs."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+
+import rover_physics
+from rover_physics.prediction.evaluation import RESULT
+from rover_physics.terrain.ground import BLOCK
+from rover_planner.errors import PlanningError
+from rover_planner.survey.geotiff import GeoTiffMap
+from rover_planner.survey.layers import types_of_layers
+from rover_planner.survey.layout import Box, Index, SurveyLayout
+from rover_planner.survey.map_source import Grids, MapSource, StoredMap, make_tile_terrain
+from rover_planner.survey.request import SurveyRequest
+from rover_planner.survey.store import SurveyStore, is_refusal
+from rover_planner.survey.tile_survey import BATCH, survey_tile
+
+BYTES_OF_CELL = 60
+"""Memory of a map cell of a chunk with all layers, as read and as the kernels read it."""
+BYTES_OF_PROCESS = 450_000_000
+"""Memory of a worker before its first chunk: interpreter, libraries and compiled kernels."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyJob:
+    """All that a worker needs to know; small, as it goes with each task."""
+
+    request: SurveyRequest
+    """What is asked."""
+    layout: SurveyLayout
+    """Cells and chunks."""
+    store: Path
+    """Folder of the store, seen by all workers."""
+    map_file: str
+    """GeoTIFF file of the map, seen by all workers; empty if the map is kept in the store."""
+    version: str = rover_physics.__version__
+    """Version of the model."""
+
+    def open_map(self) -> MapSource:
+        """Open the map."""
+        return open_map(self.store, self.map_file)
+
+
+@dataclass(frozen=True)
+class ChunkReport:
+    """What a task says of its chunk."""
+
+    chunk: Index
+    """Row and column of the chunk."""
+    poses: int = 0
+    """Number of poses."""
+    seconds: float = 0.0
+    """Time that it took [s]."""
+    refusal: str = ""
+    """Why the system refuses to write, empty if it does not."""
+
+
+def open_map(store: Path, map_file: str) -> MapSource:
+    """Return the map of a store: the GeoTIFF it names, or, if it names none, what it keeps."""
+    return GeoTiffMap(Path(map_file)) if map_file else StoredMap(store)
+
+
+def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
+    """Survey a chunk and write it into the store.
+
+    Raises:
+        PlanningError: The worker has another version of the model.
+        RoverError, OSError: The map cannot be read, or not computed with.
+    """
+    if job.version != rover_physics.__version__:
+        raise PlanningError(
+            f"the worker has version {rover_physics.__version__}, the survey {job.version}"
+        )
+    numba.set_num_threads(1)  # a worker is one core
+    began = time.perf_counter()
+    layers = compute_chunk(job, chunk)
+    poses = layers["worst_class"].size * job.request.headings
+    seconds = time.perf_counter() - began
+    try:
+        SurveyStore(job.store).write(chunk, layers, seconds)
+    except OSError as error:
+        if not is_refusal(error):
+            raise
+        return ChunkReport(chunk, refusal=error.strerror or str(error))
+    return ChunkReport(chunk, poses, seconds)
+
+
+def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
+    """Return the layers of a chunk."""
+    layout, request = job.layout, job.request
+    source = job.open_map()
+    resolution, soils = source.frame.resolution, source.soil_names
+    cells = layout.cells_of(chunk)
+    window = layout.window_of(cells)
+    grids = source.read(window)
+    shape = tuple(span.stop - span.start for span in cells)
+    layers = {
+        name: np.empty(shape, kind)
+        for name, kind in types_of_layers(request.headings, request.turns).items()
+    }
+    for tile in layout.tiles_of(chunk):
+        part = layout.window_of(tile)
+        first = [span.start * layout.step for span in tile]
+        corner = tuple(
+            (span.start - at) * resolution
+            for span, at in zip(part[::-1], first[::-1], strict=True)
+        )
+        terrain = make_tile_terrain(
+            _cut(grids, window, part), resolution, (corner[0], corner[1]), soils
+        )
+        sizes = [span.stop - span.start for span in tile]
+        y, x = (np.arange(size) * (layout.step * resolution) for size in sizes)
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        found = survey_tile(request, terrain, places)
+        here = _relative(tile, cells)
+        for name, values in found.items():
+            layers[name][here] = values.reshape(sizes)
+    return layers
+
+
+def estimate_memory(job: SurveyJob) -> int:
+    """Return the memory [bytes] that a worker needs for the largest chunk with its halo."""
+    layout = job.layout
+    rows, columns = (min(layout.chunk, size) for size in layout.shape)
+    sides = [
+        min((side - 1) * layout.step + 1 + 2 * layout.halo + BLOCK, size)
+        for side, size in zip((rows, columns), layout.map_shape, strict=True)
+    ]
+    kinds = types_of_layers(job.request.headings, job.request.turns).values()
+    kept = 2 * rows * columns * sum(kind.itemsize for kind in kinds)
+    poses = 4 * max(BATCH, job.request.headings) * RESULT.itemsize
+    return BYTES_OF_PROCESS + BYTES_OF_CELL * sides[0] * sides[1] + kept + poses
+
+
+def _cut(grids: Grids, window: Box, part: Box) -> Grids:
+    """Return a part of the layers of a window."""
+    here = _relative(part, window)
+    return {name: np.ascontiguousarray(grid[here]) for name, grid in grids.items()}
+
+
+def _relative(box: Box, to: Box) -> Box:
+    """Return a box, whose indices count from the start of another."""
+    rows, columns = (
+        slice(span.start - base.start, span.stop - base.start)
+        for span, base in zip(box, to, strict=True)
+    )
+    return rows, columns

@@ -1,0 +1,216 @@
+"""GeoTIFF maps: checked when they are opened, read by windows, written as COG."""
+
+import contextlib
+import hashlib
+import math
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rover_physics.files.validation import show_file
+from rover_planner.errors import PlanningError
+from rover_planner.shell.extras import need
+from rover_planner.survey.layout import Box
+from rover_planner.survey.map_source import Grids, MapFrame
+from rover_planner.survey.store import SurveyStore
+
+SUFFIXES = (".tif", ".tiff")
+"""Suffixes of GeoTIFF files."""
+METRES = ("", "m", "metre", "metres", "meter", "meters")
+"""Names of the unit of heights that are read; a file without a unit is taken to be in metres."""
+SQUARE = 1e-6
+"""Largest difference of width and height of a cell, as a share."""
+BAND = 512
+"""Rows that are written at a time."""
+
+
+def is_geotiff(path: str | Path) -> bool:
+    """Return whether a file's name is that of a GeoTIFF."""
+    return Path(path).suffix.lower() in SUFFIXES
+
+
+@dataclass(frozen=True)
+class GeoTiffMap:
+    """A GeoTIFF whose only band has heights in metres, in a map projection in metres.
+
+    The map frame has the coordinates of the projection. Only elevation is read.
+
+    Raises:
+        PlanningError: From `frame`: the file cannot be read, or is of another kind.
+    """
+
+    path: Path
+    """The file."""
+
+    @property
+    def frame(self) -> MapFrame:
+        """Where its cells are."""
+        with self._open() as file:
+            self._check(file)
+            resolution = float(file.transform.a)
+            x = file.transform.c + 0.5 * resolution
+            y = file.transform.f + (0.5 - file.height) * resolution
+            crs = file.crs.to_wkt()
+            return MapFrame((file.height, file.width), resolution, (x, y), crs)
+
+    @property
+    def soil_names(self) -> tuple[str, ...]:
+        """A GeoTIFF has no soils."""
+        return ()
+
+    def read(self, box: Box, every: int = 1) -> Grids:
+        """Return the heights in a box of cells, every so many cells of them; NaN for nodata."""
+        from rasterio.windows import Window
+
+        rows, columns = box
+        with self._open() as file:
+            window = Window(
+                columns.start,
+                file.height - rows.stop,
+                columns.stop - columns.start,
+                rows.stop - rows.start,
+            )
+            values = file.read(1, window=window, masked=True)
+            heights = np.where(np.ma.getmaskarray(values), np.nan, values.data.astype(np.float64))
+            heights = heights * file.scales[0] + file.offsets[0]
+        return {"elevation": np.ascontiguousarray(heights[::-1][::every, ::every])}
+
+    def hash_content(self) -> str:
+        """Return a hash of the file."""
+        with self.path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+    @contextlib.contextmanager
+    def _open(self) -> Iterator[Any]:
+        import rasterio
+
+        try:
+            with rasterio.open(self.path) as file:
+                yield file
+        except rasterio.errors.RasterioError as error:
+            raise PlanningError(f"{show_file(self.path)}: cannot be read: {error}") from None
+
+    def _check(self, file: Any) -> None:
+        """Check kind, units and completeness of an open file."""
+        wrong = _find_missing(file, self.path) or _find_fault(file)
+        if wrong:
+            raise PlanningError(f"{show_file(self.path)}: {wrong}")
+
+
+def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
+    """Write a layer of a survey as a cloud-optimised GeoTIFF with the map's georeference.
+
+    Args:
+        path: File to write; an existing one is replaced.
+        layer: (rows, columns) array, such as of Zarr; row 0 at the smallest y.
+        frame: Where the cells of the map are.
+        step: Distance of surveyed cells [map cells]; they are the middles of its cells.
+
+    Raises:
+        PlanningError: The file cannot be written.
+    """
+    need("rasterio", "a GeoTIFF")
+    import rasterio
+    from rasterio.shutil import copy
+
+    rows, columns = layer.shape
+    size = step * frame.resolution
+    left, low = (start - 0.5 * size for start in frame.origin)
+    is_float = layer.dtype.kind == "f"
+    profile = {
+        "driver": "GTiff",
+        "width": columns,
+        "height": rows,
+        "count": 1,
+        "dtype": layer.dtype.name,
+        "transform": rasterio.Affine(size, 0.0, left, 0.0, -size, low + rows * size),
+        "nodata": math.nan if is_float else None,
+        "tiled": True,
+        "compress": "deflate",
+        "BIGTIFF": "IF_SAFER",
+    }
+    if frame.crs:
+        profile["crs"] = frame.crs
+    try:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+            plain, whole = Path(folder) / "plain.tif", Path(folder) / "whole.tif"
+            with rasterio.open(plain, "w", **profile) as file:
+                for first in range(0, rows, BAND):
+                    end = min(first + BAND, rows)
+                    window = rasterio.windows.Window(0, rows - end, columns, end - first)
+                    file.write(layer[first:end][::-1], 1, window=window)
+            copy(plain, whole, driver="COG", compress="deflate")
+            whole.replace(path)
+    except rasterio.errors.RasterioError as error:
+        raise PlanningError(f"{show_file(path)}: cannot be written: {error}") from None
+    except OSError as error:
+        raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+
+
+def write_layers(store: SurveyStore, folder: Path) -> None:
+    """Write each layer of a survey as LAYER.tif, with the georeference of the map.
+
+    Raises:
+        PlanningError: A file cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PlanningError(f"{show_file(folder)}: cannot be made: {error.strerror}") from None
+    for name in store.layer_names():
+        write_cog(
+            folder / f"{name}.tif", store.layer(name), store.notes.frame, store.notes.layout.step
+        )
+
+
+def _find_fault(file: Any) -> str:
+    """Return what is wrong with an open file, empty if nothing is."""
+    transform, crs = file.transform, file.crs
+    if file.count != 1:
+        return (
+            f"has {file.count} bands; it must have one, of heights (gdal_translate -b 1 takes one)"
+        )
+    if file.dtypes[0].startswith("complex"):
+        return f"has values of type {file.dtypes[0]}; they must be heights"
+    if not crs:
+        return "has no coordinate reference system; gdal_edit.py -a_srs sets it"
+    if not crs.is_projected:
+        return (
+            "is in degrees; it must be in a map projection in metres (gdalwarp -t_srs makes one)"
+        )
+    unit, factor = crs.linear_units_factor
+    if abs(factor - 1.0) > 1e-9:
+        return f"has coordinates in {unit}; they must be in metres (gdalwarp -t_srs makes one)"
+    height = (file.units[0] or "").strip()
+    if height.lower() not in METRES:
+        return f"has heights in {height!r}; they must be in metres (gdal_calc.py converts them)"
+    if transform.b != 0.0 or transform.d != 0.0 or not (transform.a > 0.0 > transform.e):
+        return "is rotated or mirrored; its rows must run to the south (gdalwarp makes it so)"
+    if abs(transform.a + transform.e) > SQUARE * transform.a:
+        return (
+            f"has cells of {transform.a:g} x {-transform.e:g} m; they must be square "
+            "(gdalwarp -tr makes them so)"
+        )
+    if min(file.width, file.height) < 2:
+        return f"has {file.height} x {file.width} cells; it must have 2 x 2 or more"
+    return ""
+
+
+def _find_missing(file: Any, path: Path) -> str:
+    """Return that a file is truncated, empty if all its blocks are there."""
+    size = path.stat().st_size
+    height, width = file.block_shapes[0]
+    for i in range(-(-file.height // height)):
+        for j in range(-(-file.width // width)):
+            place = f"{j}_{i}"
+            start = file.get_tag_item(f"BLOCK_OFFSET_{place}", "TIFF", bidx=1)
+            length = file.get_tag_item(f"BLOCK_SIZE_{place}", "TIFF", bidx=1)
+            if start and length and int(start) + int(length) > size:
+                return (
+                    f"is truncated: it has {size} bytes, a block needs {int(start) + int(length)}"
+                )
+    return ""

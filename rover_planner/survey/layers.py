@@ -1,0 +1,94 @@
+"""What a survey keeps of each cell: names, types and meanings of its layers."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.status import PoseStatus
+from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
+from rover_physics.traversability.verdict import CODES
+
+NOT_SURVEYED = 255
+"""Class and limit of a cell that is not surveyed yet, or whose chunk failed."""
+NO_LIMIT = 0
+"""Value of `first_limit` where no limit fails; 1 + k stands for CODES[k]."""
+CLASS_NUMBERS = {name: number for number, name in enumerate(TRAVERSABILITY_CLASSES)}
+"""Classes as kept, from best to worst."""
+LIMIT_NUMBERS = {"": NO_LIMIT} | {code: 1 + k for k, code in enumerate(CODES)}
+"""Codes of limits as kept."""
+STATUS_NUMBERS = np.array(
+    [LIMIT_NUMBERS.get(status.name.lower(), NO_LIMIT) for status in sorted(PoseStatus)], np.uint8
+)
+"""Limit of each PoseStatus."""
+
+Layers = Mapping[str, NDArray]
+"""Layers by name, all of one shape."""
+
+
+class Quantity(NamedTuple):
+    """A number of a pose whose worst and best value over the headings are kept."""
+
+    name: str
+    """Name without `worst_` or `best_`."""
+    high_is_bad: bool
+    """Whether the worst value is the largest."""
+    unit: str
+    """Unit, empty for a ratio."""
+    row: int
+    """Row of the number in a score of `map_sweep`."""
+
+
+QUANTITIES = (
+    Quantity("friction_utilisation", True, "", 0),
+    Quantity("torque_saturation", True, "", 1),
+    Quantity("tip_over_ratio", False, "", 3),
+    Quantity("tilt", True, "rad", 4),
+    Quantity("belly_clearance", False, "m", 5),
+)
+
+
+def bits_type(headings: int) -> np.dtype:
+    """Return the smallest unsigned type with a bit for each heading."""
+    bits = next(bits for bits in (8, 16, 32, 64) if bits >= headings)
+    return np.dtype(f"u{bits // 8}")
+
+
+def types_of_layers(headings: int, turns: bool) -> dict[str, np.dtype]:
+    """Return the layers of a survey and their types.
+
+    Args:
+        headings: Number of headings.
+        turns: Whether turns on the spot are judged.
+    """
+    types: dict[str, np.dtype] = {name: np.dtype("u1") for name in ("worst_class", "best_class")}
+    types["first_limit"] = np.dtype("u1")
+    types["passable_headings"] = bits_type(headings)
+    if turns:
+        types["turnable_headings"] = bits_type(headings)
+    for quantity in QUANTITIES:
+        for which in ("worst", "best"):
+            types[f"{which}_{quantity.name}"] = np.dtype("f4")
+    return types
+
+
+def fill_of(name: str) -> float | int:
+    """Return the value of a layer in cells that are not surveyed."""
+    if name in ("worst_class", "best_class", "first_limit"):
+        return NOT_SURVEYED
+    return 0 if name.endswith("_headings") else float("nan")
+
+
+def pack_bits(passes: NDArray[np.bool_]) -> NDArray:
+    """Return flags (..., headings) as whole numbers (...), heading k in bit k."""
+    headings = passes.shape[-1]
+    kind = bits_type(headings)
+    bits = kind.type(1) << np.arange(headings).astype(kind)
+    return np.asarray(np.bitwise_or.reduce(np.where(passes, bits, kind.type(0)), axis=-1))
+
+
+def unpack_bits(bits: NDArray, headings: int) -> NDArray[np.bool_]:
+    """Return the flags (..., headings) of whole numbers (...)."""
+    places = np.arange(headings).astype(bits.dtype)
+    return np.asarray((bits[..., None] >> places) & 1, dtype=bool)

@@ -1,0 +1,127 @@
+"""Maps that are read by windows: those kept in a store, and GeoTIFF files."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from rover_physics.terrain.grid import Terrain
+from rover_planner.survey.layout import Box, Index
+
+MAP = "map"
+"""Group of a store that holds the map, where it comes from an .npz file."""
+GRIDS = ("elevation", "friction", "soil", "elevation_std")
+"""Layers of a map, named as the fields of a Terrain."""
+MAP_CHUNK = 512
+"""Side of the chunks in which a map is kept [cells]."""
+
+Grids = dict[str, np.ndarray]
+"""Layers of a part of a map by name; row 0 at the smallest y."""
+
+
+class MapFrame(NamedTuple):
+    """Where the cells of a map are."""
+
+    shape: Index
+    """Rows and columns."""
+    resolution: float
+    """Cell size [m]."""
+    origin: tuple[float, float]
+    """x, y of the centre of cell [0, 0] [m]."""
+    crs: str
+    """Coordinate reference system as WKT, empty if unknown."""
+
+
+class MapSource(Protocol):
+    """A map that is read by windows."""
+
+    @property
+    def frame(self) -> MapFrame:
+        """Where its cells are."""
+
+    @property
+    def soil_names(self) -> tuple[str, ...]:
+        """Names of the soils that the layer soil points to."""
+
+    def read(self, box: Box, every: int = 1) -> Grids:
+        """Return the layers in a box of cells, every so many cells of them."""
+
+
+@dataclass(frozen=True)
+class StoredMap:
+    """A map that is kept in the store of its survey."""
+
+    store: Path
+    """Folder of the store."""
+
+    @property
+    def frame(self) -> MapFrame:
+        """Where its cells are."""
+        group = self._group()
+        notes: Any = group.attrs
+        shape = group["elevation"].shape
+        origin = (float(notes["origin"][0]), float(notes["origin"][1]))
+        return MapFrame((shape[0], shape[1]), float(notes["resolution"]), origin, "")
+
+    @property
+    def soil_names(self) -> tuple[str, ...]:
+        """Names of the soils that the layer soil points to."""
+        notes: Any = self._group().attrs
+        return tuple(notes["soil_names"])
+
+    def read(self, box: Box, every: int = 1) -> Grids:
+        """Return the layers in a box of cells, every so many cells of them."""
+        group = self._group()
+        rows, columns = box
+        if every == 1:
+            return {name: group[name][rows, columns] for name in GRIDS if name in group}
+        thin = slice(rows.start, rows.stop, every), slice(columns.start, columns.stop, every)
+        return {name: group[name][thin] for name in GRIDS if name in group}
+
+    def _group(self) -> Any:
+        import zarr
+
+        return zarr.open_group(self.store, mode="r", path=MAP)
+
+
+def frame_of(terrain: Terrain) -> MapFrame:
+    """Return where the cells of a terrain are."""
+    ny, nx = terrain.elevation.shape
+    return MapFrame((ny, nx), terrain.resolution, terrain.origin, "")
+
+
+def keep_map(group: Any, terrain: Terrain) -> None:
+    """Write a terrain into a Zarr group, for `StoredMap`."""
+    kept = group.create_group(MAP)
+    for name in GRIDS:
+        grid = getattr(terrain, name)
+        if grid is not None:
+            chunks = tuple(min(MAP_CHUNK, size) for size in grid.shape)
+            kept.create_array(name, data=grid, chunks=chunks)
+    kept.attrs.update(
+        {
+            "resolution": terrain.resolution,
+            "origin": list(terrain.origin),
+            "soil_names": list(terrain.soil_names),
+        }
+    )
+
+
+def make_tile_terrain(
+    grids: Grids, resolution: float, corner: tuple[float, float], soil_names: tuple[str, ...]
+) -> Terrain | None:
+    """Return a part of a map as a Terrain, None if no height is known.
+
+    Args:
+        grids: Layers of the part.
+        resolution: Cell size [m].
+        corner: x, y of its first cell [m].
+        soil_names: Names of the soils.
+
+    Raises:
+        TerrainError: A height that is infinite or implausible.
+    """
+    if np.isnan(grids["elevation"]).all():
+        return None
+    return Terrain(**grids, resolution=resolution, origin=corner, soil_names=soil_names)

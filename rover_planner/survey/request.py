@@ -1,0 +1,76 @@
+"""What is asked of a survey: rover, options, headings and distance of cells."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+import rover_physics
+from rover_physics.bounds.path import SIGMAS, check_sigmas
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.rover.model import Rover
+from rover_planner.errors import PlanningError
+
+MAX_HEADINGS = 64
+"""Largest number of headings: a cell keeps a bit of each."""
+MAX_STEP = 10_000
+"""Largest distance of surveyed cells [map cells]."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyRequest:
+    """A question about a whole map.
+
+    Raises:
+        PlanningError: A number out of its range.
+        ModelError: Sigmas that are no number of standard deviations.
+    """
+
+    rover: Rover
+    """The rover."""
+    options: SweepOptions = DEFAULT_OPTIONS
+    """Torque policy, friction and more."""
+    headings: int = 16
+    """Number of headings, the first along x, then equally spaced to the left."""
+    step: int = 1
+    """Distance of surveyed cells [map cells]."""
+    turns: bool = False
+    """Whether to judge turns on the spot, too."""
+    sigmas: float = SIGMAS
+    """Standard deviations to allow for where the map has them."""
+
+    def __post_init__(self) -> None:
+        for name, most in (("headings", MAX_HEADINGS), ("step", MAX_STEP)):
+            value = getattr(self, name)
+            if not 1 <= value <= most:
+                raise PlanningError(f"{name} is {value}; it must be 1 to {most}")
+        check_sigmas(self.sigmas)
+
+    @property
+    def yaws(self) -> np.ndarray:
+        """The headings (n,) [rad]."""
+        return np.arange(self.headings) * (2.0 * np.pi / self.headings)
+
+    def describe(self, map_hash: str) -> dict[str, Any]:
+        """Return all that the result depends on, as JSON types.
+
+        Args:
+            map_hash: Hash of the map's content.
+        """
+        return {
+            "rover": json.loads(json.dumps(asdict(self.rover))),
+            "options": json.loads(json.dumps(asdict(self.options))),
+            "headings": self.headings,
+            "step": self.step,
+            "turns": self.turns,
+            "sigmas": self.sigmas,
+            "map": map_hash,
+            "version": rover_physics.__version__,
+        }
+
+
+def hash_of(description: dict[str, Any]) -> str:
+    """Return the hash of a description of a survey."""
+    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()[:16]

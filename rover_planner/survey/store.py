@@ -1,0 +1,244 @@
+"""The Zarr store of a survey: created whole, filled chunk by chunk, never mixed with another."""
+
+import contextlib
+import errno
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rover_physics.files.validation import show_file
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.survey.layers import (
+    CLASS_NUMBERS,
+    LIMIT_NUMBERS,
+    NOT_SURVEYED,
+    fill_of,
+    types_of_layers,
+)
+from rover_planner.survey.layout import Index, SurveyLayout
+from rover_planner.survey.map_source import MapFrame, keep_map
+from rover_planner.survey.request import hash_of
+
+FORMAT = 1
+"""Version of the store's format."""
+NOTES = "rover_planner_survey"
+"""Attribute of the store with all that is known of its survey."""
+SECONDS = "seconds"
+"""Array (rows, columns) of chunks: time that a chunk took [s]; NaN while it is not finished,
+FAILED if it failed. Each element is a file, written last."""
+FAILED = -1.0
+"""Seconds of a chunk that failed."""
+
+
+@dataclass(frozen=True)
+class StoreNotes:
+    """What a store says of its survey."""
+
+    description: dict[str, Any]
+    """What the result depends on, from `SurveyRequest.describe`."""
+    layout: SurveyLayout
+    """Cells and chunks."""
+    frame: MapFrame
+    """Where the cells of the map are."""
+    map_file: str
+    """GeoTIFF file of the map; empty if the map is kept in the store."""
+
+    @property
+    def headings(self) -> int:
+        """Number of headings."""
+        return int(self.description["headings"])
+
+    @property
+    def turns(self) -> bool:
+        """Whether turns on the spot were judged."""
+        return bool(self.description["turns"])
+
+    @property
+    def cell(self) -> float:
+        """Distance of surveyed cells [m]."""
+        return self.layout.step * self.frame.resolution
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the notes as JSON types."""
+        layout, frame = self.layout, self.frame
+        return {
+            "format": FORMAT,
+            "hash": hash_of(self.description),
+            "description": self.description,
+            "map_shape": list(layout.map_shape),
+            "chunk": layout.chunk,
+            "halo": layout.halo,
+            "resolution": frame.resolution,
+            "origin": list(frame.origin),
+            "crs": frame.crs,
+            "map_file": self.map_file,
+            "classes": {str(number): name for name, number in CLASS_NUMBERS.items()},
+            "limits": {str(number): name for name, number in LIMIT_NUMBERS.items()},
+            "not_surveyed": NOT_SURVEYED,
+        }
+
+    @staticmethod
+    def from_dict(notes: Mapping[str, Any]) -> "StoreNotes":
+        """Return the notes from JSON types."""
+        ny, nx = notes["map_shape"]
+        step = int(notes["description"]["step"])
+        x, y = notes["origin"]
+        return StoreNotes(
+            dict(notes["description"]),
+            SurveyLayout((ny, nx), step, int(notes["chunk"]), int(notes["halo"])),
+            MapFrame((ny, nx), float(notes["resolution"]), (x, y), str(notes["crs"])),
+            str(notes["map_file"]),
+        )
+
+
+class SurveyStore:
+    """The store of one survey."""
+
+    def __init__(self, path: Path):
+        """Open a store.
+
+        Raises:
+            PlanningError: There is none, or it is not that of a survey.
+        """
+        import zarr
+
+        self.path = path
+        if not path.exists():
+            raise PlanningError(f"no survey {show_file(path)}")
+        try:
+            self._group: Any = zarr.open_group(path, mode="r+")
+            self.notes = StoreNotes.from_dict(self._group.attrs[NOTES])
+        except (OSError, KeyError, ValueError, TypeError) as error:
+            raise PlanningError(
+                f"{show_file(path)} is not a survey: {type(error).__name__}; "
+                "name another folder, or remove it"
+            ) from None
+
+    def check(self, description: Mapping[str, Any], chunk: int | None) -> None:
+        """Check that the store is of the survey that is asked for.
+
+        Raises:
+            PlanningError: It is not; the text says what differs.
+        """
+        kept = self.notes.description
+        for key in (*kept, *description):
+            if kept.get(key) != description.get(key):
+                raise PlanningError(
+                    f"{show_file(self.path)} has a survey with another {key}"
+                    f"{_show_difference(kept.get(key), description.get(key))}; name another "
+                    "folder, or ask the same"
+                )
+        if chunk is not None and chunk != self.notes.layout.chunk:
+            raise PlanningError(
+                f"{show_file(self.path)} has chunks of {self.notes.layout.chunk} cells, not "
+                f"{chunk}; leave --chunk out to go on with it"
+            )
+
+    def find_finished(self) -> set[Index]:
+        """Return the chunks that are finished."""
+        rows, columns = np.nonzero(self._group[SECONDS][:] >= 0.0)
+        return set(zip(rows.tolist(), columns.tolist(), strict=True))
+
+    def write(self, chunk: Index, layers: Mapping[str, np.ndarray], seconds: float) -> None:
+        """Write the layers of a chunk, then that it is finished.
+
+        Each file is written aside and renamed when it is whole.
+
+        Raises:
+            OSError: The system refuses.
+        """
+        rows, columns = self.notes.layout.cells_of(chunk)
+        for name, values in layers.items():
+            self._group[name][rows, columns] = values
+        self._group[SECONDS][chunk] = max(seconds, 0.0)
+
+    def mark_failed(self, chunk: Index) -> None:
+        """Write that a chunk failed."""
+        self._group[SECONDS][chunk] = FAILED
+
+    def layer_names(self) -> list[str]:
+        """Return the names of the layers."""
+        return list(types_of_layers(self.notes.headings, self.notes.turns))
+
+    def layer(self, name: str) -> Any:
+        """Return a layer (rows, columns) as a Zarr array."""
+        return self._group[name]
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other commands from writing into the store.
+
+        Raises:
+            PlanningError: Another command writes into it.
+        """
+        import fcntl
+
+        with (self.path / ".lock").open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise PlanningError(
+                    f"another survey is writing into {show_file(self.path)}; wait for its end"
+                ) from None
+            yield
+
+
+def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None:
+    """Create the store of a survey that has not begun, or nothing if that fails.
+
+    Args:
+        path: Folder to create.
+        notes: What to note of the survey.
+        terrain: The map, if it is to be kept in the store.
+
+    Raises:
+        PlanningError: It cannot be written.
+    """
+    import zarr
+
+    aside = path.with_name(f"{path.name}.{os.getpid()}.new")
+    layout = notes.layout
+    try:
+        group: Any = zarr.open_group(aside, mode="w")
+        side = min(layout.chunk, max(layout.shape))
+        for name, kind in types_of_layers(notes.headings, notes.turns).items():
+            group.create_array(
+                name,
+                shape=layout.shape,
+                chunks=(layout.chunk, layout.chunk) if side == layout.chunk else (side, side),
+                dtype=kind,
+                fill_value=fill_of(name),
+            )
+        group.create_array(
+            SECONDS, shape=layout.chunks, chunks=(1, 1), dtype="f4", fill_value=float("nan")
+        )
+        if terrain is not None:
+            keep_map(group, terrain)
+        group.attrs[NOTES] = notes.to_dict()
+        aside.rename(path)
+    except OSError as error:
+        shutil.rmtree(aside, ignore_errors=True)
+        raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+
+
+def is_refusal(error: OSError) -> bool:
+    """Return whether the system refuses to write, so that another attempt is of no use."""
+    refusals = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG)
+    return error.errno in refusals
+
+
+def _show_difference(kept: object, asked: object) -> str:
+    """Return the first difference of two values in words."""
+    if isinstance(kept, dict) and isinstance(asked, dict):
+        if kept.get("name") != asked.get("name"):
+            return _show_difference(kept.get("name"), asked.get("name"))
+        for key in (*kept, *asked):
+            if kept.get(key) != asked.get(key):
+                return f" ({key}{_show_difference(kept.get(key), asked.get(key))})"
+    return f": {kept!s:.40}, not {asked!s:.40}"

@@ -1,0 +1,94 @@
+"""A survey from question to store: opens the map, creates the store or goes on with it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rover_physics.terrain.fingerprint import fingerprint
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.errors import PlanningError
+from rover_planner.survey.chunk_survey import SurveyJob
+from rover_planner.survey.geotiff import GeoTiffMap, is_geotiff
+from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
+from rover_planner.survey.map_source import MapFrame, frame_of
+from rover_planner.survey.request import SurveyRequest
+from rover_planner.survey.store import StoreNotes, SurveyStore, create_store
+
+
+@dataclass(frozen=True)
+class PreparedSurvey:
+    """A survey whose store is there."""
+
+    job: SurveyJob
+    """The work."""
+    store: SurveyStore
+    """The store."""
+    chunks: list[Index]
+    """The chunks that are not finished."""
+
+    @property
+    def finished(self) -> int:
+        """Number of chunks that were finished before."""
+        rows, columns = self.job.layout.chunks
+        return rows * columns - len(self.chunks)
+
+
+def prepare_survey(
+    request: SurveyRequest,
+    map_name: str,
+    out: Path,
+    chunk: int | None = None,
+    max_cells: int | None = None,
+    max_gap: float = 0.0,
+) -> PreparedSurvey:
+    """Open the map and create the store of a survey, or go on with a store of the same survey.
+
+    Args:
+        request: What is asked.
+        map_name: Preset, terrain file (.npz) or GeoTIFF.
+        out: Folder of the store.
+        chunk: Side of a chunk [surveyed cells], rounded up to whole tiles (default: some seconds
+            of work).
+        max_cells: Largest terrain file [cells] (default: that of `load_terrain`).
+        max_gap: Widest unknown region of a terrain file that is interpolated [m].
+
+    Raises:
+        PlanningError: A map or a store that cannot be used.
+        TerrainError: A terrain file that cannot be read.
+    """
+    terrain: Terrain | None = None
+    if is_geotiff(map_name):
+        if max_gap != 0.0:
+            raise PlanningError(
+                f"max_gap is {max_gap:g}; it must be 0 for a GeoTIFF (gdal_fillnodata.py fills it)"
+            )
+        source = GeoTiffMap(Path(map_name).absolute())
+        frame, map_file, content = source.frame, str(source.path), source.hash_content()
+    else:
+        limit = {} if max_cells is None else {"max_cells": max_cells}
+        terrain = load_terrain(map_name, **limit).fill_gaps(max_gap)
+        frame, map_file, content = frame_of(terrain), "", fingerprint(terrain)
+    notes = _make_notes(request, frame, map_file, content, chunk)
+    if not out.exists():
+        create_store(out, notes, terrain)
+    store = SurveyStore(out)
+    store.check(notes.description, None if chunk is None else notes.layout.chunk)
+    job = SurveyJob(request, store.notes.layout, out.absolute(), map_file)
+    finished = store.find_finished()
+    return PreparedSurvey(
+        job, store, [one for one in job.layout.all_chunks if one not in finished]
+    )
+
+
+def _make_notes(
+    request: SurveyRequest, frame: MapFrame, map_file: str, content: str, chunk: int | None
+) -> StoreNotes:
+    """Return the notes of a new store."""
+    side = choose_chunk(frame.shape, request.step, request.headings)
+    halo = find_halo(request.rover, frame.resolution)
+    if chunk is not None:
+        if chunk < 1:
+            raise PlanningError(f"chunk is {chunk}; it must be 1 or more surveyed cells")
+        tile = SurveyLayout(frame.shape, request.step, side, halo).tile
+        side = -(-chunk // tile) * tile
+    layout = SurveyLayout(frame.shape, request.step, side, halo)
+    return StoreNotes(request.describe(content), layout, frame, map_file)

@@ -1,0 +1,255 @@
+"""The survey of one tile: the rover at each of its cells and headings, and what is kept of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rover_physics.names import CONTROL_POLICIES, TORQUE_POLICIES
+from rover_physics.numerics.quiet import quiet
+from rover_physics.numerics.read_only import view_read_only
+from rover_physics.prediction.crossing import select_results
+from rover_physics.prediction.map_sweep import NUMBERS
+from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.path_motion import motions_of
+from rover_physics.prediction.sweep import evaluator, predict_poses
+from rover_physics.rover.model import Rover
+from rover_physics.status import PoseStatus
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.check import NOT_COMPUTABLE
+from rover_physics.traversability.classification import IMPASSABLE
+from rover_physics.traversability.first_failure import suspect_limits_of
+from rover_physics.traversability.judge_poses import judge_poses
+from rover_physics.traversability.limit_checks import check_limits
+from rover_planner.survey.kernels import mark_suspects, mark_unknown_below, write_scores
+from rover_planner.survey.layers import (
+    CLASS_NUMBERS,
+    LIMIT_NUMBERS,
+    NO_LIMIT,
+    QUANTITIES,
+    STATUS_NUMBERS,
+    fill_of,
+    pack_bits,
+    types_of_layers,
+)
+from rover_planner.survey.request import SurveyRequest
+
+BATCH = 4096
+"""Approximate number of poses whose results are in memory at a time."""
+STRAIGHT, ON_THE_SPOT = 0.0, np.inf
+"""Curvatures [1/m]."""
+OF_THE_GROUND = ("steering", "off_map", "unknown_ground", "not_settled", "suspension", "tilt")
+OF_THE_POSE = (*OF_THE_GROUND, "tip_over", "belly")
+"""Codes of limits that fail under every torque policy if they do under one: of all maps, and of
+those with exact heights."""
+
+Outline = tuple[float, float, float, float]
+"""Rear, front, right and left edge [m], body frame."""
+
+
+def survey_tile(
+    request: SurveyRequest, terrain: Terrain | None, places: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Judge the rover at places of a tile and all headings.
+
+    Args:
+        request: What is asked.
+        terrain: The tile with all ground that the rover may touch; None if no cell is known.
+        places: (n, 2) x, y [m] of the surveyed cells, in the frame of the terrain.
+
+    Returns:
+        Layers (n,).
+
+    Raises:
+        ModelError, SoilError: As `judge_poses`.
+    """
+    if terrain is None:
+        return refuse_all(request, len(places))
+    judge = TileJudge(request, terrain)
+    count = max(1, BATCH // request.headings)
+    parts = [judge.survey(places[k : k + count]) for k in range(0, len(places), count)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
+    """Return the layers (cells,) of a tile of unknown ground."""
+    types = types_of_layers(request.headings, request.turns)
+    layers = {name: np.full(cells, fill_of(name), kind) for name, kind in types.items()}
+    layers["worst_class"][:] = layers["best_class"][:] = CLASS_NUMBERS[IMPASSABLE]
+    layers["first_limit"][:] = LIMIT_NUMBERS["unknown_ground"]
+    return layers
+
+
+def outline_of(rover: Rover) -> Outline:
+    """Return the rectangle that holds wheels and belly, seen from above on flat ground."""
+    wheel, belly = rover.wheel, rover.belly
+    xs = [x for x, _, _ in rover.suspension.wheels.values()]
+    side = max(y for _, y, _ in rover.suspension.wheels.values()) + 0.5 * wheel.width
+    return (
+        min(min(xs) - wheel.radius, belly.x[0]),
+        max(max(xs) + wheel.radius, belly.x[1]),
+        min(-side, belly.y[0]),
+        max(side, belly.y[1]),
+    )
+
+
+class TileJudge:
+    """Judges poses on the ground of a tile."""
+
+    def __init__(self, request: SurveyRequest, terrain: Terrain):
+        self._request, self._terrain = request, terrain
+        self._rover, self._policy = request.rover, request.options.policy
+        self._has_gaps = bool(np.isnan(terrain.elevation).any())
+        self._is_uncertain = bool(terrain.elevation_std is not None and request.sigmas)
+
+    @quiet
+    def survey(self, places: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the layers (n,) of places (n, 2) x, y [m]."""
+        headings = self._request.headings
+        grid = np.empty((len(places), headings, 3))
+        grid[:, :, :2], grid[:, :, 2] = places[:, None], self._request.yaws
+        poses = grid.reshape(-1, 3)
+        refused = self._find_unknown_below(poses)
+        results, limits = self.judge(self._policy, poses, STRAIGHT)
+        limits = _refuse_unknown(limits, refused)
+        numbers = np.empty((NUMBERS, len(poses)), np.float32)
+        write_scores(view_read_only(results), numbers)
+        classes = self._classify(poses, limits, refused)
+        layers = _sum_up(numbers, limits, classes, headings)
+        if self._request.turns:
+            layers["turnable_headings"] = pack_bits(
+                self._find_turns(poses, limits == NO_LIMIT).reshape(-1, headings)
+            )
+        return layers
+
+    def judge(self, policy: str, poses: np.ndarray, bend: float) -> tuple[Any, np.ndarray]:
+        """Judge poses under a policy, in a motion of one curvature.
+
+        Args:
+            policy: Torque policy.
+            poses: (n, 3) x, y [m] and yaw [rad].
+            bend: Curvature of the motion [1/m].
+
+        Returns:
+            RESULTs (n,), and the number (n,) of the first limit that fails, NO_LIMIT if none.
+        """
+        options = replace(self._request.options, policy=policy)
+        model = pack_model(self._rover, self._terrain, options)
+        bends = np.full(len(poses), bend)
+        results = evaluator(model)(poses, motions=motions_of(model, poses, bends))
+        limits = find_limits(self._rover, model, poses, results)
+        if self._is_uncertain:
+            rows = np.flatnonzero(limits == NO_LIMIT)
+            if len(rows):
+                _, verdict = judge_poses(
+                    self._rover,
+                    self._terrain,
+                    poses[rows],
+                    bends[rows],
+                    options,
+                    sigmas=self._request.sigmas,
+                )
+                limits[rows] = [LIMIT_NUMBERS[code] for code in verdict.codes]
+        return results, limits
+
+    def _classify(self, poses: np.ndarray, limits: np.ndarray, refused: np.ndarray) -> np.ndarray:
+        """Return the class (n,) of poses whose limits under the asked policy are known."""
+        policies: Sequence[str] = CONTROL_POLICIES if self._is_uncertain else TORQUE_POLICIES
+        classes = np.full(len(poses), CLASS_NUMBERS[IMPASSABLE], np.uint8)
+        hopeless = OF_THE_GROUND if self._is_uncertain else OF_THE_POSE
+        is_open = ~refused & ~np.isin(limits, [LIMIT_NUMBERS[code] for code in hopeless])
+        for policy in policies:
+            rows = np.flatnonzero(is_open)
+            if not len(rows):
+                break
+            if policy == self._policy:
+                passes = limits[rows] == NO_LIMIT
+            else:
+                passes = self.judge(policy, poses[rows], STRAIGHT)[1] == NO_LIMIT
+            classes[rows[passes]] = TORQUE_POLICIES.index(policy)
+            is_open[rows[passes]] = False
+        return classes
+
+    def _find_turns(self, poses: np.ndarray, passes: np.ndarray) -> np.ndarray:
+        """Return (n,) whether the rover may turn on the spot to both sides."""
+        turns = passes.copy()
+        for bend in (ON_THE_SPOT, -ON_THE_SPOT):
+            rows = np.flatnonzero(turns)
+            if len(rows):
+                turns[rows] = self.judge(self._policy, poses[rows], bend)[1] == NO_LIMIT
+        return turns
+
+    def _find_unknown_below(self, poses: np.ndarray) -> np.ndarray:
+        """Return (n,) whether unknown ground is below the rover, seen from above."""
+        unknown = np.zeros(len(poses), bool)
+        if self._has_gaps:
+            model = pack_model(self._rover, self._terrain, self._request.options)
+            mark_unknown_below(model.ground.records, poses, outline_of(self._rover), unknown)
+        return unknown
+
+
+def find_limits(rover: Rover, model: PackedModel, poses: np.ndarray, results: Any) -> np.ndarray:
+    """Return the number (n,) of the first limit that fails at single poses, NO_LIMIT if none.
+
+    The limits are those of `judge`, without its texts.
+
+    Args:
+        rover: The rover.
+        model: Rover, terrain and options.
+        poses: (n, 3) x, y [m] and yaw [rad].
+        results: (n,) RESULT of the poses.
+    """
+    limits, suspect = np.zeros(len(poses), np.uint8), np.empty(len(poses), bool)
+    mark_suspects(view_read_only(results), suspect_limits_of(rover, model), suspect)
+    rows = np.flatnonzero(suspect)
+    if not len(rows):
+        return limits
+    prediction = predict_poses(model, poses[rows], select_results(results, rows))
+    found = STATUS_NUMBERS[prediction.status.astype(np.intp)]
+    settled = prediction.status == PoseStatus.SETTLED
+    for check in check_limits(rover, prediction):
+        if check.breaks:
+            broken = check.broken() & settled & (found == NO_LIMIT)
+            unknown = np.isnan(check.values.reshape(len(rows), -1)).any(axis=1)
+            found[broken] = LIMIT_NUMBERS[check.code]
+            found[broken & unknown] = LIMIT_NUMBERS[NOT_COMPUTABLE]
+    limits[rows] = found
+    return limits
+
+
+def _refuse_unknown(limits: np.ndarray, refused: np.ndarray) -> np.ndarray:
+    """Return the limits with unknown ground where it comes first."""
+    number = LIMIT_NUMBERS["unknown_ground"]
+    later = (limits == NO_LIMIT) | (limits > number)
+    return np.where(refused & later, np.uint8(number), limits)
+
+
+def _sum_up(
+    numbers: np.ndarray, limits: np.ndarray, classes: np.ndarray, headings: int
+) -> dict[str, np.ndarray]:
+    """Return the layers of cells from the numbers of their poses, all headings of a cell in turn.
+
+    Args:
+        numbers: (NUMBERS, n) scores of `map_sweep`.
+        limits: (n,) numbers of limits.
+        classes: (n,) numbers of classes.
+        headings: Number of headings.
+    """
+    by_cell = limits.reshape(-1, headings)
+    passes = by_cell == NO_LIMIT
+    first = np.where(passes, np.uint8(255), by_cell).min(axis=1)
+    ranks = classes.reshape(-1, headings)
+    layers = {
+        "worst_class": ranks.max(axis=1),
+        "best_class": ranks.min(axis=1),
+        "first_limit": np.where(passes.all(axis=1), np.uint8(NO_LIMIT), first),
+        "passable_headings": pack_bits(passes),
+    }
+    for quantity in QUANTITIES:
+        values = numbers[quantity.row].reshape(-1, headings)
+        ends: tuple[Callable[..., Any], Callable[..., Any]] = np.fmax.reduce, np.fmin.reduce
+        worst, best = ends if quantity.high_is_bad else ends[::-1]
+        layers[f"worst_{quantity.name}"] = worst(values, axis=1)
+        layers[f"best_{quantity.name}"] = best(values, axis=1)
+    return layers

@@ -1,0 +1,101 @@
+"""Small maps and surveys for tests of surveys."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk, survey_chunk
+from rover_planner.survey.layout import Index
+from rover_planner.survey.request import SurveyRequest
+from rover_planner.survey.survey import PreparedSurvey, prepare_survey
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+RESOLUTION = 0.1
+"""Cell size of the maps [m]."""
+
+
+def make_rough_map(rows=150, columns=170, seed=3, **layers) -> Terrain:
+    """Return waves with rocks, a wall and a hole of unknown ground, far from the origin."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[0:rows, 0:columns] * RESOLUTION
+    heights = 0.05 * np.sin(1.3 * x) + 0.04 * np.sin(1.7 * y + 0.4) + 0.1 * np.sin(0.3 * x * y)
+    for at_x, at_y in rng.uniform(0.0, columns * RESOLUTION, (40, 2)):
+        heights += 0.15 * np.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / 0.03)
+    heights[:, columns // 2 : columns // 2 + 3] += 0.6 * (y[:, :1] < 0.7 * rows * RESOLUTION)
+    heights[rows // 3 : rows // 3 + 2, columns // 4 : columns // 4 + 2] = np.nan
+    return Terrain(heights, RESOLUTION, (1200.0, -340.0), **layers)
+
+
+def make_request(**changes) -> SurveyRequest:
+    """Return a request of lsr1 at 4 headings with changes; `policy` is that of the options."""
+    options = SweepOptions(policy=changes.pop("policy", "equal"))
+    return SurveyRequest(load_rover("lsr1"), options, **({"headings": 4} | changes))
+
+
+def survey_here(
+    folder: Path, terrain: Terrain, request: SurveyRequest, **changes
+) -> PreparedSurvey:
+    """Survey a terrain in this process, without a cluster; return it with its store."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_terrain(folder / "map.npz", terrain)
+    prepared = prepare_survey(request, str(folder / "map.npz"), folder / "out", **changes)
+    for chunk in prepared.chunks:
+        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+    return prepared
+
+
+def layers_of(prepared: PreparedSurvey) -> dict[str, np.ndarray]:
+    """Return all layers of a store."""
+    return {name: prepared.store.layer(name)[:] for name in prepared.store.layer_names()}
+
+
+def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
+    """Assert that layers are the same to the bit."""
+    assert one.keys() == other.keys()
+    for name, values in one.items():
+        assert values.dtype == other[name].dtype
+        assert values.tobytes() == other[name].tobytes(), name
+
+
+def start_command(*words, **environment) -> subprocess.Popen:
+    """Start `rover_planner` with words in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "rover_planner", *map(str, words)],
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finish(process: subprocess.Popen, seconds=200.0) -> tuple[int, dict, str]:
+    """Wait for a command; return its exit code, the JSON it printed and its stderr."""
+    out, err = process.communicate(timeout=seconds)
+    return process.returncode, json.loads(out) if out else {}, err
+
+
+def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
+    """Survey a chunk as a task does, but fail on one; here, as workers import it."""
+    if chunk == (0, 1):
+        raise RuntimeError("this chunk is cursed")
+    return survey_chunk(job, chunk)
+
+
+def die_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
+    """Survey a chunk as a task does, but die of one."""
+    if chunk == (0, 1):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return survey_chunk(job, chunk)
+
+
+def forget_package() -> None:
+    """Make rover_physics a module that this process, a worker, cannot import."""
+    sys.modules["rover_physics"] = None  # type: ignore[assignment]

@@ -1,0 +1,213 @@
+"""GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("zarr", reason="install the extra survey")
+
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.survey.chunk_survey import compute_chunk
+from rover_planner.survey.geotiff import GeoTiffMap, write_cog, write_layers
+from rover_planner.survey.layers import unpack_bits
+from rover_planner.survey.survey import prepare_survey
+from rover_planner.survey.tile_survey import outline_of
+from support.survey_maps import (
+    assert_same_bits,
+    layers_of,
+    make_request,
+    make_rough_map,
+    start_command,
+    survey_here,
+)
+
+rasterio = pytest.importorskip("rasterio", reason="install the extra survey")
+
+MARS = (
+    'PROJCS["Mars equirectangular",GEOGCS["Mars",DATUM["Mars",SPHEROID["Mars",3396190,0]],'
+    'PRIMEM["Reference",0],UNIT["degree",0.0174532925199433]],'
+    'PROJECTION["Equirectangular"],PARAMETER["standard_parallel_1",0],'
+    'PARAMETER["central_meridian",0],UNIT["metre",1]]'
+)
+LEFT, TOP, CELL = 812_345.5, -245_678.25, 0.1
+
+
+def write_tif(path, heights, **changes):
+    """Write heights with row 0 in the north."""
+    heights = np.asarray(heights)
+    bands = heights if heights.ndim == 3 else heights[None]
+    profile = {
+        "driver": "GTiff",
+        "width": bands.shape[2],
+        "height": bands.shape[1],
+        "count": bands.shape[0],
+        "dtype": heights.dtype,
+        "crs": MARS,
+        "transform": rasterio.Affine(CELL, 0.0, LEFT, 0.0, -CELL, TOP),
+        "tiled": True,
+        "blockxsize": 64,
+        "blockysize": 64,
+    } | changes
+    unit = profile.pop("unit", None)
+    with rasterio.open(path, "w", **profile) as file:
+        file.write(bands)
+        if unit:
+            file.units = [unit] * len(bands)
+    return path
+
+
+def survey_tif(path, request, out, **changes):
+    prepared = prepare_survey(request, str(path), out, **changes)
+    for chunk in prepared.chunks:
+        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+    return prepared
+
+
+def test_corners_and_projection_come_back(tmp_path):
+    heights = make_rough_map(130, 170).elevation.astype(np.float32)
+    path = write_tif(tmp_path / "map.tif", heights[::-1], nodata=np.nan)
+    prepared = survey_tif(path, make_request(step=1), tmp_path / "out")
+    write_layers(prepared.store, tmp_path / "layers")
+    with rasterio.open(path) as there:
+        for name in prepared.store.layer_names():
+            with rasterio.open(tmp_path / "layers" / f"{name}.tif") as back:
+                assert back.bounds == pytest.approx(there.bounds, abs=1e-9)
+                assert back.transform.almost_equals(there.transform, 1e-9)
+                assert back.crs == there.crs and back.shape == there.shape
+                assert back.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG"
+                layer = prepared.store.layer(name)[:]
+                np.testing.assert_array_equal(back.read(1)[::-1], layer)
+
+
+def test_a_tif_gives_the_bits_of_the_same_map_in_an_npz_file(tmp_path):
+    heights = make_rough_map(130, 170).elevation.astype(np.float32)
+    path = write_tif(tmp_path / "map.tif", heights[::-1], nodata=np.nan)
+    one = survey_tif(path, make_request(), tmp_path / "out", chunk=64)
+    terrain = Terrain(heights.astype(float), CELL, (7.0, -3.0))
+    other = survey_here(tmp_path / "npz", terrain, make_request(), chunk=192)
+    assert_same_bits(layers_of(one), layers_of(other))
+
+
+@pytest.mark.parametrize("step", [2, 5])
+def test_surveyed_cells_are_the_middles_of_the_written_ones(tmp_path, step):
+    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50)))
+    prepared = prepare_survey(make_request(step=step), str(path), tmp_path / "out")
+    write_cog(
+        tmp_path / "a.tif", prepared.store.layer("best_class"), prepared.store.notes.frame, step
+    )
+    with rasterio.open(tmp_path / "a.tif") as file, rasterio.open(path) as there:
+        assert file.xy(file.height - 1, 0) == pytest.approx(there.xy(39, 0))
+        assert file.res == pytest.approx((step * CELL, step * CELL))
+
+
+def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
+    values = np.full((30, 40), 1234, np.int16)
+    values[3, 5], values[7, 9] = -9999, 1300
+    path = write_tif(tmp_path / "map.tif", values, nodata=-9999)
+    with rasterio.open(path, "r+") as file:
+        file.scales, file.offsets = [0.01], [100.0]
+    heights = GeoTiffMap(path).read((slice(0, 30), slice(0, 40)))["elevation"]
+    assert np.isnan(heights[26, 5]) and np.isnan(heights).sum() == 1
+    assert heights[22, 9] == pytest.approx(113.0) and heights[0, 0] == pytest.approx(112.34)
+
+
+def test_no_cell_passes_whose_footprint_touches_a_nodata_hole(tmp_path):
+    rng = np.random.default_rng(4)
+    heights = (0.02 * rng.random((120, 140))).astype(np.float32)
+    holes = rng.integers((0, 0), heights.shape, (25, 2))
+    heights[holes[:, 0], holes[:, 1]] = -32768.0
+    path = write_tif(tmp_path / "map.tif", heights, nodata=-32768.0)
+    request = make_request(headings=8)
+    prepared = survey_tif(path, request, tmp_path / "out", chunk=64)
+    passes = unpack_bits(prepared.store.layer("passable_headings")[:], 8)
+    rear, front, right, left = outline_of(request.rover)
+    rows, columns = np.mgrid[0:120, 0:140]
+    touched = np.zeros(passes.shape, bool)
+    for row, column in holes:
+        away = np.stack([columns - column, rows - (119 - row)], axis=-1) * -CELL
+        for k, yaw in enumerate(request.yaws):
+            along = away @ (np.cos(yaw), np.sin(yaw))
+            across = away @ (-np.sin(yaw), np.cos(yaw))
+            touched[..., k] |= (
+                (rear <= along) & (along <= front) & (right <= across) & (across <= left)
+            )
+    assert touched.mean() > 0.05 and passes.mean() > 0.1
+    assert not (touched & passes).any()
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"crs": "EPSG:4326"}, "is in degrees; it must be in a map projection in metres"),
+        ({"crs": "EPSG:2263"}, "has coordinates in US survey foot"),
+        ({"crs": None}, "has no coordinate reference system"),
+        ({"unit": "ft"}, "has heights in 'ft'; they must be in metres"),
+        ({"transform": rasterio.Affine.rotation(10) @ rasterio.Affine.scale(0.1, -0.1)},
+         "is rotated or mirrored"),
+        ({"transform": rasterio.Affine(0.1, 0, 0, 0, 0.1, 0)}, "is rotated or mirrored"),
+        ({"transform": rasterio.Affine(0.1, 0, 0, 0, -0.2, 0)}, "has cells of 0.1 x 0.2 m"),
+    ],
+)  # fmt: skip
+def test_a_tif_of_another_kind_is_refused_with_a_hint(tmp_path, changes, said):
+    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50), np.float32), **changes)
+    with pytest.raises(PlanningError) as refusal:
+        prepare_survey(make_request(), str(path), tmp_path / "out")
+    assert said in str(refusal.value) and str(path) in str(refusal.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_three_bands_and_complex_numbers_are_refused(tmp_path):
+    for name, heights, said in (
+        ("a.tif", np.zeros((3, 40, 50), np.uint8), "has 3 bands; it must have one"),
+        ("b.tif", np.zeros((40, 50), np.complex64), "has values of type complex64"),
+    ):
+        with pytest.raises(PlanningError, match=said):
+            prepare_survey(
+                make_request(), str(write_tif(tmp_path / name, heights)), tmp_path / "out"
+            )
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.99])
+def test_a_truncated_tif_is_refused_before_anything_is_done(tmp_path, share):
+    heights = np.random.default_rng(1).random((300, 300)).astype(np.float32)
+    path = write_tif(tmp_path / "map.tif", heights, compress="deflate")
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    ended = start_command("survey", "lsr1", path, tmp_path / "out")
+    _, err = ended.communicate(timeout=60)
+    assert ended.returncode == 2 and not (tmp_path / "out").exists()
+    assert err.startswith("rover_planner: ") and err.count("\n") == 1, err
+    if share > 0.01:  # else even the projection is missing
+        assert "map.tif: cannot be read" in err or "map.tif: is truncated" in err
+
+
+def test_a_missing_tif_is_refused(tmp_path):
+    with pytest.raises(PlanningError, match="cannot be read"):
+        prepare_survey(make_request(), str(tmp_path / "no.tif"), tmp_path / "out")
+
+
+def test_gaps_of_a_tif_are_not_filled_here(tmp_path):
+    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50), np.float32))
+    with pytest.raises(PlanningError, match="max_gap is 0.2; it must be 0 for a GeoTIFF"):
+        prepare_survey(make_request(), str(path), tmp_path / "out", max_gap=0.2)
+
+
+def test_another_content_is_another_map(tmp_path):
+    heights = np.zeros((40, 50), np.float32)
+    path = write_tif(tmp_path / "map.tif", heights)
+    prepare_survey(make_request(), str(path), tmp_path / "out")
+    heights[3, 3] = 0.5
+    write_tif(path, heights)
+    with pytest.raises(PlanningError, match="another map"):
+        prepare_survey(make_request(), str(path), tmp_path / "out")
+
+
+def test_a_layer_that_cannot_be_written_is_named(tmp_path):
+    prepared = survey_here(tmp_path, replace(make_rough_map(20, 20)), make_request(step=5))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(PlanningError, match="cannot be made"):
+        write_layers(prepared.store, tmp_path / "file")
+    with pytest.raises(PlanningError, match="cannot be written"):
+        write_cog(tmp_path / "no" / "a.tif", np.zeros((3, 3)), prepared.store.notes.frame, 1)

@@ -1,0 +1,175 @@
+"""A store goes on where it was left, and is never mixed with another survey."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("zarr", reason="install the extra survey")
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import save_terrain
+from rover_planner.errors import PlanningError
+from rover_planner.survey.chunk_survey import compute_chunk
+from rover_planner.survey.store import NOTES, SurveyStore
+from rover_planner.survey.survey import prepare_survey
+from support.survey_maps import (
+    assert_same_bits,
+    layers_of,
+    make_request,
+    make_rough_map,
+    survey_here,
+)
+
+
+@pytest.fixture
+def files(tmp_path):
+    save_terrain(tmp_path / "map.npz", make_rough_map(140, 140))
+    return tmp_path
+
+
+def prepare(files, request=None, **changes):
+    request = make_request() if request is None else request
+    return prepare_survey(request, str(files / "map.npz"), files / "out", **changes)
+
+
+def test_finished_chunks_are_not_done_again_and_half_written_ones_are(files):
+    prepared = prepare(files, chunk=64)
+    assert len(prepared.chunks) == 9 and prepared.finished == 0
+    for chunk in prepared.chunks[:4]:
+        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+    half = prepared.chunks[4]
+    rows, columns = prepared.job.layout.cells_of(half)
+    prepared.store.layer("worst_tilt")[rows, columns] = 7.0  # it was stopped after this layer
+    again = prepare(files)
+    assert again.finished == 4 and again.chunks == prepared.chunks[4:]
+    for chunk in again.chunks:
+        again.store.write(chunk, compute_chunk(again.job, chunk), 1.0)
+    assert prepare(files).chunks == []
+    whole = survey_here(files / "whole", make_rough_map(140, 140), make_request(), chunk=192)
+    assert_same_bits(layers_of(again), layers_of(whole))
+
+
+def test_a_failed_chunk_is_not_finished(files):
+    prepared = prepare(files, chunk=64)
+    prepared.store.mark_failed((1, 2))
+    assert prepare(files).chunks == prepared.chunks
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"rover": load_rover("m2020")}, "another rover: lsr1, not m2020"),
+        ({"policy": "optimal"}, "another options (policy: equal, not optimal)"),
+        ({"headings": 8}, "another headings: 4, not 8"),
+        ({"step": 2}, "another step: 1, not 2"),
+        ({"turns": True}, "another turns: False, not True"),
+        ({"sigmas": 0.0}, "another sigmas: 3.0, not 0.0"),
+    ],
+)
+def test_a_store_of_another_survey_is_refused(files, changes, said):
+    prepare(files)
+    rover = changes.pop("rover", None)
+    request = make_request(**changes)
+    with pytest.raises(PlanningError) as refusal:
+        prepare(files, request if rover is None else replace(request, rover=rover))
+    assert said in str(refusal.value)
+
+
+def test_a_rover_of_the_same_name_but_other_numbers_is_another(files):
+    prepare(files)
+    rover = load_rover("lsr1")
+    heavier = replace(rover, wheel=replace(rover.wheel, mass=0.36))
+    with pytest.raises(PlanningError, match=r"another rover \(wheel \(mass: 0.35, not 0.36\)\)"):
+        prepare(files, replace(make_request(), rover=heavier))
+
+
+def test_a_store_of_another_map_or_version_is_refused(files, monkeypatch):
+    prepare(files)
+    monkeypatch.setattr("rover_physics.__version__", "99.0")
+    with pytest.raises(PlanningError, match="another version: .*, not 99.0"):
+        prepare(files)
+    monkeypatch.undo()
+    terrain = make_rough_map(140, 140)
+    heights = terrain.elevation.copy()
+    heights[5, 5] += 1e-9
+    save_terrain(files / "map.npz", replace(terrain, elevation=heights))
+    with pytest.raises(PlanningError, match="another map"):
+        prepare(files)
+
+
+def test_other_chunks_are_refused_only_where_they_are_asked_for(files):
+    prepare(files, chunk=64)
+    with pytest.raises(PlanningError, match="has chunks of 64 cells, not 128"):
+        prepare(files, chunk=128)
+    assert prepare(files, chunk=50).job.layout.chunk == 64
+    with pytest.raises(PlanningError, match="chunk is 0; it must be 1 or more"):
+        prepare(files, chunk=0)
+
+
+def test_a_folder_that_is_no_survey_is_refused_and_left_alone(files):
+    (files / "out").mkdir()
+    (files / "out" / "thesis.tex").write_text("years of work")
+    with pytest.raises(PlanningError, match="out is not a survey"):
+        prepare(files)
+    assert [path.name for path in (files / "out").iterdir()] == ["thesis.tex"]
+    with pytest.raises(PlanningError, match="no survey"):
+        SurveyStore(files / "nothing")
+
+
+def test_two_commands_do_not_write_into_one_store(files):
+    store = prepare(files).store
+    refused = pytest.raises(PlanningError, match="another survey is writing into")
+    with store.locked(), refused, SurveyStore(store.path).locked():
+        raise AssertionError("two at once")
+    with SurveyStore(store.path).locked():
+        pass
+
+
+def test_a_store_that_cannot_be_created_leaves_nothing_behind(files):
+    (files / "out").write_text("a file")
+    with pytest.raises(PlanningError, match="is not a survey"):
+        prepare(files)
+    missing = files / "no" / "such"
+    with pytest.raises(PlanningError, match="cannot be written: "):
+        prepare_survey(make_request(), str(files / "map.npz"), files / "map.npz" / "out")
+    assert not missing.exists()
+
+
+def test_the_notes_name_classes_and_limits(files):
+    store = prepare(files).store
+    notes = store._group.attrs[NOTES]
+    assert json.loads(json.dumps(notes)) == notes
+    assert notes["classes"]["0"] == "passable" and notes["limits"]["12"] == "friction"
+    assert notes["description"]["rover"]["name"] == "lsr1"
+    assert store.notes.to_dict() == notes
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"headings": 0}, "headings is 0; it must be 1 to 64"),
+        ({"headings": 65}, "headings is 65"),
+        ({"step": 0}, "step is 0; it must be 1 to 10000"),
+    ],
+)
+def test_impossible_numbers_are_refused(changes, said):
+    with pytest.raises(PlanningError, match=said):
+        make_request(**changes)
+
+
+def test_filled_gaps_are_another_map(files):
+    filled = prepare(files, max_gap=0.3)
+    assert not np.isnan(
+        filled.job.open_map().read((slice(0, 140), slice(0, 140)))["elevation"]
+    ).any()
+    with pytest.raises(PlanningError, match="another map"):
+        prepare(files)
+
+
+def test_cells_that_are_not_surveyed_say_so(files):
+    store = prepare(files).store
+    assert (store.layer("best_class")[:] == 255).all()
+    assert np.isnan(store.layer("worst_tilt")[:]).all()
+    assert not store.layer("passable_headings")[:].any()
