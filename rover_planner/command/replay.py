@@ -60,7 +60,7 @@ def replay(
     """
     need("rclpy", "replay")
     need("rosbags", "replay")
-    from rover_planner.progress import show_bar
+    from rover_planner.shell.progress import show_bar
     from rover_planner.ros.bags import bag_reader
     from rover_planner.ros.bags.bag_writer import write_bag
     from rover_planner.ros.bags.replay import Questions, Replay
