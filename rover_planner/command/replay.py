@@ -60,10 +60,10 @@ def replay(
     """
     need("rclpy", "replay")
     need("rosbags", "replay")
-    from rover_planner.shell.progress import show_bar
     from rover_planner.ros.bags import bag_reader
     from rover_planner.ros.bags.bag_writer import write_bag
     from rover_planner.ros.bags.replay import Questions, Replay
+    from rover_planner.shell.progress import show_bar
 
     if out.exists():
         raise PlanningError(f"{out} exists already; OUT must be a new folder")

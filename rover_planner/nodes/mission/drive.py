@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.plan_progress import PlanProgress
+from rover_planner.planning.navigation.watched_path import WatchedPath
 
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
@@ -89,18 +89,19 @@ def _follow(
     client: RoverClient, plan: Poses, settings: DriveSettings, deadline: float
 ) -> tuple[Poses, str]:
     """Follow a plan to its end; return the last pose (3,), and why the rest of it is refused."""
-    progress = PlanProgress(plan)
+    path, index = WatchedPath(plan), 0
     client.send_path(plan)
 
     def is_there(pose: Poses) -> bool:
-        progress.advance(pose)
-        return progress.is_over(pose, settings.within)
+        nonlocal index
+        index = path.find_place(pose, index).index
+        return path.is_over(pose, index, settings.within)
 
     while True:
         pose = client.wait_for_pose(is_there, settings.period)
         if is_there(pose):
             return pose, ""
-        refused = client.check(progress.rest)
+        refused = client.check(plan[index:])
         if refused:
             return pose, refused
         if time.monotonic() > deadline:
