@@ -6,6 +6,8 @@ import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
 
+from msg_adapters.results.occupancy import occupancy_grid
+
 REACHED, NOT_REACHED = 0, 100
 """Values of places inside and outside the area."""
 
@@ -22,17 +24,8 @@ def area_to_grid(
         frame: Frame of the map.
         stamp: builtin_interfaces/Time.
     """
-    message = OccupancyGrid()
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.info.map_load_time = stamp
-    message.info.resolution = cell
-    message.info.height, message.info.width = places.shape
-    message.info.origin.position.x = first[0] - 0.5 * cell
-    message.info.origin.position.y = first[1] - 0.5 * cell
-    message.info.origin.orientation.w = 1.0
     values = np.where(places, REACHED, NOT_REACHED).astype(np.int8)
-    message.data.frombytes(np.ascontiguousarray(values).tobytes())
-    return message
+    return occupancy_grid(values, cell, first, frame, stamp)
 
 
 def empty_area(frame: str, stamp: Any) -> OccupancyGrid:

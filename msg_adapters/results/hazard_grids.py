@@ -6,6 +6,8 @@ import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
 
+from msg_adapters.results.occupancy import occupancy_grid
+
 VALUES = (0, 33, 66, 100)
 """Values of the classes 0 to 3: passable, with speed servos, with traction control, impassable."""
 UNKNOWN = -1
@@ -25,13 +27,5 @@ def classes_to_grid(
         frame: Frame of the map.
         stamp: builtin_interfaces/Time.
     """
-    message = OccupancyGrid()
-    message.header.frame_id, message.header.stamp = frame, stamp
-    message.info.map_load_time = stamp
-    message.info.resolution = cell
-    message.info.height, message.info.width = classes.shape
-    message.info.origin.position.x = first[0] - 0.5 * cell
-    message.info.origin.position.y = first[1] - 0.5 * cell
-    message.info.origin.orientation.w = 1.0
-    message.data.frombytes(_TABLE[classes].tobytes())  # -1 is the last of the table
-    return message
+    values = _TABLE[classes]  # -1 is the last of the table
+    return occupancy_grid(values, cell, first, frame, stamp)
