@@ -40,8 +40,8 @@ def boulder_field() -> tuple[Terrain, tuple, tuple]:
     for name, terrain in real_maps().items():
         if name.startswith("otira"):
             return without_gaps(terrain), (25.402, 15.524, 0.297), (23.869, 14.883, -2.296)
-    made = make_mars_terrain(3, 8.0, rock_cover=0.2, crater_density=0.0)
-    return made, (1.0, 1.0, 0.0), (6.0, 6.0, 0.0)
+    made = make_mars_terrain(4, 8.0, rock_cover=0.25, crater_density=0.0)
+    return made, (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02)
 
 
 def without_gaps(terrain: Terrain) -> Terrain:
