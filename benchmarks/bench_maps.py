@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
 from benchmarks.measure import Figure, median_time, quantile
@@ -79,10 +78,8 @@ class Stage:
         self.server: TraverseServer = ros.spin(  # type: ignore[assignment]
             TraverseServer(context=ros.context, parameter_overrides=fixed)
         )
-        self.server.get_logger().set_level(LoggingSeverity.INFO)
         self.client: PlannerClient = ros.spin(PlannerClient(ros))  # type: ignore[assignment]
         self.client.send_terrain(self.prior)
-        self.server.get_logger().set_level(LoggingSeverity.WARN)
         self.waits: list[float] = []
         maps = self.server.desk._maps
         wait = maps.wait

@@ -312,7 +312,10 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
         if options.drive and answer["traversable"]:
             report({"event": "driving", "goal": number})
             tell = partial(_report_change, report, number)
-            drive_to(node, goal, answer["poses"], DriveSettings(), tell)
+            try:
+                drive_to(node, goal, answer["poses"], DriveSettings(), tell)
+            except NoAnswerError as error:
+                raise DriveFailedError(str(error)) from error
             report({"event": "arrived", "goal": number})
     return next(code for code in (EXIT_FAILED, EXIT_NOT_TRAVERSABLE, EXIT_OK) if code in codes)
 

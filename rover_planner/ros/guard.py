@@ -93,6 +93,8 @@ class GuardedExecutor(SingleThreadedExecutor):
             self._report(_name(entity), error)
 
     def _report(self, place: str, error: Exception) -> None:
+        if not self.context.ok():
+            return  # whoever reads or publishes while ROS shuts down fails
         if self._guard_of_node is None:
             raise error
         self._guard_of_node.report(place, error)

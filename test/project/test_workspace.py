@@ -91,6 +91,7 @@ def test_the_ament_index_and_share_have_the_package(workspace, python):
     assert Path(told.strip()) == share / "rover_planner"
 
 
+@pytest.mark.parametrize("workspace", ["copied"], indirect=True)  # its kernels compile once
 def test_a_server_of_the_workspace_answers_its_mission_planner(workspace):
     programs = "install/rover_planner/lib/rover_planner"
     file = "install/rover_planner/share/rover_planner/config/parameters/traverse_server.yaml"
