@@ -215,6 +215,7 @@ class _Run:
         self._outcome = SurveyOutcome()
         self._chunk_of: dict[Any, Index] = {}
         self._attempts: dict[Index, int] = {}
+        self._suspects: list[Index] = []
         self._threads, self._count_again = 1, 0.0
 
     def run(self, chunks: Iterator[Index]) -> SurveyOutcome:
@@ -231,7 +232,20 @@ class _Run:
                 self._take_failure(chunk, future, under_way)
             future.release()
             self._fill(under_way, chunks)
+        for chunk in self._suspects:
+            self._survey_alone(chunk)
         return self._outcome
+
+    def _survey_alone(self, chunk: Index) -> None:
+        """Survey a chunk with which workers died; alone, so that it is not blamed for another."""
+        key = f"survey-{chunk[0]}-{chunk[1]}-alone"
+        future = self._client.submit(self._task, self._job, chunk, key=key, pure=False)
+        error = future.exception()  # waits for the end
+        if error is None:
+            self._take(future.result())
+        else:
+            self._give_up(chunk, error)
+        future.release()
 
     def _fill(self, under_way: Any, chunks: Iterator[Index]) -> None:
         """Submit chunks until there are enough under way."""
@@ -271,10 +285,16 @@ class _Run:
                 "with the others"
             )
         error = future.exception()
-        killed = type(error).__name__ == "KilledWorker"
-        if self._attempts[chunk] < ATTEMPTS and not killed:
+        if type(error).__name__ == "KilledWorker":
+            self._suspects.append(chunk)
+        elif self._attempts[chunk] < ATTEMPTS:
             self._submit(chunk, under_way)
-            return
+        else:
+            self._give_up(chunk, error)
+
+    def _give_up(self, chunk: Index, error: BaseException) -> None:
+        """Mark a chunk as failed."""
+        killed = type(error).__name__ == "KilledWorker"
         why = f"its worker died {ATTEMPTS} times" if killed else f"{type(error).__name__}: {error}"
         self._outcome.failed[chunk] = why
         SurveyStore(self._job.store).mark_failed(chunk)

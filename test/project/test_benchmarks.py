@@ -30,11 +30,11 @@ SMALL = {
     "start": {"STARTS": 1, "COLD_STARTS": 0},
     "survey": {"CELLS": 96, "REPEATS": 1, "WORKERS": (1, 1), "TURNS": 1, "TASKS": 20},
     "traction": {"ALONE_TIME": 0.5, "TOGETHER_TIME": 1.0},
-    "view": {},
+    "view": {"PATHS": 1, "LENGTH": 2.0, "SLIDERS": {"friction [-]": (0.6,)}},
     "walls": {"POSES": 5, "HEIGHTS": (0.3,)},
 }
 """Values of each topic's constants with which it takes seconds."""
-QUICK = ("fan", "growth", "ingestion", "view")
+QUICK = ("fan", "growth", "ingestion")
 """Topics that take less than two seconds in the small size."""
 
 
