@@ -33,13 +33,14 @@ def plan_candidates() -> None:
 
 
 def search_ways() -> None:
-    """Search a way where a wall leaves none."""
-    elevation = np.zeros((60, 60))
-    elevation[:, 30] = 1.0
-    ground = Terrain(elevation, 0.05, (0.0, 0.0))
+    """Search a way on level ground, and where a wall leaves none."""
     ends = (0.7, 1.5, 0.0), (2.3, 1.5, 0.0)
-    question = WayQuestion(load_rover("lsr1"), ground, *ends, PathQueryOptions())
-    find_way(question, LatticeSettings(budget=60.0))
+    for height in (0.0, 1.0):
+        elevation = np.zeros((60, 60))
+        elevation[:, 30] = height
+        ground = Terrain(elevation, 0.05, (0.0, 0.0))
+        question = WayQuestion(load_rover("lsr1"), ground, *ends, PathQueryOptions())
+        find_way(question, LatticeSettings(budget=60.0))
 
 
 def control_traction() -> None:

@@ -47,4 +47,5 @@ def cut_out(question: WayQuestion, nodes: Nodes) -> Terrain:
     if part.shape == terrain.elevation.shape or np.isnan(part).all():
         return terrain
     x, y = np.asarray(terrain.origin) + terrain.resolution * first
-    return Terrain(part, terrain.resolution, (float(x), float(y)))
+    # Kernels are compiled for arrays without gaps.
+    return Terrain(np.ascontiguousarray(part), terrain.resolution, (float(x), float(y)))
