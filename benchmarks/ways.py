@@ -17,7 +17,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.measure import WIDTH, quantile
-from benchmarks.way_trials.estimate import check_estimate
+from benchmarks.way_trials.estimate import check_estimate, rank_difficulty
 from benchmarks.way_trials.grounds import Case, Pair, grounds
 from benchmarks.way_trials.trial import Trial, same_on_threads, search, try_pair, try_warm
 from benchmarks.way_trials.truth import NoTruthError, Truth
@@ -39,6 +39,8 @@ def run_case(case: Case, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield {**asdict(trial), **compare(case, pair, trial, truth, asked)}
     if asked["nodes"]:
         yield {"ground": case.name, **check_estimate(case, asked["nodes"])}
+    if asked["edges"]:
+        yield {"ground": case.name, **rank_difficulty(case, asked["edges"])}
 
 
 def compare(
@@ -100,6 +102,9 @@ def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
         if "checked" in row:
             yield "nodes refused by the cheap test", f"{100 * row['share']:.1f} %"
             yield "of these the model passes", f"{row['wrong']} of {row['checked']:,}"
+        if "rank" in row:
+            yield "random edges refused", f"{row['refused']} of {row['ranked']:,}"
+            yield "of more difficulty than those that pass", f"{100 * row['rank']:.0f} %"
 
 
 def summarise_comparisons(trials: Rows) -> Iterator[tuple[str, str]]:
@@ -167,6 +172,7 @@ def main(
     ompl_planner: Annotated[str, typer.Option(help="BITstar, RRTConnect, RRTstar.")] = "BITstar",
     threads: Annotated[int, typer.Option(help="Pairs searched on one and on two threads.")] = 0,
     nodes: Annotated[int, typer.Option(help="Nodes with which the cheap test is checked.")] = 0,
+    edges: Annotated[int, typer.Option(help="Edges that rank the difficulty.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write all rows as JSON lines.")] = None,
 ) -> None:
     """Search ways between random poses and print what was found, in what time."""

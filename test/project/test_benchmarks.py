@@ -125,11 +125,13 @@ def test_ways_are_compared_with_the_best_of_the_lattice_in_a_small_size(capsys):
     worlds = importlib.import_module("rover_planner.worlds.mars_terrain")
     case = trials.Case("small", rover, worlds.make_mars_terrain(3, 8.0), "equal")
     asked = {"count": 2, "seed": 0, "budget": 2.0, "truth": 2, "truth_seconds": 100.0, "warm": 1}
-    asked |= {"ompl": 0, "threads": 1, "nodes": 1000}
+    asked |= {"ompl": 0, "threads": 1, "nodes": 1000, "edges": 60}
     rows = list(ways.run_case(case, asked))
-    assert [row.get("outcome") for row in rows] == ["found", "found", None]
+    assert [row.get("outcome") for row in rows] == ["found", "found", None, None]
     assert all(row["passes"] and 0.0 < row["best"] < np.inf for row in rows[:2])
     assert rows[0]["warm_outcome"] == "found" and rows[0]["same_on_threads"] is not False
     assert rows[2]["wrong"] == 0
+    assert rows[3]["ranked"] == 60 and 0 < rows[3]["refused"] < 60
+    assert 0.5 < rows[3]["rank"] <= 1.0
     ways.show(rows)
     assert "found of connected" in capsys.readouterr().out
