@@ -107,7 +107,7 @@ def replay_plan(
     picture: Picture = None,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
-    """Search the way of a question again that `plan --dump` or the server has written."""
+    """Search the way of a question again that `plan --dump` has written."""
     from rover_planner.planning.ways.question_file import read_question
 
     asked, settings = read_question(question, max_cells)
