@@ -1,11 +1,11 @@
-"""Measures a survey: cost of a chunk, two workers against one, memory and the scheduler."""
+"""Measures a survey: cost of a chunk, two workers against one and against the bare model."""
 
-import pickle
+import contextlib
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
@@ -15,8 +15,8 @@ from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
-from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk
-from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk
+from rover_planner.survey.chunk_survey import SurveyJob, compute_chunk
+from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.runner import ClusterSettings, open_client, survey_with
 from rover_planner.survey.survey import prepare_survey
@@ -24,20 +24,18 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 CELLS = 512
 """Side of the made Mars whose chunks are measured [cells]."""
-CHUNK = 64
+CHUNK = 128
 """Side of these chunks [cells]."""
 HEADINGS = 8
 """Headings of all surveys."""
-REPEATS = 5
+REPEATS = 3
 """Repeats of the measurement of a chunk."""
 WORKERS = (1, 2)
 """Numbers of workers that are compared, in turns."""
 TURNS = 3
 """Turns of this comparison."""
-TASKS = 2000
-"""Empty tasks that the scheduler hands out."""
-LARGE = (10_000, 31_623)
-"""Sides of the maps whose number of tasks is told [cells]."""
+COUNT = 2
+"""Rows and columns of chunks in the middle of the map that are surveyed in a turn."""
 
 
 def measure() -> list[Figure]:
@@ -49,20 +47,14 @@ def measure() -> list[Figure]:
         save_terrain(Path(folder, "mars.npz"), mars)
         prepared = prepare_survey(request, f"{folder}/mars.npz", Path(folder, "out"), CHUNK)
         job = prepared.job
-        return measure_chunk(job, mars) + measure_workers(job) + measure_scheduler(job)
+        return measure_chunk(job, mars) + measure_workers(job, mars)
 
 
 def measure_chunk(job: SurveyJob, mars: Terrain) -> list[Figure]:
     """Compare a chunk in the middle of the map with the bare scores of its poses."""
     rows, columns = job.layout.chunks
     chunk = rows // 2, columns // 2
-    (ys, xs), yaws = job.layout.cells_of(chunk), job.request.yaws
-    x, y = (
-        start + mars.resolution * np.arange(span.start, span.stop)
-        for start, span in zip(mars.origin, (xs, ys), strict=True)
-    )
-    grid = np.broadcast_arrays(x[:, None], y[:, None, None], yaws)
-    poses = np.stack(grid, axis=-1).reshape(-1, 3)
+    poses, yaws = poses_of(job, mars, chunk), job.request.yaws
     request = job.request
     turning = replace(job, request=replace(request, turns=True))
     bare, whole, turns = median_times(
@@ -85,58 +77,64 @@ def measure_chunk(job: SurveyJob, mars: Terrain) -> list[Figure]:
     ]
 
 
-def measure_workers(job: SurveyJob) -> list[Figure]:
-    """Compare numbers of workers by the clock, in turns, without the start of the cluster."""
-    times: dict[int, list[float]] = {count: [] for count in WORKERS}
-    memory = 0
-    for _ in range(TURNS):
-        for count in WORKERS:
-            with open_client(ClusterSettings(workers=count)) as client:
-                client.run(_warm_up, job)
-                times[count].append(_time(lambda: survey_with(client, job, job.layout.all_chunks)))
-                memory = max(memory, *client.run(_peak_memory).values())
-    few, many = (float(np.median(times[count])) for count in (WORKERS[0], WORKERS[-1]))
-    name, against = f"{WORKERS[-1]} workers", f"{WORKERS[0]} worker"
-    return [
-        Figure("survey", name, few / many, "x", 1.7, True, repeats=TURNS, against=against),
-        Figure("survey", "largest memory of a worker", memory / 1e6, "MB", 1024.0, repeats=1),
-    ]
+def measure_workers(job: SurveyJob, mars: Terrain) -> list[Figure]:
+    """Compare numbers of workers and the bare scores of the same poses, all in turns.
 
-
-def measure_scheduler(job: SurveyJob) -> list[Figure]:
-    """Measure what the scheduler does for a task, and how many tasks large maps have.
-
-    Client and scheduler are in this process, so its CPU time is theirs.
+    The clusters stay open, so that their start is not counted. What is compared with bare scores
+    is the CPU time of all processes, which other programs affect less than the clock.
     """
-    side = choose_chunk((LARGE[0], LARGE[0]), 1, HEADINGS)
-    layout = SurveyLayout((LARGE[0], LARGE[0]), 1, side, job.layout.halo)
-    large = replace(job, layout=layout)
-    chunks = [(k // 100, k % 100) for k in range(TASKS)]
-    with open_client(ClusterSettings(workers=1)) as client:
-        client.run(_warm_up, job)
-        before = _peak_memory()
-        began = time.process_time()
-        survey_with(client, large, chunks, task=do_nothing)
-        took = time.process_time() - began
-        grown = _peak_memory() - before
-    sent = len(pickle.dumps((large, chunks[0])))
-    back = len(pickle.dumps(ChunkReport((0, 0), 1, 1.0)))
-    figures = [
-        Figure("survey", "client and scheduler, a task", took / TASKS * 1e3, "ms", repeats=1),
-        Figure("survey", "sent with a task", sent / 1e3, "kB", repeats=1),
-        Figure("survey", "sent back", back / 1e3, "kB", repeats=1),
-        Figure("survey", f"memory of the scheduler, {TASKS} tasks", grown / 1e6, "MB", repeats=1),
+    rows, columns = job.layout.chunks
+    half = COUNT // 2
+    middle = [
+        (i, j)
+        for i in range(max(rows // 2 - half, 0), rows // 2 + half)
+        for j in range(max(columns // 2 - half, 0), columns // 2 + half)
     ]
-    for cells in LARGE:
-        side = choose_chunk((cells, cells), 1, HEADINGS)
-        tasks = (-(-cells // side)) ** 2
-        figures.append(Figure("survey", f"tasks of {cells} x {cells} cells", tasks, "", repeats=1))
-    return figures
+    poses = np.concatenate([poses_of(job, mars, chunk) for chunk in middle])
+    few, many = WORKERS[0], WORKERS[-1]
+    clock: dict[int, list[float]] = {0: [], 1: []}
+    cpu: dict[int, list[float]] = {0: [], 1: []}
+    bare, memory = [], 0
+    with contextlib.ExitStack() as stack:
+        clients = [
+            stack.enter_context(open_client(ClusterSettings(workers=count)))
+            for count in (few, many)
+        ]
+        for client in clients:
+            client.run(_warm_up, job)
+        score_poses(job.request.rover, mars, poses[:100], job.request.options)
+        for turn in range(TURNS):
+            for k in (0, 1) if turn % 2 else (1, 0):
+                busy, began = _cpu_of_all(clients[k]), time.perf_counter()
+                survey_with(clients[k], job, middle)
+                clock[k].append(time.perf_counter() - began)
+                cpu[k].append(_cpu_of_all(clients[k]) - busy)
+            busy = time.process_time()
+            score_poses(job.request.rover, mars, poses, job.request.options)
+            bare.append(time.process_time() - busy)
+        memory = max(max(client.run(_peak_memory).values()) for client in clients)
+    one, two, plain = (float(np.median(times)) for times in (cpu[0], cpu[1], bare))
+    speed = float(np.median(clock[0]) / np.median(clock[1]))
+    name, against = f"{many} workers", f"{few} worker"
+    return [
+        Figure("survey", name, speed, "x", 1.7, True, repeats=TURNS, against=against),
+        Figure("survey", f"{name}, CPU time of all processes", two / one, "x", repeats=TURNS,
+               against=against),
+        Figure("survey", f"{against}, CPU time of all processes", one / plain, "x", 1.1,
+               repeats=TURNS, against="score_poses"),
+        Figure("survey", "largest memory of a worker", memory / 1e6, "MB", 1024.0, repeats=1),
+    ]  # fmt: skip
 
 
-def do_nothing(job: SurveyJob, chunk: Index) -> ChunkReport:
-    """Return at once, as a task that takes no time."""
-    return ChunkReport(chunk)
+def poses_of(job: SurveyJob, mars: Terrain, chunk: Index) -> np.ndarray:
+    """Return the poses (n, 3) of a chunk, x, y [m] and yaw [rad]."""
+    (ys, xs), yaws = job.layout.cells_of(chunk), job.request.yaws
+    x, y = (
+        start + mars.resolution * np.arange(span.start, span.stop)
+        for start, span in zip(mars.origin, (xs, ys), strict=True)
+    )
+    grid = np.broadcast_arrays(x[:, None], y[:, None, None], yaws)
+    return np.stack(grid, axis=-1).reshape(-1, 3)
 
 
 def _warm_up(job: SurveyJob) -> None:
@@ -152,7 +150,6 @@ def _peak_memory() -> int:
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def _time(work: Callable[[], object]) -> float:
-    began = time.perf_counter()
-    work()
-    return time.perf_counter() - began
+def _cpu_of_all(client: Any) -> float:
+    """Return the CPU time of this process and the workers of a client [s]."""
+    return time.process_time() + sum(client.run(time.process_time).values())

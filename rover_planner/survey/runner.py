@@ -133,6 +133,7 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
         "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
         "distributed.logging.distributed": "critical",
         "distributed.comm.timeouts.connect": CONNECT_TIME,
+        "distributed.worker.profile.enabled": False,  # it looks at a worker's stack every 10 ms
     }
     with contextlib.ExitStack() as stack:
         stack.enter_context(dask.config.set(quiet))
@@ -151,6 +152,7 @@ def open_client(settings: ClusterSettings) -> Iterator[Any]:
             threads_per_worker=1,
             memory_limit=settings.memory_limit or "auto",
             dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": ":0"},  # any port, so that several can run
             silence_logs=logging.CRITICAL,
         )
         stack.enter_context(cluster)

@@ -108,11 +108,13 @@ class SurveyStore:
         """
         import zarr
 
+        from rover_planner.survey.durable_store import DurableStore
+
         self.path = path
         if not path.exists():
             raise PlanningError(f"no survey {show_file(path)}")
         try:
-            self._group: Any = zarr.open_group(path, mode="r+")
+            self._group: Any = zarr.open_group(DurableStore(path), mode="r+")
             self.notes = StoreNotes.from_dict(self._group.attrs[NOTES])
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise PlanningError(
@@ -148,7 +150,8 @@ class SurveyStore:
     def write(self, chunk: Index, layers: Mapping[str, np.ndarray], seconds: float) -> None:
         """Write the layers of a chunk, then that it is finished.
 
-        Each file is written aside and renamed when it is whole.
+        Each file is written aside, forced to the disk and renamed when it is whole, so that a
+        chunk that is marked as finished is there after a power failure.
 
         Raises:
             OSError: The system refuses.
@@ -202,10 +205,12 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     """
     import zarr
 
+    from rover_planner.survey.durable_store import DurableStore, force_folders
+
     aside = path.with_name(f"{path.name}.{os.getpid()}.new")
     layout = notes.layout
     try:
-        group: Any = zarr.open_group(aside, mode="w")
+        group: Any = zarr.open_group(DurableStore(aside), mode="w")
         side = min(layout.chunk, max(layout.shape))
         for name, kind in types_of_layers(notes.headings, notes.turns).items():
             group.create_array(
@@ -222,6 +227,7 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
             keep_map(group, terrain)
         group.attrs[NOTES] = notes.to_dict()
         aside.rename(path)
+        force_folders(path.parent, path.parent)
     except OSError as error:
         shutil.rmtree(aside, ignore_errors=True)
         raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None

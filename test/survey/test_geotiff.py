@@ -14,6 +14,7 @@ from rover_planner.survey.geotiff import GeoTiffMap, write_cog, write_layers
 from rover_planner.survey.layers import unpack_bits
 from rover_planner.survey.survey import prepare_survey
 from rover_planner.survey.tile_survey import outline_of
+from rover_planner.viewer.state.survey_layers import load_map
 from support.survey_maps import (
     assert_same_bits,
     layers_of,
@@ -202,6 +203,18 @@ def test_another_content_is_another_map(tmp_path):
     write_tif(path, heights)
     with pytest.raises(PlanningError, match="another map"):
         prepare_survey(make_request(), str(path), tmp_path / "out")
+
+
+def test_the_page_gets_the_map_that_was_surveyed_and_not_one_that_has_changed(tmp_path):
+    heights = make_rough_map(70, 90).elevation.astype(np.float32)
+    path = write_tif(tmp_path / "map.tif", heights[::-1], nodata=np.nan)
+    prepare_survey(make_request(), str(path), tmp_path / "out")
+    terrain = load_map(tmp_path / "out", 10_000)
+    np.testing.assert_array_equal(terrain.elevation, heights.astype(float))
+    assert terrain.origin == pytest.approx((LEFT + 0.5 * CELL, TOP - 69.5 * CELL))
+    write_tif(path, heights[::-1] + 1, nodata=np.nan)
+    with pytest.raises(PlanningError, match=r"map\.tif has changed since .*out was made"):
+        load_map(tmp_path / "out", 10_000)
 
 
 def test_a_layer_that_cannot_be_written_is_named(tmp_path):

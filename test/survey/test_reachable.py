@@ -1,20 +1,26 @@
 """What can be reached on a surveyed map, and returned from, agrees with scipy's graphs."""
 
 import json
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from rover_physics.terrain.grid import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import unpack_bits
-from rover_planner.survey.moves import find_moves
-from rover_planner.survey.reachable import find_reachable, search_area
+from rover_planner.survey.layers import pack_bits, unpack_bits
+from rover_planner.survey.reach.grid import HeadingGrid
+from rover_planner.survey.reach.kept_area import open_area
+from rover_planner.survey.reach.moves import find_moves
+from rover_planner.survey.reach.reachable import find_reachable, search_area
 from support.survey_maps import make_request, make_rough_map, survey_here
 
 CELL = 0.25
@@ -35,36 +41,117 @@ def graph_of(passable, turnable, headings):
             if turns[i, j, k] and turns[i, j, other]:
                 edges[(i, j, k), (i, j, other)] = 0.0
     size = rows * columns * headings
-    at = [np.ravel_multi_index(np.array([edge[e] for edge in edges]).T, (rows, columns, headings))
-          for e in (0, 1)]  # fmt: skip
+    at = [np.ravel_multi_index(np.array([edge[e] for edge in edges], int).reshape(-1, 3).T,
+                               (rows, columns, headings)) for e in (0, 1)]  # fmt: skip
     # Explicit zeros are edges for scipy's sparse graphs.
     return csr_array((np.array(list(edges.values())), (at[0], at[1])), shape=(size, size))
+
+
+def make_flags(shape, headings, seed, share):
+    """Return flags (rows, columns, headings): where a rover passes, and where it turns."""
+    rng = np.random.default_rng(seed)
+    open_at = rng.random((*shape, headings)) < share
+    open_at[shape[0] // 2, shape[1] // 2] = True
+    return open_at, open_at & (rng.random(open_at.shape) < 0.7)
+
+
+def search(open_at, turns_at, tile):
+    """Return the numbers of the area around the middle, and its distances."""
+    shape, headings = open_at.shape[:2], open_at.shape[2]
+    grid = HeadingGrid(pack_bits(open_at), pack_bits(turns_at), find_moves(headings, CELL), tile)
+    distance = np.full(shape, np.inf, np.float32)
+    with tempfile.TemporaryDirectory() as folder:
+        start = shape[0] // 2, shape[1] // 2
+        numbers = search_area(grid, start, distance.__setitem__, Path(folder))
+    return numbers, distance
+
+
+def compare_with_scipy(open_at, turns_at, numbers, distance):
+    """Assert that an area is that of Dijkstra's algorithm and strong components on all nodes."""
+    rows, columns, headings = open_at.shape
+    size, first = open_at.size, (rows // 2 * columns + columns // 2) * headings
+    graph = graph_of(pack_bits(open_at), pack_bits(turns_at), headings)
+    starts = [first + k for k in range(headings) if open_at.reshape(-1)[first + k]]
+    out = dijkstra(graph, indices=starts, min_only=True).reshape(open_at.shape)
+    at = graph.tocoo()
+    tails, heads = (
+        np.concatenate([ends, more])
+        for ends, more in zip(at.coords, (starts, np.roll(starts, 1)), strict=True)
+    )
+    joined = csr_array((np.ones(len(tails)), (tails, heads)), shape=(size, size))
+    _, labels = connected_components(joined, connection="strong")
+    inside = (labels == labels[starts[0]]).reshape(open_at.shape)
+    wanted = np.where(inside, out, np.inf).min(axis=2)
+    np.testing.assert_allclose(distance, wanted, rtol=1e-5)
+    assert numbers.cells == np.isfinite(wanted).sum()
+    assert numbers.reached == np.isfinite(out).any(axis=2).sum()
+    assert numbers.longest == distance[np.isfinite(distance)].max() == distance[numbers.farthest]
 
 
 @pytest.mark.parametrize("headings", [1, 4, 8, 12, 16])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_ways_are_the_shortest_of_the_graph_and_lead_back(headings, seed):
-    rng = np.random.default_rng(seed)
-    kind = np.uint64
-    open_at = rng.random((22, 25, headings)) < 0.85
-    start = (11, 12)
-    open_at[start] = True
-    turns_at = open_at & (rng.random(open_at.shape) < 0.7)
-    places = np.arange(headings).astype(kind)
-    passable, turnable = (
-        np.bitwise_or.reduce(np.where(one, kind(1) << places, kind(0)), axis=2)
-        for one in (open_at, turns_at)
+    open_at, turns_at = make_flags((22, 25), headings, seed, 0.85)
+    numbers, distance = search(open_at, turns_at, 8)
+    compare_with_scipy(open_at, turns_at, numbers, distance)
+    assert headings < 8 or numbers.cells > 20
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    shape=st.tuples(st.integers(1, 13), st.integers(1, 13)),
+    headings=st.sampled_from([1, 2, 3, 4, 8, 16, 24]),
+    seed=st.integers(0, 10_000),
+    share=st.floats(0.4, 1.0),
+    tile=st.integers(1, 13),
+)
+def test_every_tiling_finds_the_same_to_the_bit(shape, headings, seed, share, tile):
+    open_at, turns_at = make_flags(shape, headings, seed, share)
+    numbers, distance = search(open_at, turns_at, tile)
+    whole = search(open_at, turns_at, max(shape))
+    assert numbers == whole[0]
+    assert distance.tobytes() == whole[1].tobytes()
+    compare_with_scipy(open_at, turns_at, numbers, distance)
+
+
+def test_a_way_back_through_other_tiles_is_found():
+    # A spiral that is driven one way round: no tile alone has a way back.
+    open_at = np.zeros((9, 9, 4), bool)
+    open_at[0, :, 0] = open_at[:, 8, 1] = open_at[8, :, 2] = open_at[:, 0, 3] = True
+    turns_at = np.zeros_like(open_at)
+    for corner in ((0, 8), (8, 8), (8, 0), (0, 0)):
+        turns_at[corner] = open_at[corner]
+    open_at[4, 4] = True
+    open_at[4, 5:8, 0] = open_at[4, 8, 0] = turns_at[4, 8, :2] = True
+    for tile in (2, 3, 5, 9):
+        numbers, distance = search(open_at, turns_at, tile)
+        compare_with_scipy(open_at, turns_at, numbers, distance)
+        assert numbers.reached > 30 and numbers.cells == 1
+    open_at[0:5, 4, 1] = turns_at[0, 4, :2] = True  # from the ring back to the middle
+    for tile in (2, 3, 5, 9):
+        numbers, distance = search(open_at, turns_at, tile)
+        compare_with_scipy(open_at, turns_at, numbers, distance)
+        assert numbers.cells > 30 and numbers.longest > 8.0
+
+
+def test_the_area_is_kept_in_the_store_until_more_is_surveyed(tmp_path):
+    request = make_request(headings=8)
+    prepared = survey_here(tmp_path, Terrain(np.zeros((50, 70)), 0.1), request, chunk=64)
+    assert open_area(prepared.store) is None
+    found = find_reachable(prepared.store, 2.5, 2.5, tile=64)
+    first = found.distance[:].tobytes()
+    other = find_reachable(prepared.store, 2.5, 2.5, tile=17)
+    kept = open_area(prepared.store)
+    assert (kept.cells, kept.longest, kept.farthest) == (
+        found.cells,
+        found.longest,
+        found.farthest,
     )
-    area = search_area(passable, turnable, find_moves(headings, CELL), start, CELL)
-    graph = graph_of(passable, turnable, headings)
-    nodes = [np.ravel_multi_index((*start, k), open_at.shape)
-             for k in range(headings) if open_at[(*start, k)]]  # fmt: skip
-    out = dijkstra(graph, indices=nodes, min_only=True)
-    back = dijkstra(graph.T, indices=nodes, min_only=True)
-    wanted = np.where(np.isfinite(back), out, np.inf).reshape(open_at.shape).min(axis=2)
-    np.testing.assert_allclose(area.distance, wanted, rtol=1e-5)
-    assert area.reached == np.isfinite(out).reshape(open_at.shape).any(axis=2).sum()
-    assert headings < 8 or area.cells > 20
+    assert kept.distance[:].tobytes() == other.distance[:].tobytes() == first
+    assert kept.from_place == (2.5, 2.5) and kept.cells == np.isfinite(kept.distance).sum()
+    assert not [path for path in prepared.store.path.iterdir() if path.name.startswith(".reach")]
+    prepared.store.mark_failed((0, 0))
+    assert open_area(prepared.store) is None
 
 
 @pytest.mark.parametrize("headings", range(1, 65))
@@ -88,7 +175,7 @@ def test_a_wall_bounds_what_can_be_reached_and_a_step_has_no_return(tmp_path):
     store = survey_here(tmp_path, Terrain(heights, 0.1), make_request(headings=8)).store
     area = find_reachable(store, 3.0, 3.5)
     assert area.start == (35, 30) and area.cells > 1000
-    assert np.isinf(area.distance[:, 60:]).all()
+    assert np.isinf(area.distance[:, 60:]).all() and area.longest > 2.0
     assert area.distance[35, 40] == pytest.approx(1.0)
     assert area.distance[45, 40] == pytest.approx(np.sqrt(2.0))
     assert area.area == pytest.approx(area.cells * 0.01)
@@ -103,7 +190,7 @@ def test_judged_turns_bound_the_area(tmp_path):
         request = make_request(headings=8, turns=turns)
         prepared = survey_here(tmp_path / str(turns), terrain, request)
         areas.append(find_reachable(prepared.store, 1202.5, -337.5))
-    assumed, judged = (np.isfinite(area.distance) for area in areas)
+    assumed, judged = (np.isfinite(area.distance[:]) for area in areas)
     assert judged.sum() < assumed.sum() and not (judged & ~assumed).any()
 
 
@@ -124,7 +211,7 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     report = json.loads(capfd.readouterr().out)
     area = find_reachable(store, 3.0, 3.0)
     assert report["cells"] == area.cells and report["turns"] == "assumed"
-    assert report["longest"] == pytest.approx(float(area.distance[area.farthest]), abs=1e-3)
+    assert report["longest"] == pytest.approx(area.longest, abs=1e-3)
     # At the edge the rover stands along it only, and it drives forwards only.
     assert report["cells_without_return"] == area.reached - area.cells > 0
     assert picture.stat().st_size > 10_000 and tif.stat().st_size > 100

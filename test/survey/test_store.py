@@ -1,7 +1,9 @@
 """A store goes on where it was left, and is never mixed with another survey."""
 
 import json
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
+from rover_planner.survey.durable_store import write_durably
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
 from support.survey_maps import (
@@ -173,3 +176,43 @@ def test_cells_that_are_not_surveyed_say_so(files):
     assert (store.layer("best_class")[:] == 255).all()
     assert np.isnan(store.layer("worst_tilt")[:]).all()
     assert not store.layer("passable_headings")[:].any()
+
+
+def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypatch):
+    prepared = prepare(files, chunk=64)
+    chunk = prepared.chunks[0]
+    layers = compute_chunk(prepared.job, chunk)
+    done, fsync, replace_file = [], os.fsync, Path.replace
+
+    def force(number):
+        done.append(("forced", Path(f"/proc/self/fd/{number}").readlink()))
+        fsync(number)
+
+    def rename(path, target):
+        done.append(("renamed", path, target))
+        return replace_file(path, target)
+
+    monkeypatch.setattr(os, "fsync", force)
+    monkeypatch.setattr(Path, "replace", rename)
+    prepared.store.write(chunk, layers, 1.0)
+    renamed = [(k, event) for k, event in enumerate(done) if event[0] == "renamed"]
+    assert len(renamed) == len(layers) + 1
+    for k, (_, aside, target) in renamed:
+        assert ("forced", aside) in done[:k]
+        folders = [target.parent, *target.parent.parents]
+        for folder in folders[: folders.index(prepared.store.path) + 1]:
+            assert ("forced", folder) in done[k:]
+    k, (_, _, last) = renamed[-1]
+    assert last.relative_to(prepared.store.path).parts[0] == "seconds"
+    assert done[k - 2][0] == "forced" and done[k - 2][1] == prepared.store.path
+
+
+def test_a_file_that_was_not_renamed_is_not_seen(files):
+    prepared = prepare(files, chunk=64)
+    chunk = prepared.chunks[0]
+    prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+    folder = prepared.store.path / "seconds" / "c" / "0"
+    (folder / ".1.0123.partial").write_bytes(b"half of it")
+    assert prepare(files).finished == 1
+    with pytest.raises(OSError, match="No such file"):
+        write_durably(Path("/proc/no/such"), b"", Path("/proc"))

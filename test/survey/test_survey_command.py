@@ -26,6 +26,7 @@ from rover_planner.survey.runner import (
 )
 from rover_planner.survey.store import SurveyStore
 from rover_planner.survey.survey import prepare_survey
+from support.project.long_tests import on_demand
 from support.survey_maps import (
     assert_same_bits,
     die_on_one,
@@ -123,7 +124,9 @@ def test_a_killed_worker_costs_only_its_chunks_time(whole, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "how", [signal.SIGKILL, signal.SIGINT, pytest.param(signal.SIGTERM, marks=on_demand)]
+)
 def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_path, how):
     folder, layers = whole
     out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""The compiled part of the search for cells that can be reached."""
+"""The compiled part of the search for the shortest ways."""
 
 import numpy as np
 
@@ -12,23 +12,23 @@ def advance_front(masks, moves, front, distance, onward):
     A node is a cell at a heading: `cell * headings + heading`, cells row by row.
 
     Args:
-        masks: (ny, nx) uint64 bits of the passable headings, (ny, nx) uint64 bits of the headings
-            at which the rover may turn, and the direction: 1 away from the start, -1 back to it.
+        masks: (ny, nx) uint64 bits of the passable headings, and (ny, nx) uint64 bits of the
+            headings at which the rover may turn.
         moves: Moves.
         front: (n,) nodes.
         distance: (ny nx headings,) distance of each node so far [m], infinite if not reached;
-            written.
+            written. One below 0 closes a node.
         onward: (3 n,) nodes that are nearer than before, written.
     """
-    passable, turnable, direction = masks
-    rows, columns = passable.shape
+    passable, turnable = masks
+    columns = passable.shape[1]
     headings, found = moves.counts.size, 0
     for at in range(front.size):
         node = front[at]
         cell, heading = node // headings, node % headings
         i, j = cell // columns, cell % columns
         far = distance[node]
-        target = _drive(masks, moves, (i, j), heading)
+        target = _drive(passable, moves, (i, j), heading)
         if target >= 0:
             there = np.float32(far + moves.lengths[heading])
             goal = target * headings + heading
@@ -48,26 +48,16 @@ def advance_front(masks, moves, front, distance, onward):
 
 
 @exact_kernel
-def _drive(masks, moves, place, heading):
-    """Return the cell at the end of a move, or where it comes from; -1 if it is not passable."""
-    passable, _, direction = masks
+def _drive(passable, moves, place, heading):
+    """Return the cell at the end of a move, -1 if it is not passable."""
     rows, columns = passable.shape
     count, bit = moves.counts[heading], np.uint64(heading)
     last = count - 1
     i, j = place
-    if direction < 0:
-        i -= moves.steps[heading, last, 0]
-        j -= moves.steps[heading, last, 1]
-        if not (0 <= i < rows and 0 <= j < columns):
-            return -1
-        if not passable[i, j] >> bit & np.uint64(1):
-            return -1
     for k in range(count):
         row, column = i + moves.steps[heading, k, 0], j + moves.steps[heading, k, 1]
         if not (0 <= row < rows and 0 <= column < columns):
             return -1
         if not passable[row, column] >> bit & np.uint64(1):
             return -1
-    if direction < 0:
-        return i * columns + j
     return (i + moves.steps[heading, last, 0]) * columns + j + moves.steps[heading, last, 1]

@@ -1,0 +1,1 @@
+"""What can be reached on a surveyed map and returned from."""

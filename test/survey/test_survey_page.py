@@ -1,0 +1,179 @@
+"""A survey as layers of the page: its colours, its legend, and what is refused or said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
+pytest.importorskip("zarr", reason="install the extra survey")
+
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.cli import main
+from rover_planner.errors import PlanningError
+from rover_planner.survey.layers import CLASS_NUMBERS
+from rover_planner.survey.palette import CLASS_COLOURS
+from rover_planner.survey.reach.reachable import find_reachable
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.panel.survey_legend import draw_survey_legend
+from rover_planner.viewer.scene.survey_mesh import build_survey_mesh
+from rover_planner.viewer.state.colours import UNKNOWN, from_css
+from rover_planner.viewer.state.session import ViewSession
+from rover_planner.viewer.state.survey_layers import (
+    BEST_CLASS,
+    CLASS,
+    HEADINGS,
+    LIMIT,
+    REACHABLE,
+    load_map,
+    open_survey,
+)
+from support.survey_maps import make_request, survey_here
+from support.viewer.browser import (
+    ARGUMENTS,
+    PROGRAM,
+    Visitor,
+    needs_browser,
+    sync_api,
+    wait_until,
+)
+
+LSR1 = load_rover("lsr1")
+PASSABLE, WALL, HOLE = (1.5, 1.5), (4.55, 3.0), (1.5, 4.5)
+"""Places on the map [m]."""
+
+
+@pytest.fixture(scope="module")
+def surveyed(tmp_path_factory):
+    """Return a survey of flat ground with a wall and a hole, and its folder."""
+    heights = np.zeros((60, 60))
+    heights[:, 44:48] = 1.0
+    heights[44:47, 14:17] = np.nan
+    request = make_request(headings=8)
+    folder = tmp_path_factory.mktemp("survey")
+    prepared = survey_here(folder, Terrain(heights, 0.1), request)
+    find_reachable(prepared.store, *PASSABLE)
+    return prepared.store.path
+
+
+@pytest.fixture(scope="module")
+def shown(surveyed):
+    return open_survey(surveyed, LSR1, load_map(surveyed, 10_000))
+
+
+def colour_at(shown, name, place):
+    found = shown.colour(name, np.array([place[0]]), np.array([place[1]]))
+    return tuple(found.colours[0, 0].tolist())
+
+
+def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_there(shown):
+    passable, impassable = (from_css(CLASS_COLOURS[k]) for k in (0, CLASS_NUMBERS["impassable"]))
+    for name in (CLASS, BEST_CLASS):
+        assert colour_at(shown, name, PASSABLE) == passable
+        assert colour_at(shown, name, WALL) == impassable
+        assert colour_at(shown, name, HOLE) == UNKNOWN
+    assert colour_at(shown, CLASS, (-3.0, 1.0)) == UNKNOWN
+    found = shown.colour(CLASS, np.array([1.0]), np.array([1.0]))
+    legend = draw_survey_legend(CLASS, shown.describe(CLASS), found, ())
+    assert "impassable" in legend and "traction control" not in legend
+    assert "8 headings" in legend and "differs" not in legend
+
+
+def test_every_layer_has_colours_and_a_meaning(shown):
+    assert {"friction utilisation", "torque saturation", "tip over ratio", "tilt",
+            "belly clearance"} <= {name.removeprefix("survey: ").split(",")[0]
+                                   for name in shown.names}  # fmt: skip
+    at = np.linspace(0.0, 5.9, 60)
+    for name in shown.names:
+        found = shown.colour(name, at, at)
+        assert found.colours.shape == (60, 60, 3)
+        assert (found.scale is None) != (not found.keys), name
+        assert len(np.unique(found.colours.reshape(-1, 3), axis=0)) > 1, name
+    assert shown.colour(HEADINGS, at, at).scale.high == 8
+    assert any("off map" in text for _, text in shown.colour(LIMIT, at, at).keys)
+
+
+def test_the_reachable_area_ends_at_the_wall(shown):
+    assert "can go and return" in shown.describe(REACHABLE)
+    assert colour_at(shown, REACHABLE, PASSABLE) != UNKNOWN
+    assert colour_at(shown, REACHABLE, (5.3, 3.0)) == UNKNOWN
+
+
+def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
+    terrain = load_map(surveyed, 10_000)
+    drawn = build_survey_mesh(terrain, shown, CLASS)
+    picture = np.asarray(drawn.mesh.visual.material.baseColorTexture)[::-1]
+    factor = picture.shape[0] // 60
+    assert factor == 8
+    row, column = (int((at / 0.1 + 0.5) * factor) for at in PASSABLE[::-1])
+    np.testing.assert_allclose(picture[row, column], from_css(CLASS_COLOURS[0]), atol=2)
+
+
+def test_what_differs_from_the_page_is_said(shown):
+    assert shown.find_differences(LSR1, SweepOptions()) == ()
+    assert shown.find_differences(LSR1, SweepOptions(joint_angles={})) == ()
+    changed = replace(LSR1, friction=0.5)
+    said = shown.find_differences(changed, SweepOptions(policy="servo", soil="dry sand"))
+    assert said[0] == "the rover was changed since"
+    assert "torque policy equal in the survey, servo here" in said
+    assert any(one.startswith("soil") for one in said)
+
+
+@pytest.mark.parametrize(
+    ("rover", "heights", "said"),
+    [
+        (load_rover("m2020"), None, "a survey of lsr1, not m2020"),
+        (replace(LSR1, friction=0.5), None, "a survey of another lsr1"),
+        (LSR1, np.zeros((60, 60)), "another map, or of one with other gaps"),
+    ],
+)
+def test_a_survey_of_another_rover_or_map_is_refused(surveyed, rover, heights, said):
+    terrain = load_map(surveyed, 10_000) if heights is None else Terrain(heights, 0.1)
+    with pytest.raises(PlanningError, match=said):
+        open_survey(surveyed, rover, terrain)
+
+
+def test_a_map_that_is_too_large_is_refused(surveyed):
+    with pytest.raises(PlanningError, match="60 x 60 cells; --max-cells is 100"):
+        load_map(surveyed, 100)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--survey", "nothing"], "no survey nothing"),
+        (["--survey", ".", "--follow"], "--follow and --survey exclude each other"),
+        (["--survey", "."], "is not a survey"),
+    ],
+)
+def test_the_command_refuses_what_is_no_survey(words, said, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["view", "lsr1", "--port", "0", *words]) == 2
+    err = capfd.readouterr().err
+    assert said in err and err.count("\n") == 1
+
+
+@needs_browser
+@pytest.mark.slow
+def test_the_page_shows_the_survey_and_says_when_the_policy_is_another(shown, surveyed):
+    session = ViewSession(LSR1, load_map(surveyed, 10_000), (1.5, 1.5, 0.0), (2.5, 1.5, 0.0))
+    page = Page(session, port=0, survey=shown)
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+        visitor = Visitor(chromium, page.url)
+        visitor.open_tab("Ground and path")
+        visitor.wait_for("impassable")
+        assert "survey: class" in visitor.text("#scale")
+        before = visitor.picture()
+        visitor.choose("Colour by", REACHABLE)
+        visitor.wait_for("can go and return")
+        wait_until(lambda: visitor.picture() != before, "other colours")
+        visitor.choose("Torques", "speed servos")
+        visitor.wait_for("torque policy equal in the survey, servo here")
+        visitor.choose("Colour by", "height")
+        visitor.wait_for("a line every metre")
+        assert not visitor.page_errors
+        chromium.close()
+    page.close()
