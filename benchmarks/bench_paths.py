@@ -149,17 +149,17 @@ def measure_memory(count: int, folder: Path) -> Figure:
     return Figure("paths", f"predict {count:,} poses: peak memory", peak, "MiB", 1024.0, repeats=1)
 
 
-def measure(count: int = MANY) -> list[Figure]:
-    """Measure paths, files, questions and memory."""
+def measure(count: int | None = None) -> list[Figure]:
+    """Measure paths, files, questions and memory; the last for a number of poses or MANY."""
     numba.set_num_threads(1)
     rover, figures = load_rover("lsr1"), []
     for name, (ground, paths, most) in cases().items():
         figures += measure_ratio(rover, name, ground, paths, most)
     with tempfile.TemporaryDirectory(dir=".") as folder:
         figures += measure_files(rover, Path(folder)) + measure_questions(rover)
-        figures.append(measure_memory(count, Path(folder)))
+        figures.append(measure_memory(count or MANY, Path(folder)))
     return figures
 
 
 if __name__ == "__main__":
-    show(measure(int(sys.argv[1]) if len(sys.argv) > 1 else MANY))
+    show(measure(int(sys.argv[1]) if len(sys.argv) > 1 else None))

@@ -46,6 +46,12 @@ class TimedPage(Page):
         self.drawn: list[float] = []
         super().__init__(session, port=0)
 
+    @property
+    def processor_time(self) -> float:
+        """Processor time that the page's own thread has used [s]."""
+        assert self._thread.ident is not None
+        return time.clock_gettime(time.pthread_getcpuclockid(self._thread.ident))
+
     def advance(self, seconds: float) -> None:
         """Draw the next picture."""
         self.drawn.append(time.perf_counter())
@@ -57,7 +63,11 @@ class Times:
     """What was measured on one ground."""
 
     verdicts: list[float] = field(default_factory=list)
-    """Times from a slider to the new verdict [s]."""
+    """Times from a slider to the new verdict, in words [s]."""
+    drawings: list[float] = field(default_factory=list)
+    """Times to all drawings of that verdict: paths, failure, lanes, plots, tables [s]."""
+    efforts: list[float] = field(default_factory=list)
+    """Processor times of the page's own thread up to there [s]; other load hardly counts."""
     rests: list[float] = field(default_factory=list)
     """Times to the verdicts under all policies [s]."""
     pauses: list[float] = field(default_factory=list)
@@ -96,6 +106,12 @@ def measure_ground(name: str, ground: Terrain) -> Iterator[Figure]:
         yield figure(f"{title}: slider to verdict", value=1e3 * quantile(times.verdicts, 0.5),
                      target=target)  # fmt: skip
         yield figure(f"{title}: the longest", value=1e3 * max(times.verdicts), target=target)
+        drawings = times.drawings
+        yield figure(f"{title}: slider to drawings", value=1e3 * quantile(drawings, 0.5))
+        yield figure(f"{title}: the longest to drawings", value=1e3 * max(drawings), target=target)
+        efforts = times.efforts
+        yield figure(f"{title}: page's processor time", value=1e3 * quantile(efforts, 0.5))
+        yield figure(f"{title}: page's longest processor time", value=1e3 * max(efforts))
         if times.rests:
             yield figure(
                 f"{title}: slider to all policies", value=1e3 * quantile(times.rests, 0.5)
@@ -142,11 +158,15 @@ def _time_change(
     page: TimedPage, value: RoverValue, number: float, times: Times, whole: bool
 ) -> None:
     session, before, began = page.session, page.session.wanted, time.perf_counter()
+    effort = page.processor_time
     page.requests.add(lambda: page._change_value(value, number), "slider")
     _wait(lambda: session.wanted is not before)
     _wait(lambda: not session.is_outdated)
     _wait_for_page(page)
     times.verdicts.append(time.perf_counter() - began)
+    _wait(lambda: not page.is_drawing)
+    times.drawings.append(time.perf_counter() - began)
+    times.efforts.append(page.processor_time - effort)
     if whole:
         _wait(lambda: not page.is_busy)
         _wait_for_page(page)
@@ -160,7 +180,7 @@ def _time_change(
 
 
 def _wait_for_page(page: Page) -> None:
-    """Wait until the page's thread has shown what it does now."""
+    """Wait until the page's thread has done what was requested before."""
     shown = threading.Event()
     page.requests.add(shown.set)
     shown.wait()

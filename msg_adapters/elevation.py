@@ -53,7 +53,7 @@ class CloudPoints:
     """The points of a cloud in the order of the message, invalid ones included."""
 
     xyz: NDArray[np.float64]
-    """(n, 3) coordinates [m]; NaN where the message has NaN."""
+    """(n, 3) coordinates [m]; NaN where the message has NaN, in all three if they are moved."""
     friction: NDArray[np.float64] | None
     """(n,) friction coefficient, where the cloud has such a field."""
     elevation_std: NDArray[np.float64] | None
@@ -62,8 +62,18 @@ class CloudPoints:
     """Rounding error of the x and y coordinates [m]."""
 
 
-def read_points(cloud: PointCloud2) -> CloudPoints:
-    """Read the points of a cloud of any layout.
+@dataclass(frozen=True, eq=False)
+class PointMove:
+    """What moves points from the frame of a sensor to that of the map: R p + t."""
+
+    rotation: NDArray[np.float64]
+    """(3, 3) R."""
+    translation: NDArray[np.float64]
+    """(3,) t [m]."""
+
+
+def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoints:
+    """Read the points of a cloud of any layout, and move them.
 
     Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
     and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64.
@@ -75,6 +85,9 @@ def read_points(cloud: PointCloud2) -> CloudPoints:
     columns = {name: points[name].astype(np.float64).ravel() for name in points.dtype.names or ()}
     xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
     precision = rounding_error(points["x"], points["y"])
+    if move is not None:
+        xyz = xyz @ move.rotation.T + move.translation  # NaN where a coordinate is
+        precision = rounding_error(points["x"], points["y"], points["z"])
     return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 
 
@@ -83,12 +96,13 @@ def terrain_from_point_cloud(
     cloud: PointCloud2,
     resolution: float = 0.0,
     cell_height: str = "max",
+    move: PointMove | None = None,
 ) -> Terrain:
     """Grid a cloud onto square cells; a cell without a point is unknown (NaN).
 
     Args:
-        cloud: Points in the map frame, z up [m]. A point without a finite height is unknown
-            ground. A point without finite x and y is ignored.
+        cloud: Points in the map frame, z up [m], or in the sensor's frame of `move`. A point
+            without a finite height is unknown ground. A point without finite x and y is ignored.
         resolution: Cell size [m]. 0 uses the spacing of the points, which must then form a
             regular grid along x and y. Irregular points need a resolution above 0; their cells
             are centred on multiples of it.
@@ -96,6 +110,8 @@ def terrain_from_point_cloud(
             which is safe; it raises noisy ground by about the noise and narrows a ditch by up
             to a cell. "mean" is unbiased on plain ground and lowers the edges of obstacles.
             "median" also ignores stray points, and loses obstacles below half of a cell's points.
+        move: Moves the points to the map frame. They need a resolution above 0 then, as points of
+            a sensor form no grid in the map.
 
     Raises:
         MessageError: The cloud cannot be read, has no valid point or one beyond MAX_COORDINATE,
@@ -110,6 +126,8 @@ def terrain_from_point_cloud(
             f"resolution is {resolution} m; it must be positive, or 0 to detect it, and from "
             f"{MIN_RESOLUTION:g} to {MAX_RESOLUTION:g}"
         )
+    if move is not None:
+        return _terrain_of_scatter(read_points(cloud, move), resolution, cell_height)
     points = _view_points(cloud)
     raster = detect_raster(points["x"], points["y"])
     if raster is not None and _is_wanted(raster.grid, resolution):

@@ -1,6 +1,29 @@
-"""Checks the frame of messages: only the map frame is accepted, nothing is transformed."""
+"""Checks the frame of messages, and reads transforms between frames."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
+from msg_adapters.stamps import stamp_to_ns
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTransform:
+    """Where a child frame is in its parent frame at a time."""
+
+    parent: str
+    """Name of the parent frame."""
+    child: str
+    """Name of the child frame."""
+    stamp: int
+    """Time [ns]; 0 if the sender set none."""
+    translation: NDArray[np.float64]
+    """(3,) x, y, z [m]."""
+    xyzw: NDArray[np.float64]
+    """(4,) quaternion of length 1."""
 
 
 def check_frame(frame_id: str, map_frame: str, what: str) -> None:
@@ -12,3 +35,23 @@ def check_frame(frame_id: str, map_frame: str, what: str) -> None:
     if frame_id != map_frame:
         given = f"in frame {frame_id!r}" if frame_id else "without a frame_id"
         raise MessageError(f"{what} is {given}; it must be in {map_frame!r}")
+
+
+def read_transform(message: Any) -> FrameTransform:
+    """Return the transform of a geometry_msgs/TransformStamped, also one of a bag.
+
+    Raises:
+        MessageError: It is not finite, no unit quaternion, or a frame has no name.
+    """
+    parent, child = message.header.frame_id, message.child_frame_id
+    place, turn = message.transform.translation, message.transform.rotation
+    numbers = np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w])
+    length = float(np.linalg.norm(numbers[3:]))
+    if not (np.isfinite(numbers).all() and 0.99 < length < 1.01 and parent and child):
+        raise MessageError(
+            f"transform from {child!r} to {parent!r} has translation {numbers[:3].tolist()} and "
+            f"rotation {numbers[3:].tolist()}; it must be finite, a quaternion of length 1, and "
+            "both frames must have names"
+        )
+    stamp = stamp_to_ns(message.header.stamp) or 0
+    return FrameTransform(parent, child, stamp, numbers[:3], numbers[3:])

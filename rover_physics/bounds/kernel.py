@@ -21,6 +21,7 @@ from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.stability import CORNERS
 from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.records import new_record, record_type, shared_array_of
 from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
@@ -115,8 +116,8 @@ def find_bounds(
     uncertain = shared_array_of(_pack_uncertain(model, ground))
     with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
-            places = poses[part], motions[part], nominal[part]
-            sweep = uncertain, places, works, bounds[part]
+            places = (view_read_only(one[part]) for one in (poses, motions, nominal))
+            sweep = uncertain, tuple(places), works, bounds[part]
             run_chunks(bound_poses, sweep, len(works), threads)
     return bounds
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rover_physics.contact.contact_record import NOTICED
-from rover_physics.contact.intrusion import is_below, take_point
+from rover_physics.contact.intrusion import ROUNDING, is_below, is_beside, take_point
 from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import elevation_of
 
@@ -28,13 +28,18 @@ def look_into_cells(ground, search, i, j):
     ex, ey, scale = search.ahead_x, search.ahead_y, ground.inverse_resolution
     here = elevation_of(ground, i, j)
     x, y = j - search.x, i - search.y
-    s, curl = x * ex + y * ey, 0.5 / (search.radius * search.cosine)
+    s, t, curl = x * ex + y * ey, y * ex - x * ey, 0.5 / (search.radius * search.cosine)
     gentle = abs(s) < GENTLE * search.radius
     for cell in range(4):
         row, column = i - cell // 2, j - cell % 2
         if row < 0 or column < 0 or row > ground.rows - 2 or column > ground.columns - 2:
             continue
         di, dj = 1 - 2 * (cell // 2), 1 - 2 * (cell % 2)
+        along, aside = di * ex, -dj * ey
+        if is_beside(
+            search, t + min(along, 0.0) + min(aside, 0.0), t + max(along, 0.0) + max(aside, 0.0)
+        ):
+            continue
         beside = (elevation_of(ground, i, j + dj) - here) * scale
         above = (elevation_of(ground, i + di, j) - here) * scale
         across = (elevation_of(ground, i + di, j + dj) - here) * scale
@@ -80,6 +85,9 @@ def _look_into_cell(search, corner, shape):
     a, b, c, d = shape
     sag, skew = d * ex * ey, d * (ex * ex - ey * ey)
     slope_s, slope_t = b * ex + c * ey, c * ex - b * ey - search.tangent
+    least, most = span_of_peaks(slope_t / d, ex, ey)
+    if not least <= most:
+        return
     half = 0.5 / sag
     bend = 0.5 * d * d * half
     rise = slope_s + slope_t * skew * half
@@ -96,6 +104,13 @@ def _look_into_cell(search, corner, shape):
         at = min(max(rise / rest, low), high)
         if level + R * inverse + (rise - 0.5 * rest * at) * at <= search.best:
             return
+    least, most = max(s0 + least, low), min(s0 + most, high)
+    if not least <= most:
+        return
+    at = min(max(rise / rest, least), most) if rest > 0.0 else least
+    highest = max((rise - 0.5 * rest * at) * at, (rise - 0.5 * rest * most) * most)
+    if level + R * inverse + highest < search.best - ROUNDING:
+        return
     if rest > 0.0:
         _look_on_line(search, (s0, t0), shape, (rise, bend, low, high))
         return
@@ -106,6 +121,23 @@ def _look_into_cell(search, corner, shape):
         _look_on_line(search, (s0, t0), shape, (rise, bend, max(low, inflection), high))
     if low < -inflection:
         _look_on_line(search, (s0, t0), shape, (rise, bend, low, min(high, -inflection)))
+
+
+@kernel
+def span_of_peaks(place, ex, ey):
+    """Return the least and largest distance along s from a cell's corner at which a peak may be.
+
+    On the line of best t the place along x is (distance - place) / (2 ex), that along y
+    (distance + place) / (2 ey); both are between 0 and 1 in the cell.
+
+    Args:
+        place: Slope of the ground across the heading at the corner, over the twist [cells].
+        ex: Heading along x; neither this nor the next may be 0.
+        ey: Heading along y.
+    """
+    least = max(place + min(2.0 * ex, 0.0), min(2.0 * ey, 0.0) - place)
+    most = min(place + max(2.0 * ex, 0.0), max(2.0 * ey, 0.0) - place)
+    return least - ROUNDING, most + ROUNDING
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 from numba import int64
 
 from rover_physics.contact.cell_peaks import GENTLE, look_into_cells
-from rover_physics.contact.intrusion import begin_search, is_below, take_point
+from rover_physics.contact.intrusion import begin_search, is_below, is_beside, take_point
 from rover_physics.contact.rim_search import LEVEL, RIM_BEND, cross_rim, look_along_rims
 from rover_physics.contact.tracking import keep_contact
 from rover_physics.numerics.kernels import kernel
@@ -176,6 +176,8 @@ def _look_around(ground, search, vertex, there):
             along_s, along_t = ey, ex
         if edge % 2 == 1:
             di, dj, along_s, along_t = -di, -dj, -along_s, -along_t
+        if is_beside(search, t + min(along_t, 0.0), t + max(along_t, 0.0)):
+            continue
         if not is_cell_on_map(ground, j + dj, i + di):
             continue
         rise = (elevation_of(ground, i + di, j + dj) - here) * scale - search.tangent * along_t

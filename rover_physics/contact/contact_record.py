@@ -4,6 +4,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 
 
@@ -56,6 +57,8 @@ CELL_SEARCH = record_type(
     ("cell", float),  # size of a cell [m]
     ("radius", float),  # radius of the wheel [cells]
     ("half_width", float),  # half its width, as seen from above [cells]
+    ("right", float),  # least place across the heading of what is below it [cells]
+    ("left", float),  # largest one [cells]
     ("x", float),  # place of its centre [cells]
     ("y", float),
     ("z", float),  # height of its centre [m]
@@ -77,3 +80,11 @@ CELL_SEARCH = record_type(
     ("found", np.int64),  # 1 if the search has found it
 )
 """Work space of `look_everywhere`."""
+
+
+@kernel
+def hold_wheels(held, i, contacts):
+    """Copy height and contact angle of the held wheels at pose i into the contacts."""
+    for wheel in range(6 if held.shape[0] > 0 else 0):
+        contacts.held_height[wheel] = held[i, wheel, 0]
+        contacts.held_angle[wheel] = held[i, wheel, 1]

@@ -10,6 +10,9 @@ import numpy as np
 from rover_physics.contact.contact_record import NOTICED
 from rover_physics.numerics.kernels import kernel
 
+ROUNDING = 1e-9
+"""Bound of rounding errors of places and intrusions [cells]."""
+
 
 @kernel
 def begin_search(model, work, wheel):
@@ -28,6 +31,9 @@ def begin_search(model, work, wheel):
     search.cosine, search.sine = placement.up[wheel, 2], placement.axis[wheel, 2]
     search.tangent = search.sine / search.cosine
     search.half_width = samples.half_width * scale * search.cosine
+    lean = search.sine * search.radius
+    search.right = min(lean, 0.0) - search.half_width
+    search.left = max(lean, 0.0) + search.half_width
     search.found = search.crossings = 0
     contacts = work.contacts
     search.peak[0] = search.peak[1] = -np.inf
@@ -43,6 +49,12 @@ def is_below(search, s, t):
     """Return whether the point (s, t) is below the wheel; |s| must be below R."""
     lean = search.sine * np.sqrt(search.radius * search.radius - s * s)
     return abs(t - lean) <= search.half_width
+
+
+@kernel
+def is_beside(search, low, high):
+    """Return whether all that is at places `low` <= t <= `high` is beside the wheel for sure."""
+    return low > search.left + ROUNDING or high < search.right - ROUNDING
 
 
 @kernel

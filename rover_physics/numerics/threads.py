@@ -1,7 +1,8 @@
 """Number of threads of a sweep; for a short sweep, waking threads takes longer than the sweep."""
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
@@ -9,6 +10,9 @@ import numba
 
 MAX_SERIAL_POSES = 2000
 """Largest number of poses with equal torques, or equivalent effort, that use one thread."""
+
+CALLS_IN_WORK = 2
+"""Calls for each thread that run or wait in `run_in_turn`, so that a thread has its next one."""
 
 
 @contextmanager
@@ -44,4 +48,29 @@ def run_chunks(sweep: Callable[..., Any], inputs: tuple, chunks: int, threads: i
             done.result()
     finally:
         # An interrupted sweep ends with the chunks at work: they write into its arrays.
+        pool.shutdown(cancel_futures=True)
+
+
+def run_in_turn(calls: Iterable[Callable[[], object]], threads: int) -> None:
+    """Run calls on some threads; they begin in their order.
+
+    Args:
+        calls: The calls, drawn one by one while earlier ones run. When call k begins, call
+            k - CALLS_IN_WORK * threads has ended, so the two may share a work space.
+        threads: Number of threads.
+    """
+    if threads == 1:
+        for call in calls:
+            call()
+        return
+    pool = ThreadPoolExecutor(threads)
+    waiting: deque[Future[object]] = deque()
+    try:
+        for call in calls:
+            if len(waiting) == CALLS_IN_WORK * threads:
+                waiting.popleft().result()
+            waiting.append(pool.submit(call))
+        for one in waiting:
+            one.result()
+    finally:
         pool.shutdown(cancel_futures=True)

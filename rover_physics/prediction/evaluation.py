@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.contact.clearance import belly_clearance
-from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS
+from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS, hold_wheels
 from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces
@@ -39,7 +39,6 @@ NONE_HELD = np.empty((0, 6, 2))
 AHEAD = np.empty((0, 3))
 """Value of `motions` if the rover drives straight ahead, or straight back if this is its direction
 of the settings."""
-
 
 SETTINGS = record_type(
     ("policy", np.int64),  # a TorquePolicy
@@ -229,28 +228,34 @@ def set_pose(model, poses, motions, i, work):
 
 
 @kernel
-def hold_wheels(held, i, contacts):
-    """Copy height and contact angle of the held wheels at pose i into the contacts."""
-    for wheel in range(6 if held.shape[0] > 0 else 0):
-        contacts.held_height[wheel] = held[i, wheel, 0]
-        contacts.held_angle[wheel] = held[i, wheel, 1]
-
-
-@kernel
 def evaluate_pose(model, work, result):
     """Evaluate the model at the pose and motion of `set_pose` into a RESULT.
 
     If the rover does not settle or its forces do not balance, only motion, steering, status and q
-    (NaN) are written.
-    If a result is not a number, all are NaN: a comparison with NaN would keep every limit.
+    (NaN) are written. If a result is not a number, all are NaN: NaN would keep every limit.
     """
-    linkage = model.linkage
-    _write_motion(linkage, work, result)
+    _write_motion(model.linkage, work, result)
+    evaluate_stance(model, work, stand(model, work), result)
+
+
+@kernel
+def stand(model, work):
+    """Settle the rover at the pose and motion of `set_pose`; return a PoseStatus.
+
+    What it writes depends on the rover and its ground, not on the torque policy.
+    """
     status = settle(model, work) if work.can_follow else PoseStatus.STEERING
     if status == PoseStatus.SETTLED:
-        place_masses(linkage, work.q, work.placement)
-        if not _balance(model, work):
-            status = PoseStatus.NO_EQUILIBRIUM
+        place_masses(model.linkage, work.q, work.placement)
+    return status
+
+
+@kernel
+def evaluate_stance(model, work, status, result):
+    """Evaluate a rover for which `stand` has returned a status, without motion and steering."""
+    linkage = model.linkage
+    if status == PoseStatus.SETTLED and not _balance(model, work):
+        status = PoseStatus.NO_EQUILIBRIUM
     result.status = status
     if status != PoseStatus.SETTLED:
         result.q[:] = np.nan

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.contact.contact_record import hold_wheels
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.crossing import find_crossings
 from rover_physics.prediction.evaluation import (
     AHEAD,
     NONE_HELD,
     evaluate_pose,
-    hold_wheels,
     new_results,
     new_work,
     set_pose,

@@ -244,9 +244,9 @@ def find_suspects(results, limits):
     suspect = -1
     for row in range(results.size):
         result = results[row]
-        if result.status != PoseStatus.SETTLED or not _stands_safely(result, limits):
+        if result.status != PoseStatus.SETTLED or not stands_safely(result, limits):
             return (row if suspect < 0 else suspect), row
-        if not _has_grip(result, limits):
+        if not has_grip(result, limits):
             suspect = row if suspect < 0 else suspect
             if not _may_fall(result):
                 return suspect, row
@@ -254,7 +254,7 @@ def find_suspects(results, limits):
 
 
 @exact_kernel
-def _stands_safely(result, limits):
+def stands_safely(result, limits):
     """Return whether suspension, tilt, tip-over ratio and clearance keep their limits."""
     q = result.q
     rocker = min(q[3], -q[3]) >= limits.least_rocker and max(q[3], -q[3]) <= limits.most_rocker
@@ -267,7 +267,7 @@ def _stands_safely(result, limits):
 
 
 @exact_kernel
-def _has_grip(result, limits):
+def has_grip(result, limits):
     """Return whether load, sinkage, friction and torque of all wheels keep their limits.
 
     So must the speed of a rover with speed servos.

@@ -227,6 +227,9 @@ def main(words: Sequence[str] | None = None) -> int:
         options = read_words(NODE_NAME, words)
         if options == EXIT_OK:  # help was printed
             return EXIT_OK
+        rclpy.logging.get_logger(NODE_NAME).info(
+            "compiling kernels; the first start takes longest"
+        )
         init_ros(words)
         overrides = [Parameter(name, value=value) for name, value in options.items()]
         node = RoverSimulator(parameter_overrides=overrides)

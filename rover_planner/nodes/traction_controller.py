@@ -171,6 +171,7 @@ class TractionController(Node):
         self._supervisor.configure(self._load(parameters))
         self._clock_watch.timeout = parameters.clock_timeout
         self._inputs.stamps.tolerance = parameters.stamp_tolerance
+        self._inputs.frames.apply_timeout(parameters.transform_timeout)
         last, self._values = self._values, parameters
         if (last.map_resolution, last.cell_height) != (
             parameters.map_resolution,

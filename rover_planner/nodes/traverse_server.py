@@ -34,14 +34,15 @@ from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_file_service import MapFileService
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
-from rover_planner.nodes.navigation.frames import Frames, is_empty
+from rover_planner.nodes.navigation.frames import is_empty
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
+from rover_planner.nodes.navigation.sensor_frames import SensorFrames
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
-from rover_planner.nodes.warm_up import WAYS
+from rover_planner.nodes.warm_up import HAZARDS, WAYS
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
@@ -67,6 +68,9 @@ from rover_planner.shell.kernels import load_kernels
 from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "traverse_server"
+SWITCH_INTERVAL = 1e-3
+"""Longest time for which a thread that prepares maps may delay a question whenever it needs
+Python's lock [s]; Python's thread switch interval."""
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 
@@ -82,6 +86,7 @@ class TraverseServer(Node):
         super().__init__(NODE_NAME, **node_arguments)
         self._values = declare_parameters(self, TraverseServerParameters)
         behind = UNCERTAIN if self._values.planner == FAN else (*UNCERTAIN, *WAYS)
+        behind = (*behind, *HAZARDS) if self._values.hazard_map else behind
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
         self._behind = load_kernels(EXACT, behind, self.get_logger().info)
         warn_of_disk(self.get_logger())
@@ -90,8 +95,9 @@ class TraverseServer(Node):
         """Takes unexpected errors."""
         frame, reliability = self._values.map_frame, self._values.input_reliability
         self._joint_names = read_joint_map(self._values.joint_map, self._service.all_joint_names)
-        self.frames = Frames(self, self._values, self.guard.around)
+        self.frames = SensorFrames(self, self._values, self.guard.around)
         """Transforms poses to the map frame."""
+        self.frames.listen()
         self._results = ResultTopics(
             self,
             DeferredWork(self),
@@ -101,7 +107,12 @@ class TraverseServer(Node):
             self.frames.to_base,
         )
         self._maps = MapTopics(
-            self, self._service, self._values, self.guard, lambda error: self._note_map(error)
+            self,
+            self._service,
+            self._values,
+            self.guard,
+            lambda error: self._note_map(error),
+            self.frames.find_sensor,
         )
         self.desk = QuestionDesk(self, self._service, self._maps, self.guard)
         """Takes the questions of all services."""
@@ -176,7 +187,7 @@ class TraverseServer(Node):
         self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
         self._maps.apply(parameters)
         self.watch.apply(parameters)
-        self.frames.apply(parameters)
+        self.frames.apply_timeout(parameters.transform_timeout)
         self._hazards.apply(parameters)
 
     def _note_map(self, error: str) -> None:
@@ -197,6 +208,7 @@ class TraverseServer(Node):
             here = self.frames.localise_odometry(odometry)
             pose, _ = odometry_to_pose(here, self._values.map_frame)
             body = float(pose[2]), *odometry_to_tilt(here)
+            self.frames.take_odometry(here)
             self._service.take_pose(pose[[0, 1, 3]], body)
             self._maps.look_under_rover()
         except INPUT_ERRORS as error:
@@ -357,6 +369,7 @@ def _run(make_node: Callable[[], TraverseServer]) -> None:
         executor.add_guarded(node, node.guard)
         gc.collect()
         gc.freeze()  # objects that live as long as the node are excluded from garbage collection
+        sys.setswitchinterval(SWITCH_INTERVAL)
         executor.spin()
     except Exception as error:
         # A signal during the start ends the context, and the rest of the start then fails.

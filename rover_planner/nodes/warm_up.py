@@ -4,11 +4,14 @@ import numpy as np
 
 from rover_physics.compilation import Step
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.warm_up import EXACT, SCORES, UNCERTAIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
+from rover_planner.planning.navigation import pose_classes
+from rover_planner.planning.navigation.pose_classes import RoverOnMap
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import LatticeSettings, find_way
@@ -19,9 +22,11 @@ CANDIDATES = (Step("candidate paths", "rover_planner.nodes.warm_up:plan_candidat
 """All that candidates of a question need."""
 WAYS = (Step("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
 """All that searches around obstacles need."""
+HAZARDS = (Step("classes of poses", "rover_planner.nodes.warm_up:classify_poses"),)
+"""All that the hazard map needs."""
 TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
 """All that updates of the traction controller need."""
-GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES), WAYS)
+GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES), WAYS, HAZARDS)
 """All kernels; groups have hardly any in common."""
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
@@ -33,14 +38,21 @@ def plan_candidates() -> None:
 
 
 def search_ways() -> None:
-    """Search a way on level ground, and where a wall leaves none."""
+    """Search a way on level ground, around the end of a wall, and where a wall leaves none."""
     ends = (0.7, 1.5, 0.0), (2.3, 1.5, 0.0)
-    for height in (0.0, 1.0):
+    for rows in (0, 35, 60):
         elevation = np.zeros((60, 60))
-        elevation[:, 30] = height
+        elevation[:rows, 30] = 1.0
         ground = Terrain(elevation, 0.05, (0.0, 0.0))
         question = WayQuestion(load_rover("lsr1"), ground, *ends, PathQueryOptions())
         find_way(question, LatticeSettings(budget=60.0))
+
+
+def classify_poses() -> None:
+    """Find the class of a pose on level ground."""
+    ground = Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
+    on_map = RoverOnMap(load_rover("lsr1"), ground, SweepOptions())
+    pose_classes.classify_poses(on_map, np.array([[1.5, 1.5, 0.0]]))
 
 
 def control_traction() -> None:

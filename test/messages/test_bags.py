@@ -1,5 +1,6 @@
-"""Recorded maps are read: a GridMap that comes with grid_map, Hazcam points of Spirit."""
+"""Recorded maps are read: a GridMap of legged robots, Hazcam points of Spirit."""
 
+import lzma
 import os
 from pathlib import Path
 
@@ -10,7 +11,10 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import terrain_from_grid_map
+from rover_physics import judge_path, load_rover
 from support.messages.grid_maps import move_buffer
+
+DATA = Path(__file__).resolve().parents[1] / "data"
 
 
 def bag(name: str) -> Path:
@@ -23,25 +27,48 @@ def bag(name: str) -> Path:
     return path
 
 
-def test_the_grid_map_that_comes_with_grid_map_is_read():
+@pytest.fixture(scope="module")
+def recorded_grid_map(tmp_path_factory):
+    """Return the GridMap of a ROS 1 bag of traversability_estimation (test/data/README.md)."""
+    pytest.importorskip("rosbags", reason="no rosbags: pip install '.[bags]'")
     from rosbags.highlevel import AnyReader
 
-    with AnyReader([bag("grid_map_demo/grid_map.bag")]) as reader:
+    file = tmp_path_factory.mktemp("bag") / "elevation_map.bag"
+    file.write_bytes(lzma.decompress((DATA / "grid_map.bag.xz").read_bytes()))
+    with AnyReader([file]) as reader:
         ((connection, _, raw),) = list(reader.messages())
-        message = reader.deserialize(raw, connection.msgtype)
-    terrain = terrain_from_grid_map(message)
-    # 1.2 m along x and 3.6 m along y around (0, 0), cells of 3 cm
-    assert terrain.elevation.shape == (120, 40) and terrain.resolution == 0.03
-    assert terrain.origin == pytest.approx((-0.585, -1.785))
-    known = np.isfinite(terrain.elevation)
-    assert known.sum() == np.isfinite(message.data[0].data).sum() == 906
-    assert terrain.elevation[known].min() == pytest.approx(-0.1)
-    assert terrain.elevation[known].max() == pytest.approx(0.1)
-    # The message's first value is that of the cell of largest x and y; rows run along -x.
-    stored = message.data[0].data
-    np.testing.assert_array_equal(terrain.elevation[-1, ::-1], stored[:40].astype(float))
-    moved = terrain_from_grid_map(move_buffer(message, 11, 97))
+        return reader.deserialize(raw, connection.msgtype)
+
+
+def test_a_grid_map_of_legged_robots_is_read_from_its_bag(recorded_grid_map):
+    terrain = terrain_from_grid_map(recorded_grid_map)
+    # 3 m along x and 3.99 m along y around (0, 0), cells of 3 cm, all known
+    assert terrain.elevation.shape == (133, 100) and terrain.resolution == 0.03
+    assert terrain.origin == pytest.approx((-1.485, -1.98))
+    (stored,) = (
+        layer.data
+        for name, layer in zip(recorded_grid_map.layers, recorded_grid_map.data, strict=True)
+        if name == "elevation"
+    )
+    # Value k is that of row k % 100 and column k // 100; rows run along -x, columns along -y.
+    for k in range(0, len(stored), 37):
+        x, y = 1.485 - 0.03 * (k % 100), 1.98 - 0.03 * (k // 100)
+        row, column = round((y + 1.98) / 0.03), round((x + 1.485) / 0.03)
+        assert terrain.elevation[row, column] == stored[k]
+    moved = terrain_from_grid_map(move_buffer(recorded_grid_map, 11, 97))
     assert moved.elevation.tobytes() == terrain.elevation.tobytes()
+
+
+def test_a_rover_climbs_the_ramp_of_the_recorded_map_and_not_its_wall(recorded_grid_map):
+    """The ramp rises by 0.4 m in 1 m towards +x; beside it is a wall of 0.3 m."""
+    terrain, rover = terrain_from_grid_map(recorded_grid_map), load_rover("lsr1")
+    x = np.arange(-0.6, -0.35, 0.05)
+    on_ramp, _ = judge_path(rover, terrain, np.column_stack([x, 0 * x + 1.0, 0 * x]))
+    assert on_ramp.settled.all()
+    np.testing.assert_allclose(on_ramp.pitch, -np.arctan(0.4), atol=0.04)  # the nose is up
+    x = np.arange(-0.9, -0.2, 0.02)
+    _, verdict = judge_path(rover, terrain, np.column_stack([x, 0 * x - 0.3, 0 * x]))
+    assert verdict.code == "wheel_lift"  # at the wall
 
 
 def test_hazcam_points_of_spirit_become_ground_with_the_height_that_was_asked_for():

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.elevation import (
+    PointMove,
     read_points,
     terrain_from_point_cloud,
     terrain_to_occupancy_grid,
@@ -399,3 +400,20 @@ def test_the_occupancy_grid_tells_known_from_unknown():
     cells = np.array(grid.data).reshape(terrain.elevation.shape)
     np.testing.assert_array_equal(cells, np.where(np.isnan(terrain.elevation), -1, 0))
     assert grid.header.frame_id == "map" and grid.info.map_load_time.sec == 3
+
+
+def test_moved_points_are_those_that_were_moved_before_and_invalid_ones_are_left_out():
+    angle, shift = 0.6, np.array([1.0, -2.0, 0.5])
+    c, s = np.cos(angle), np.sin(angle)
+    move = PointMove(np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]), shift)
+    points = np.random.default_rng(4).uniform(-1.0, 1.0, (4000, 3))
+    points[:, 2] *= 0.05
+    here = points @ move.rotation.T + shift
+    seen = np.vstack([points, [[np.nan, 0.0, 0.0], [0.0, 0.0, np.inf], [0.0, np.nan, np.nan]]])
+    found = terrain_from_point_cloud(cloud_of(seen, kind="<f8"), 0.1, "max", move)
+    right = terrain_from_point_cloud(cloud_of(here, kind="<f8"), 0.1, "max")
+    assert_same(found, right)
+    with pytest.raises(MessageError, match="set map_resolution"):
+        terrain_from_point_cloud(cloud_of(seen, kind="<f8"), move=move)
+    with pytest.raises(MessageError, match="has finite x, y and z"):
+        terrain_from_point_cloud(cloud_of(np.full((4, 3), np.nan)), 0.1, move=move)

@@ -5,18 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics.numerics.interruption import interruptible
+from rover_physics.prediction.sweep import sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES, classify_judged
 from rover_physics.traversability.judge_poses import judge_poses
-from rover_planner.planning.navigation import hazard_map
+from rover_planner.planning.navigation import hazard_map, pose_classes
+from rover_planner.planning.navigation.class_kernels import IMPASSABLE, UNKNOWN
 from rover_planner.planning.navigation.hazard_map import HazardMap
 from rover_planner.planning.navigation.pose_classes import (
-    IMPASSABLE,
-    UNKNOWN,
     RoverOnMap,
     classify_poses,
+    judge_classes,
 )
 
 LSR1 = load_rover("lsr1")
@@ -64,6 +66,62 @@ def test_a_pose_has_the_class_that_a_path_there_would_have(std):
         else:
             assert TRAVERSABILITY_CLASSES[number] == pose.traversability_class
     assert len(set(found.tolist())) >= (4 if std is None else 3)
+
+
+@pytest.mark.parametrize("rover", ["lsr1", "m2020"])
+@pytest.mark.parametrize("kind", ["rough", "rocks", "slope", "soil", "layers"])
+def test_the_quick_classes_are_those_of_the_full_judgement(kind, rover):
+    cell = 0.1 if rover == "m2020" else 0.05
+    terrain = rough(7, (90, 100), cell, {"rough": 1.0, "slope": 0.02}.get(kind, 0.3))
+    options = OPTIONS
+    if kind == "soil":
+        options = replace(OPTIONS, soil="mars_simulant")
+    if kind == "layers":
+        friction = np.random.default_rng(1).uniform(0.1, 1.0, terrain.elevation.shape)
+        terrain = replace(terrain, friction=friction)
+    on_map = RoverOnMap(load_rover(rover), terrain, options)
+    poses = poses_of(terrain, 250 if kind == "soil" else 800)
+    quick, full = classify_poses(on_map, poses), judge_classes(on_map, poses)
+    np.testing.assert_array_equal(quick, full)
+    assert len(set(full.tolist())) >= 3
+
+
+def test_threads_change_no_class():
+    on_map, poses = RoverOnMap(LSR1, rough(1), OPTIONS), poses_of(rough(1), 5000)
+    few = [classify_poses(on_map, poses[k : k + 500]) for k in range(0, 5000, 500)]
+    np.testing.assert_array_equal(classify_poses(on_map, poses), np.concatenate(few))
+
+
+def test_questions_can_go_first_every_256_poses():
+    on_map, looked = RoverOnMap(LSR1, rough(1), OPTIONS), []
+    poses = poses_of(rough(1), 5000)
+    with interruptible(lambda: looked.append(None)):
+        classify_poses(on_map, poses)
+    assert len(looked) >= 5000 // 256
+
+    def stop():
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError), interruptible(stop):
+        classify_poses(on_map, poses)
+
+
+@pytest.mark.parametrize("excess", [-2e-9, -2e-10, 0.0, 2e-10, 2e-9])
+def test_at_a_limit_the_full_judgement_decides(excess, monkeypatch):
+    ramp = Terrain(0.3 * 0.05 * np.indices((60, 60))[1].astype(float), 0.05, (0.0, 0.0))
+    pose = np.array([[1.5, 1.5, 0.0]])
+    tilt = sweep_poses(LSR1, ramp, pose, np.zeros(1)).pitch[0]
+    limits = replace(LSR1.limits, tilt=abs(float(tilt)) + np.radians(excess))
+    on_map = RoverOnMap(replace(LSR1, limits=limits), ramp, OPTIONS)
+    asked = []
+    monkeypatch.setattr(
+        pose_classes,
+        "judge_classes",
+        lambda on_map, poses: asked.append(len(poses)) or judge_classes(on_map, poses),
+    )
+    assert classify_poses(on_map, pose) == judge_classes(on_map, pose)
+    assert asked == ([1] if excess < 0.0 else [])  # within the limit there is no doubt
+    assert (classify_poses(on_map, pose)[0] == IMPASSABLE) == (excess < -1e-9)
 
 
 def test_no_cell_is_free_where_all_headings_fail():

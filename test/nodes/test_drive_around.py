@@ -15,6 +15,7 @@ from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.project.long_tests import on_demand
 from support.ros_fixtures import RosRun, wait_until
 
 SERVER = {
@@ -52,7 +53,7 @@ def without_gaps(terrain: Terrain) -> Terrain:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
+@pytest.mark.parametrize("engine", ["quasi_static", pytest.param("mujoco", marks=on_demand)])
 def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
     terrain, start, goal = boulder_field()
     save_terrain(tmp_path / "ground.npz", terrain)

@@ -7,110 +7,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, PoseStamped, Quaternion
-from nav_msgs.msg import Odometry
-from nav_msgs.msg import Path as PathMessage
-from rclpy.serialization import deserialize_message, serialize_message
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from sensor_msgs.msg import JointState, PointCloud2
+from geometry_msgs.msg import Quaternion
+from rclpy.serialization import deserialize_message
+from rosbags.rosbag2 import Reader
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.stamps import ns_to_stamp
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.prediction.sweep import sweep_path
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.command.prediction_files import read_prediction
 from rover_planner.nodes.result_topics import RESULT_KINDS
-from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
 from rover_planner.viewer.state.session import ViewSession
 from support.messages.grid_maps import grid_map_of, move_buffer
-
-LSR1 = load_rover("lsr1")
-BEGIN = 1_700_000_000_000_000_000
-"""Time of the first message [ns]."""
-STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
-
-
-def waves() -> Terrain:
-    """Return ground 10 m x 4 m with waves that turn the suspension."""
-    X, Y = np.meshgrid(np.arange(-1.0, 9.0, 0.04), np.arange(-2.0, 2.0, 0.04))
-    return Terrain(0.03 * np.sin(4.0 * X + 0.8 * Y), 0.04, (-1.0, -2.0))
-
-
-def odometry_at(x: float, frame: str = "map") -> Odometry:
-    message = Odometry()
-    message.header.frame_id = frame
-    message.pose.pose.position = Point(x=x)
-    message.pose.pose.orientation.w = 1.0
-    return message
-
-
-def joints_of(angles: dict[str, float]) -> JointState:
-    return JointState(name=list(angles), position=list(angles.values()))
-
-
-def drive(length: float, off: float = 0.0) -> list[tuple[str, object]]:
-    """Return the messages of a drive along x: odometry and suspension angles each 2 cm.
-
-    The angles are those of the model, plus `off` [rad] for the bogies.
-    """
-    x = np.arange(0.5, 0.5 + length, 0.02)
-    poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
-    prediction = sweep_path(LSR1, waves(), poses)
-    messages: list[tuple[str, object]] = []
-    for k, place in enumerate(x.tolist()):
-        right, left = prediction.bogie_angle[k].tolist()
-        angles = {
-            "rocker_right": float(prediction.rocker_angle[k, 0]),
-            "rocker_left": float(prediction.rocker_angle[k, 1]),
-            "bogie_right": right + off,
-            "bogie_left": left + off,
-        }
-        messages += [("/joint_states", joints_of(angles)), ("/odometry", odometry_at(place))]
-    return messages
-
-
-def cloud(terrain: Terrain, stamp: int = BEGIN, frame: str = "map") -> PointCloud2:
-    return terrain_to_point_cloud(terrain, frame, ns_to_stamp(stamp))
-
-
-def path_to(x: float) -> PathMessage:
-    message = PathMessage()
-    message.header.frame_id = "map"
-    message.header.stamp = ns_to_stamp(BEGIN + 5)
-    for place in (1.0, x):
-        pose = PoseStamped()
-        pose.pose.position.x = place
-        pose.pose.orientation = Quaternion(w=1.0)
-        message.poses.append(pose)
-    return message
-
-
-def record(folder: Path, messages: list[tuple[str, object]], storage: str = "mcap") -> Path:
-    """Write messages 10 ms apart to a new bag."""
-    types = get_typestore(Stores.ROS2_JAZZY)
-    with Writer(folder, version=9, storage_plugin=STORAGES[storage]) as writer:
-        connections = {}
-        for k, (topic, message) in enumerate(messages):
-            if topic not in connections:
-                package, name = type(message).__module__.split(".")[0], type(message).__name__
-                connections[topic] = writer.add_connection(
-                    topic, f"{package}/msg/{name}", typestore=types
-                )
-            stamp = BEGIN + 10_000_000 * k
-            writer.write(connections[topic], stamp, serialize_message(message))
-    return folder
-
-
-def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]:
-    """Replay a bag; return its answers and the total."""
-    assert main(["replay", str(bag), str(out), *words]) == 0, capsys.readouterr().err
-    *answers, total = map(json.loads, capsys.readouterr().out.splitlines())
-    return answers, total
+from support.messages.recorded_drives import (
+    BEGIN,
+    LSR1,
+    STORAGES,
+    cloud,
+    drive,
+    odometry_at,
+    path_to,
+    record,
+    record_grid_map,
+    replay,
+    waves,
+)
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -204,19 +126,6 @@ def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
     assert [answer["map"] for answer in answers] == ["map_001.npz", "map_002.npz"]
     first = np.load(tmp_path / "out" / "001_can_traverse.npz")["poses"]
     np.testing.assert_allclose(first[[0, -1], 0], [1.0, 3.0], atol=1e-6)
-
-
-def record_grid_map(folder: Path, message: object) -> Path:
-    """Write a GridMap and an odometry to a new bag, as a robot with grid_map_msgs does."""
-    types = get_typestore(Stores.ROS2_JAZZY)
-    for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
-        types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        odometry = writer.add_connection("/odometry", "nav_msgs/msg/Odometry", typestore=types)
-        writer.write(odometry, BEGIN, serialize_message(odometry_at(1.0)))
-        grid = writer.add_connection("/elevation_map", GRID_MAP, typestore=types)
-        writer.write(grid, BEGIN + 1, types.serialize_cdr(message, GRID_MAP))
-    return folder
 
 
 def test_a_grid_map_is_replayed_without_its_package_whatever_its_buffer(tmp_path, capsys):

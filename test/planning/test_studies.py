@@ -11,8 +11,9 @@ from rover_physics.rover.rover_file import load_rover
 from rover_planner.cli import main
 from rover_planner.studies.objectives import climbs, tallest_step
 from rover_planner.studies.rover_keys import find_key, vary
-from rover_planner.studies.runner import run_study
+from rover_planner.studies.runner import find_rover, run_study
 from rover_planner.studies.study_file import study_from_dict
+from rover_planner.studies.summary import describe_ties
 
 LSR1 = load_rover("lsr1")
 PIVOT_X = {"name": "suspension.bogie_pivot.x", "from": 0.10, "to": 0.30, "count": 9}
@@ -192,3 +193,21 @@ def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):
     assert rows[0][0] == "suspension.bogie_pivot.x [m]" and len(rows) == 6
     assert (tmp_path / "out" / "loads.png").read_bytes()[:4] == b"\x89PNG"
     assert main(["study", str(tmp_path / "none.yaml")]) == 2
+
+
+def test_rovers_as_good_within_the_resolution_are_named():
+    parameters = [{"name": "suspension.bogie_pivot.z", "from": -0.08, "to": -0.06, "count": 3}]
+    result = run_study(study(objective="tallest_step", friction=0.5, parameters=parameters))
+    values = [trial.objective for trial in result.trials]
+    assert max(values) - min(values) < 0.002  # the heights are found to 2 mm
+    assert len(result.ties) == 2 and result.best not in result.ties
+    assert describe_ties(result).startswith("as good within 0.002 m: suspension.bogie_pivot.z = ")
+
+
+def test_an_optimisation_has_no_ties_and_the_best_rover_has_its_values():
+    result = run_study(study(method="optimise", evaluations=10))
+    assert result.ties == () and describe_ties(result) == ""
+    assert find_rover(result.study, result.best) == vary(
+        result.study.rover,
+        dict(zip((p.keys[0] for p in result.study.parameters), result.best.values, strict=True)),
+    )

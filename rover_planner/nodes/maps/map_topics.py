@@ -8,7 +8,7 @@ from typing import Any
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, PointCloud2
 
-from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.elevation import PointMove, terrain_from_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
@@ -19,6 +19,7 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions, sensor_qos
@@ -33,9 +34,9 @@ LOOK_PERIOD = 0.5
 """Shortest time between two looks for unknown ground under the rover [s]."""
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge [s]."""
-MERGE_WAIT = 0.015
-"""Longest wait of a question for a map that is to be merged into the one that is there [s]; with
-the time in which a thread wakes up it is below 20 ms."""
+MERGE_WAIT = 0.005
+"""Longest wait of a question for a map that is to be merged into the one that is there [s]. A busy
+machine may take 15 ms more to wake the thread until it is 20 ms."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ class MapTopics:
         parameters: TraverseServerParameters,
         guard: Guard,
         tell: Callable[[str], None],
+        find_sensor: Callable[[str, int | None], Rigid],
     ):
         """Subscribe to the maps and load the first one.
 
@@ -82,11 +84,14 @@ class MapTopics:
             guard: Takes unexpected errors.
             tell: Called in the thread after each map: with the reason if it was refused, else
                 with an empty text.
+            find_sensor: Returns where a sensor's frame was in the map frame at a time [ns];
+                called in the thread; may raise INPUT_ERRORS.
 
         Raises:
             TerrainError: The file of the parameter terrain_file cannot be loaded.
         """
         self._node, self._service, self._tell = node, service, tell
+        self._find_sensor = find_sensor
         self._settings = _settings_of(parameters)
         self._fills = parameters.fill_under_rover
         self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
@@ -189,16 +194,30 @@ class MapTopics:
     def _take_message(self, message: Any) -> None:
         settings = self._settings
         self._topic = CLOUD if isinstance(message, PointCloud2) else GRID_MAP
-        check_frame(message.header.frame_id, settings.frame, self._topic)
-        if self._topic == CLOUD:
-            terrain = terrain_from_point_cloud(message, settings.resolution, settings.cell_height)
-        else:
-            terrain = terrain_from_grid_map(message, settings.layers)
         stamp = stamp_to_ns(message.header.stamp)
+        if self._topic == CLOUD:
+            terrain = terrain_from_point_cloud(
+                message,
+                settings.resolution,
+                settings.cell_height,
+                self._find_cloud(message.header.frame_id, stamp),
+            )
+        else:
+            check_frame(message.header.frame_id, settings.frame, self._topic)
+            terrain = terrain_from_grid_map(message, settings.layers)
         since = self._now() if stamp is None else stamp / NANOSECONDS
         kept = self._keeper.take(terrain, self._topic, since, self._service.standing())
         self._take(kept, self._topic, stamp)
         self._is_from_topic = True
+
+    def _find_cloud(self, frame: str, stamp: int | None) -> PointMove | None:
+        """Return what moves the points of a cloud to the map frame; None if they are in it."""
+        if frame == self._settings.frame:
+            return None
+        if not frame:
+            check_frame(frame, self._settings.frame, self._topic)
+        sensor = self._find_sensor(frame, stamp)
+        return PointMove(sensor.rotation.as_matrix(), sensor.translation)
 
     def _fill_under_rover(self) -> None:
         standing = self._service.standing()

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from geometry_msgs.msg import Pose, PoseStamped, TransformStamped
@@ -13,10 +13,14 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from scipy.spatial.transform import Rotation
 
 from msg_adapters.errors import MessageError
+from msg_adapters.frames import read_transform
 from msg_adapters.paths import pose_to_array
 from msg_adapters.stamps import stamp_to_ns
-from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.transforms import Rigid, StampedTransform, TransformTree
+from rover_planner.planning.navigation.transforms import (
+    Rigid,
+    TransformTree,
+    stamped_transform,
+)
 
 TF_DEPTH = 100
 """Messages of /tf that wait to be taken, as in tf2."""
@@ -32,6 +36,26 @@ def tf_message() -> type | None:
     return kind
 
 
+class FrameParameters(Protocol):
+    """What nodes that know frames have as parameters."""
+
+    @property
+    def map_frame(self) -> str:
+        """Frame of the map."""
+
+    @property
+    def base_frame(self) -> str:
+        """Frame of the robot."""
+
+    @property
+    def base_offset(self) -> tuple[float, ...]:
+        """(6,) x, y, z [m], roll, pitch, yaw [rad] of the body in the frame of the robot."""
+
+    @property
+    def transform_timeout(self) -> float:
+        """Age from which a transform is refused [s]."""
+
+
 class Frames:
     """Knows the frames of a node; without tf2_msgs only that of the map.
 
@@ -41,25 +65,37 @@ class Frames:
     def __init__(
         self,
         node: Node,
-        parameters: TraverseServerParameters,
+        parameters: FrameParameters,
         around: Callable[[Callable[..., Any]], Callable[..., Any]],
     ):
-        """Subscribe where tf2_msgs is installed; `around` guards callbacks."""
-        self._node = node
+        """Know only the frame of the map; `listen` hears of others.
+
+        Args:
+            node: The node.
+            parameters: Its parameters.
+            around: Guards callbacks.
+        """
+        self._node, self._around = node, around
         self._map, self._base = parameters.map_frame, parameters.base_frame
         self._tree = TransformTree(parameters.transform_timeout)
         offset = parameters.base_offset
         self._offset = Rigid.from_rpy(*offset) if any(offset) else None
-        kind = tf_message()
-        if kind is None:
-            return
-        static = QoSProfile(depth=TF_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        node.create_subscription(kind, "/tf", around(self.take), TF_DEPTH)
-        node.create_subscription(kind, "/tf_static", around(self.take_static), static)
+        self._listens = False
 
-    def apply(self, parameters: TraverseServerParameters) -> None:
-        """Take new parameters."""
-        self._tree.timeout = parameters.transform_timeout
+    def listen(self) -> None:
+        """Subscribe to /tf and /tf_static, once, where tf2_msgs is installed."""
+        kind = tf_message()
+        if kind is None or self._listens:
+            return
+        self._listens = True
+        static = QoSProfile(depth=TF_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        around = self._around
+        self._node.create_subscription(kind, "/tf", around(self.take), TF_DEPTH)
+        self._node.create_subscription(kind, "/tf_static", around(self.take_static), static)
+
+    def apply_timeout(self, timeout: float) -> None:
+        """Take the age from which transforms are refused [s]."""
+        self._tree.timeout = timeout
 
     def take(self, message: Any) -> None:
         """Take a TFMessage of /tf."""
@@ -94,7 +130,7 @@ class Frames:
         if is_here and self._offset is None:
             return stamped
         pose_to_array(stamped.pose, what)  # refuses what is no pose
-        rigid = _read_pose(stamped.pose)
+        rigid = read_pose(stamped.pose)
         if not is_here:
             stamp = stamp_to_ns(stamped.header.stamp)
             rigid = self._tree.find(self._map, frame, stamp, self._now()).then(rigid)
@@ -133,7 +169,7 @@ class Frames:
         if self._offset is not None:
             back = self._offset.inverse()
             for stamped in path.poses:
-                moved = _write_pose(_read_pose(stamped.pose).then(back))
+                moved = _write_pose(read_pose(stamped.pose).then(back))
                 _copy_pose(moved, stamped.pose)
         return path
 
@@ -150,27 +186,7 @@ class Frames:
             except MessageError as error:
                 self._node.get_logger().warning(str(error), throttle_duration_sec=5.0)
                 continue
-            self._tree.take(read, is_static=is_static)
-
-
-def read_transform(message: TransformStamped) -> StampedTransform:
-    """Return the transform of a message.
-
-    Raises:
-        MessageError: It is not finite, no unit quaternion, or a frame has no name.
-    """
-    parent, child = message.header.frame_id, message.child_frame_id
-    place, turn = message.transform.translation, message.transform.rotation
-    numbers = np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w])
-    length = float(np.linalg.norm(numbers[3:]))
-    if not (np.isfinite(numbers).all() and 0.99 < length < 1.01 and parent and child):
-        raise MessageError(
-            f"transform from {child!r} to {parent!r} has translation {numbers[:3].tolist()} and "
-            f"rotation {numbers[3:].tolist()}; it must be finite, a quaternion of length 1, and "
-            "both frames must have names"
-        )
-    rigid = Rigid(numbers[:3], Rotation.from_quat(numbers[3:]))
-    return StampedTransform(parent, child, stamp_to_ns(message.header.stamp) or 0, rigid)
+            self._tree.take(stamped_transform(read), is_static=is_static)
 
 
 def is_empty(stamped: PoseStamped) -> bool:
@@ -180,7 +196,8 @@ def is_empty(stamped: PoseStamped) -> bool:
     return not stamped.header.frame_id and not any(rest) and turn.w in (0.0, 1.0)
 
 
-def _read_pose(pose: Pose) -> Rigid:
+def read_pose(pose: Pose) -> Rigid:
+    """Return the transform of a pose from the frame that it is in."""
     place, turn = pose.position, pose.orientation
     return Rigid(
         np.array([place.x, place.y, place.z]),

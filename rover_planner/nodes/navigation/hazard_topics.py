@@ -37,7 +37,7 @@ SLICE = 0.2
 SHOW_PERIOD = 1.0
 """Time between two publications while cells wait to be judged [s]."""
 MAX_PAUSE = 1.0
-"""Longest pause for questions [s]."""
+"""Longest pause for questions in a SLICE [s]; they wait for some 10 ms of work at most."""
 END_TIME = 2.0
 """Longest wait for the thread at the end [s]."""
 
@@ -74,6 +74,7 @@ class HazardTopics:
         node.create_timer(CATCH_UP, guard.around(self._catch_up), clock=steady)
         self._enabled = threading.Event()
         self._ending = threading.Event()
+        self._patience = 0.0
         self.apply(parameters)
         self._thread = threading.Thread(target=self._run, name="hazards", daemon=True)
         self._thread.start()
@@ -123,7 +124,7 @@ class HazardTopics:
         while not self._ending.is_set():
             self._enabled.wait()
             try:
-                with interruptible(self._check_end):
+                with interruptible(self._let_questions_go_first):
                     self._update(hazards)
             except QuestionStoppedError:
                 return
@@ -149,7 +150,8 @@ class HazardTopics:
             hazards.take(
                 RoverOnMap(settings.rover, known.terrain, query.sweep_options(), query.map_sigmas)
             )
-            self._pause()
+            self._patience = MAX_PAUSE
+            self._let_questions_go_first()  # in work it would take time from the slice
             pose = self._service.fresh_pose()
             is_done = hazards.work(SLICE, None if pose is None else (pose[0], pose[1]))
             if is_done:
@@ -158,12 +160,14 @@ class HazardTopics:
                 shown_at = time.monotonic()
                 self._show(hazards, known.fingerprint)
 
-    def _pause(self) -> None:
-        """Let questions come first, for a while."""
-        end = time.monotonic() + MAX_PAUSE
-        while self._is_busy() and time.monotonic() < end:
-            self._check_end()
+    def _let_questions_go_first(self) -> None:
+        """Wait while there are questions, for MAX_PAUSE in each SLICE; called between poses."""
+        self._check_end()
+        began = time.monotonic()
+        while self._is_busy() and time.monotonic() - began < self._patience:
             time.sleep(0.01)
+            self._check_end()
+        self._patience -= time.monotonic() - began
 
     def _show(self, hazards: HazardMap, map_hash: str) -> None:
         view = hazards.view()

@@ -17,6 +17,7 @@ from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
+from rover_planner.nodes.navigation.frames import Frames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import MapIntake
@@ -68,6 +69,8 @@ class TractionInputs:
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
+        self.frames = Frames(node, parameters, guard.around)
+        """Brings odometry of other frames to that of the map."""
         self._subscribe(parameters)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
@@ -161,7 +164,10 @@ class TractionInputs:
 
     def _take_odometry(self, odometry: Odometry, now: float) -> None:
         measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)
-        pose, deviation = odometry_to_pose(odometry, self._map_frame, self._base_frame)
+        if odometry.header.frame_id != self._map_frame:
+            self.frames.listen()  # only then: /tf of a whole robot costs the loop time
+        here = self.frames.localise_odometry(odometry)
+        pose, deviation = odometry_to_pose(here, self._map_frame, self._base_frame)
         self._service.take_odometry(pose, deviation, measured)
         self._log.update(ODOMETRY, "", "odometry is used again", now)
 

@@ -12,12 +12,12 @@ from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import FAN, LATTICE
-from rover_planner.planning.answering.blind_check import BlindCheck, physical
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.suspension_check import compare_suspension
+from rover_planner.planning.lattice.blind_check import BlindCheck, physical
 from rover_planner.planning.lattice.search import Progress
 from rover_planner.planning.path_geometry import densify
 from rover_planner.planning.path_planner import PathPlanner, PathSearch, Pose, add_way
@@ -26,6 +26,7 @@ from rover_planner.planning.verdict_report import SuspensionReport
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import GOAL_REFUSED, START_REFUSED, find_way
+from rover_planner.worlds.maps.blind_ground import ALLOW
 from rover_planner.worlds.maps.blind_ground import CODE as BLIND
 
 NO_PATH = "no path was received yet; publish one on ~/path"
@@ -119,12 +120,17 @@ class Situation:
         """
         planner = self._planner()
         question = WayQuestion(
-            planner.rover, planner.terrain, *ends, planner.options, planner.joint_angles
+            planner.rover,
+            planner.terrain,
+            *ends,
+            planner.options,
+            planner.joint_angles,
+            self._blind if self.settings.blind_ground != ALLOW else None,
         )
         answer = find_way(question, self.settings.lattice, self.edge_memory, self._look)
         if answer.path is not None:
             candidates = None if refused is None else refused.search
-            way = self._blind.hold(answer.path)
+            way = answer.path
             search = add_way(candidates, way, ends[1])
             suspension = self._compare_suspension(planner.predict_standing)
             return replace(_judgement(planner, way, self._blind, suspension, search), way=answer)

@@ -1,6 +1,7 @@
 """Asks the model about pieces of path and about single nodes, and counts the work."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,9 +12,11 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_poses import judge_poses
 from rover_physics.traversability.pieces import judge_pieces
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.planning.lattice.blind_check import BlindCheck
 from rover_planner.planning.lattice.costs import true_cost
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.path_query import Candidate, PathQueryOptions, check_path
+from rover_planner.worlds.maps.blind_ground import CODE
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,8 @@ class Judge:
     """How paths are judged."""
     joint_angles: Mapping[str, float] | None = None
     """Angles [rad] of the manipulator's joints by name; None is stowed."""
+    blind: BlindCheck | None = None
+    """Refuses ground under the belly that was never seen; None allows it."""
     poses: int = field(default=0, init=False)
     """Number of poses asked for so far, a measure of the work done."""
 
@@ -54,14 +59,33 @@ class Judge:
             self.options.sweep_options(self.joint_angles),
             sigmas=self.options.map_sigmas,
         )
-        return [
+        judged = [
             Judged(piece.code, true_cost(self.rover, gear, piece))
             for gear, piece in zip(gears, found, strict=True)
         ]
+        for row in self._find_blind(pieces, [one.code for one in judged]):
+            judged[row] = Judged(CODE, math.inf)
+        return judged
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
         """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
-        return self._stand(poses).codes
+        codes = list(self._stand(poses).codes)
+        if self.blind is None:
+            return tuple(codes)
+        for row in self._find_blind([pose[None, :] for pose in poses], codes):
+            codes[row] = CODE
+        return tuple(codes)
+
+    def _find_blind(
+        self, pieces: Sequence[NDArray[np.float64]], codes: Sequence[str]
+    ) -> Iterator[int]:
+        """Yield the indices of pieces that pass by their codes, but are over blind ground."""
+        passing = [row for row, code in enumerate(codes) if not code]
+        if self.blind is None or not passing:
+            return
+        refused = self.blind.refuses([pieces[row] for row in passing])
+        for row in np.flatnonzero(refused).tolist():
+            yield passing[row]
 
     def _stand(self, poses: NDArray[np.float64]) -> Verdict:
         """Judge single poses (n, 3), wheels ahead."""
@@ -78,12 +102,14 @@ class Judge:
     def refuse(self, pose: NDArray[np.float64]) -> tuple[str, str]:
         """Return code and reason why the rover cannot stand at a pose (3,), empty if it can."""
         verdict = self._stand(pose[None, :])
+        if not verdict.codes[0] and self.blind is not None and self.blind.refuses([pose[None]])[0]:
+            return CODE, self.blind.describe()
         return verdict.codes[0], verdict.reasons[0]
 
     def check(self, poses: NDArray[np.float64]) -> Candidate:
         """Judge a whole path (n, 3) with all that belongs to it, up to its first failure."""
         self.poses += len(poses)
-        return check_path(
+        checked = check_path(
             self.rover,
             self.terrain,
             poses,
@@ -91,3 +117,4 @@ class Judge:
             self.joint_angles,
             stop_at_failure=True,
         )
+        return checked if self.blind is None else self.blind.hold(checked)

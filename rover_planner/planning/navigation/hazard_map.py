@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.navigation.class_kernels import IMPASSABLE, UNKNOWN
 from rover_planner.planning.navigation.footprint import find_footprint
-from rover_planner.planning.navigation.pose_classes import (
-    IMPASSABLE,
-    UNKNOWN,
-    RoverOnMap,
-    classify_poses,
-)
+from rover_planner.planning.navigation.pose_classes import RoverOnMap, classify_poses
 
 TILE = 32
 """Cells along the side of a tile; tiles are judged one after another."""
+BATCH = 4096
+"""Poses for which tiles are judged together; fewer would not use all threads."""
 MARGIN = 2
 """Cells by which a footprint is widened: heights are interpolated, and cells have an extent."""
 SHIFT_TOLERANCE = 1e-3
 """Share of a cell by which the grids of two maps may differ and still count as the same."""
+Window = tuple[slice, slice]
+"""Rows and columns of a map."""
 LAYERS = ("elevation", "friction", "soil", "elevation_std")
 """Layers of a map that count."""
 
@@ -89,7 +89,7 @@ class HazardMap:
         """Judge stale poses for about some time; return whether none is left.
 
         Args:
-            seconds: Time [s]; the tile in work is finished.
+            seconds: Time [s]; the tiles in work are finished.
             near: x, y [m] of the place whose tiles come first; None begins at cell [0, 0].
 
         Raises:
@@ -98,8 +98,8 @@ class HazardMap:
         if self._on_map is None:
             return True
         end = time.monotonic() + seconds
-        for tile in self._stale_tiles(self._on_map.terrain, near):
-            self._judge(self._on_map, tile)
+        for tiles in self._batches(self._on_map.terrain, near):
+            self._judge(self._on_map, tiles)
             if time.monotonic() > end:
                 break
         return not self._stale.any()
@@ -131,9 +131,22 @@ class HazardMap:
             found[heading] = grown[y, x][1:-1, 1:-1]
         return found
 
-    def _stale_tiles(
+    def _batches(
         self, terrain: Terrain, near: tuple[float, float] | None
-    ) -> Iterator[tuple[slice, slice]]:
+    ) -> Iterator[list[Window]]:
+        """Yield tiles with stale poses, the nearest first, at least BATCH poses together."""
+        batch: list[Window] = []
+        count = 0
+        for tile in self._stale_tiles(terrain, near):
+            batch.append(tile)
+            count += int(np.count_nonzero(self._stale[:, *tile]))
+            if count >= BATCH:
+                yield batch
+                batch, count = [], 0
+        if batch:
+            yield batch
+
+    def _stale_tiles(self, terrain: Terrain, near: tuple[float, float] | None) -> Iterator[Window]:
         """Yield the cells (rows, columns) of tiles with stale poses, the nearest first."""
         any_heading = self._stale.any(axis=0)
         rows, columns = (math.ceil(n / TILE) for n in any_heading.shape)
@@ -146,10 +159,13 @@ class HazardMap:
         for i, j in tiles.tolist():
             yield slice(i * TILE, (i + 1) * TILE), slice(j * TILE, (j + 1) * TILE)
 
-    def _judge(self, on_map: RoverOnMap, tile: tuple[slice, slice]) -> None:
-        """Judge the stale poses of a tile."""
-        heading, row, column = np.nonzero(self._stale[:, *tile])
-        row, column = row + tile[0].start, column + tile[1].start
+    def _judge(self, on_map: RoverOnMap, tiles: list[Window]) -> None:
+        """Judge the stale poses of tiles."""
+        found = []
+        for tile in tiles:
+            stale = np.array(np.nonzero(self._stale[:, *tile]))
+            found.append(stale + np.array([[0], [tile[0].start], [tile[1].start]]))
+        heading, row, column = np.concatenate(found, axis=1)
         x, y = on_map.terrain.origin
         cell = on_map.terrain.resolution
         poses = np.column_stack([x + cell * column, y + cell * row, self._yaw[heading]])
@@ -193,10 +209,6 @@ def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
     if old.origin != new.origin and np.abs(moved - cells).max() > SHIFT_TOLERANCE:
         return None
     return int(cells[1]), int(cells[0])
-
-
-Window = tuple[slice, slice]
-"""Rows and columns of a map."""
 
 
 def _overlap(old: Terrain, new: Terrain, shift: Shift) -> tuple[Window, Window]:

@@ -1,12 +1,14 @@
 """Transforms between frames with their times, as on /tf, and what leads from one to another."""
 
 import bisect
+import threading
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from msg_adapters.frames import FrameTransform
 from rover_planner.errors import PlanningError
 
 MEMORY = 10_000_000_000
@@ -70,6 +72,12 @@ class StampedTransform:
     """Position and orientation of the child in the parent frame."""
 
 
+def stamped_transform(read: FrameTransform) -> StampedTransform:
+    """Return the transform of a message."""
+    rigid = Rigid(read.translation, Rotation.from_quat(read.xyzw))
+    return StampedTransform(read.parent, read.child, read.stamp, rigid)
+
+
 class _Edge:
     """The transforms of one child frame in the last time, in the order of their stamps."""
 
@@ -114,20 +122,25 @@ class _Edge:
 
 
 class TransformTree:
-    """Keeps the transforms of the last seconds; each frame has one parent."""
+    """Keeps the transforms of the last seconds; each frame has one parent.
+
+    Several threads may use it.
+    """
 
     def __init__(self, timeout: float):
         self.timeout = timeout
         """Age from which a transform is stale [s]."""
         self._edges: dict[str, _Edge] = {}
+        self._lock = threading.Lock()
 
     def take(self, transform: StampedTransform, *, is_static: bool = False) -> None:
         """Keep a transform; with another parent, or a clock set back, the old ones are dropped."""
-        edge = self._edges.get(transform.child)
-        stale = edge is not None and edge.newest - transform.stamp > MEMORY
-        if edge is None or edge.parent != transform.parent or edge.is_static != is_static or stale:
-            edge = self._edges[transform.child] = _Edge(transform.parent, is_static)
-        edge.add(transform.stamp, transform.rigid)
+        with self._lock:
+            edge, parent = self._edges.get(transform.child), transform.parent
+            stale = edge is not None and edge.newest - transform.stamp > MEMORY
+            if edge is None or edge.parent != parent or edge.is_static != is_static or stale:
+                edge = self._edges[transform.child] = _Edge(parent, is_static)
+            edge.add(transform.stamp, transform.rigid)
 
     def knows(self, frame: str) -> bool:
         """Return whether a frame is the parent or the child of a transform."""
@@ -138,6 +151,15 @@ class TransformTree:
     def has_parent(self, frame: str) -> bool:
         """Return whether a frame is the child of a transform."""
         return frame in self._edges
+
+    def connects(self, one: str, other: str) -> bool:
+        """Return whether transforms lead from one frame to another, of whatever age.
+
+        Raises:
+            TransformError: Transforms form a circle.
+        """
+        with self._lock:
+            return not set(self._chain(one)).isdisjoint(self._chain(other))
 
     def find(self, target: str, source: str, time: int | None, now: int) -> Rigid:
         """Return where the source frame is in the target frame.
@@ -154,6 +176,10 @@ class TransformTree:
         """
         if target == source:
             return Rigid.none()
+        with self._lock:
+            return self._find(target, source, time, now)
+
+    def _find(self, target: str, source: str, time: int | None, now: int) -> Rigid:
         up, down = self._chain(source), self._chain(target)
         shared = next((frame for frame in up if frame in down), None)
         if shared is None:

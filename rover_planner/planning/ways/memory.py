@@ -11,6 +11,7 @@ from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.lattice.primitives import make_primitives
 from rover_planner.planning.ways.question import WayQuestion
+from rover_planner.worlds.maps.blind_ground import ALLOW
 
 _LAYERS = ("elevation", "friction", "soil", "elevation_std")
 
@@ -33,8 +34,9 @@ class EdgeMemory:
             spacing = question.options.waypoint_spacing
             edges = Edges(nodes, make_primitives(question.rover, nodes.cell, spacing))
             known = JudgedEdges(edges)
-        elif asked.terrain is not question.terrain:
+        elif asked.terrain is not question.terrain or _sees_otherwise(asked, question):
             changed = find_changes(asked.terrain, question.terrain)
+            changed |= _find_newly_seen(asked, question)
             known.forget(_places_within_reach(question, known.edges, changed))
         self._asked, self._known = question, known
         return known
@@ -48,12 +50,33 @@ def _is_alike(asked: WayQuestion, question: WayQuestion, known: JudgedEdges, nod
         and asked.rover == question.rover
         and asked.options == question.options
         and asked.joint_angles == question.joint_angles
+        and _rule_of(asked) == _rule_of(question)
         and old.resolution == new.resolution
         and old.origin == new.origin
         and old.elevation.shape == new.elevation.shape
         and old.soil_names == new.soil_names
         and all((getattr(old, name) is None) == (getattr(new, name) is None) for name in _LAYERS)
     )
+
+
+def _rule_of(question: WayQuestion) -> str:
+    """Return the rule of BLIND_GROUND of a question."""
+    return ALLOW if question.blind is None else question.blind.rule
+
+
+def _sees_otherwise(asked: WayQuestion, question: WayQuestion) -> bool:
+    """Return whether what was seen may differ between two questions of one rule, and counts."""
+    if _rule_of(question) == ALLOW or asked.blind is None or question.blind is None:
+        return False
+    return asked.blind.seen.kinds is not question.blind.seen.kinds
+
+
+def _find_newly_seen(asked: WayQuestion, question: WayQuestion) -> NDArray[np.bool_]:
+    """Return (ny, nx) True for the cells of which something else is known whether it was seen."""
+    old, new = asked.blind, question.blind
+    if old is None or new is None or not _sees_otherwise(asked, question):
+        return np.zeros(question.terrain.elevation.shape, bool)
+    return np.asarray(old.seen.kinds != new.seen.kinds)
 
 
 def find_changes(old: Terrain, new: Terrain) -> NDArray[np.bool_]:

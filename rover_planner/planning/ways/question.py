@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.lattice.blind_check import BlindCheck
 from rover_planner.planning.path_query import PathQueryOptions
 
 
@@ -26,3 +27,5 @@ class WayQuestion:
     """How paths are judged."""
     joint_angles: Mapping[str, float] | None = None
     """Angles [rad] of the manipulator's joints by name; None is stowed."""
+    blind: BlindCheck | None = None
+    """Refuses ground under the belly that was never seen; None allows it."""

@@ -56,6 +56,8 @@ class LatticeSettings:
     frontier: bool = False
     """Whether a way may end at the frontier of the known ground, as near as possible to a goal
     beyond it."""
+    ends_at_first: bool = False
+    """Whether the first way is the answer; else better ones are searched for the whole budget."""
 
     def __post_init__(self) -> None:
         for name in ("budget", "cell"):
@@ -138,7 +140,11 @@ class _WaySearch:
         self._start = _check_end("start", question, may_be_off_map=False)
         self._goal = _check_end("goal", question, may_be_off_map=settings.frontier)
         self._judge = Judge(
-            question.rover, question.terrain, question.options, question.joint_angles
+            question.rover,
+            question.terrain,
+            question.options,
+            question.joint_angles,
+            question.blind,
         )
         cell = settings.cell or 0.25 * wheelbase(question.rover)
         self._nodes, self._is_limited = choose_window(question, cell)
@@ -241,6 +247,8 @@ class _WaySearch:
         """Return whether the search may go on; tell of its progress."""
         if self._on_progress is not None:
             self._on_progress(search.progress)
+        if self._settings.ends_at_first and search.progress.best is not None:
+            return False
         budget = self._settings.budget
         work = self._judge.poses + search.shortest.expanded / EXPANSIONS_PER_POSE
         if work > POSES_PER_SECOND * budget:

@@ -11,18 +11,22 @@ from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader, ReaderError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
 
-MAP, JOINTS, ODOMETRY, PATH = "map", "joints", "odometry", "path"
-"""Inputs of a replay."""
+MAP, JOINTS, ODOMETRY, IMU, PATH = "map", "joints", "odometry", "imu", "path"
+TF, TF_STATIC = "tf", "tf_static"
+"""Inputs of a replay; the last two have the topics of the same names."""
 GRID_MAP = "grid_map_msgs/msg/GridMap"
 TYPES: dict[str, tuple[str, ...]] = {
     MAP: ("sensor_msgs/msg/PointCloud2", GRID_MAP),
     JOINTS: ("sensor_msgs/msg/JointState",),
     ODOMETRY: ("nav_msgs/msg/Odometry",),
+    IMU: ("sensor_msgs/msg/Imu",),
+    TF: ("tf2_msgs/msg/TFMessage",),
+    TF_STATIC: ("tf2_msgs/msg/TFMessage",),
     PATH: ("nav_msgs/msg/Path",),
 }
 """Types of each input, as bags name them."""
@@ -30,6 +34,7 @@ CLASSES = {
     "sensor_msgs/msg/PointCloud2": PointCloud2,
     "sensor_msgs/msg/JointState": JointState,
     "nav_msgs/msg/Odometry": Odometry,
+    "sensor_msgs/msg/Imu": Imu,
     "nav_msgs/msg/Path": PathMessage,
 }
 """Classes of the types that every ROS has."""
@@ -37,6 +42,7 @@ USUAL = {
     MAP: ("elevation_cloud", "elevation_map"),
     JOINTS: ("joint_states",),
     ODOMETRY: ("odometry",),
+    IMU: ("imu",),
     PATH: ("traverse_server/path",),
 }
 """How the topic of each input usually ends."""
@@ -128,7 +134,8 @@ def open_bag(path: Path, wanted: Mapping[str, str]) -> Iterator[BagReader]:
     Args:
         path: The bag.
         wanted: Topics by input, empty to choose: the one that ends as USUAL, or the only one of
-            its type; for PATH only the former.
+            its type; for IMU and PATH only the former. TF and TF_STATIC are always /tf and
+            /tf_static.
 
     Raises:
         PlanningError: It cannot be read, a wanted topic is missing, or several topics are as good.
@@ -157,8 +164,10 @@ def _choose(reader: Reader, kind: str, wanted: str) -> str:
                 f"{', '.join(topics) or 'none'}"
             )
         return f"/{wanted.lstrip('/')}"
+    if kind in (TF, TF_STATIC):
+        return f"/{kind}" if f"/{kind}" in topics else ""
     usual = [topic for topic in topics if topic.endswith(tuple(f"/{end}" for end in USUAL[kind]))]
-    candidates = usual if usual or kind == PATH else topics
+    candidates = usual if usual or kind in (IMU, PATH) else topics
     if len(candidates) > 1:
         raise PlanningError(
             f"the bag has {len(candidates)} topics of type {name}: {', '.join(candidates)}; "

@@ -12,9 +12,10 @@ from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
-from msg_adapters.joints import joint_positions
-from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.imu import ImuMounting, imu_to_attitude
+from msg_adapters.joint_map import read_joint_map
 from msg_adapters.paths import path_to_poses
+from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
@@ -23,6 +24,7 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import stamp_text
+from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.service_settings import (
     keeper_settings,
     load_service_settings,
@@ -30,13 +32,25 @@ from rover_planner.planning.answering.service_settings import (
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.bags.bag_reader import JOINTS, MAP, ODOMETRY, PATH, Recorded
+from rover_planner.ros.bags.bag_reader import (
+    IMU,
+    JOINTS,
+    MAP,
+    ODOMETRY,
+    PATH,
+    TF,
+    TF_STATIC,
+    Recorded,
+)
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
+from rover_planner.ros.bags.recorded_frames import RecordedFrames
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
+LOOK_PERIOD = 0.5
+"""Shortest time between two looks for unknown ground under the rover [s], as in the node."""
 MAX_NOTES = 5
 """Number of refused messages that are told one by one."""
 
@@ -97,10 +111,18 @@ class Replay:
         self._register = Register("replay")
         self._drive, self._begun = RecordedDrive(), self._service.situation()
         self._pose: NDArray[np.float64] | None = None
+        self._measured = Measurements()  # by the times of the recording
+        self._looked = -float("inf")
+        self._frames = RecordedFrames(values)
+        self._joint_names = read_joint_map(values.joint_map, self._service.all_joint_names)
+        self._imu = ImuMounting(values.imu_frame or BASE_FRAME, values.imu_mounting)
         self._take: dict[str, Callable[[Recorded], Iterator[Answer]]] = {
             MAP: self._take_map,
             JOINTS: self._take_joints,
             ODOMETRY: self._take_odometry,
+            IMU: self._take_imu,
+            TF: self._take_transforms,
+            TF_STATIC: self._take_transforms,
             PATH: self._take_path,
         }
 
@@ -120,14 +142,17 @@ class Replay:
 
     def _take_map(self, recorded: Recorded) -> Iterator[Answer]:
         message, values = recorded.message, self.parameters
-        check_frame(message.header.frame_id, values.map_frame, recorded.topic)
-        if isinstance(message, PointCloud2):
-            terrain = terrain_from_point_cloud(message, values.map_resolution, values.cell_height)
-        else:
-            terrain = terrain_from_grid_map(message, self._layers)
         stamp = stamp_to_ns(message.header.stamp)
+        if isinstance(message, PointCloud2):
+            move = self._frames.find_move(message, recorded.topic, recorded.stamp)
+            size, height = values.map_resolution, values.cell_height
+            terrain = terrain_from_point_cloud(message, size, height, move)
+        else:
+            check_frame(message.header.frame_id, values.map_frame, recorded.topic)
+            terrain = terrain_from_grid_map(message, self._layers)
         since = (recorded.stamp if stamp is None else stamp) / NANOSECONDS
-        kept = self._keeper.take(terrain, recorded.topic, since, self._service.standing())
+        standing = self._measured.standing(recorded.stamp / NANOSECONDS)
+        kept = self._keeper.take(terrain, recorded.topic, since, standing)
         is_new = self._keep(kept, recorded.topic, stamp)
         goal = self.questions.goal
         if not is_new or goal is None:
@@ -143,13 +168,28 @@ class Replay:
         return self._service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
 
     def _take_joints(self, recorded: Recorded) -> Iterator[Answer]:
-        self._service.take_joints(joint_positions(recorded.message, self._service.joint_names))
+        positions = self._joint_names.positions(recorded.message, self._service.joint_names)
+        self._service.take_joints(positions)
+        self._measured.take_joints(positions, recorded.stamp / NANOSECONDS)
+        yield from ()
+
+    def _take_transforms(self, recorded: Recorded) -> Iterator[Answer]:
+        self._frames.take(recorded.message, is_static=recorded.kind == TF_STATIC)
+        yield from ()
+
+    def _take_imu(self, recorded: Recorded) -> Iterator[Answer]:
+        if self.parameters.imu_attitude:
+            attitude = imu_to_attitude(recorded.message, self._imu)
+            now = recorded.stamp / NANOSECONDS
+            self._measured.take_tilt(attitude.roll, attitude.pitch, now)
         yield from ()
 
     def _take_odometry(self, recorded: Recorded) -> Iterator[Answer]:
-        pose, _ = odometry_to_pose(recorded.message, self.parameters.map_frame)
-        self._pose = pose[[0, 1, 3]]
+        x, y, z, roll, pitch, yaw = self._frames.locate(recorded.message, recorded.stamp)
+        self._pose, now = np.array([x, y, yaw]), recorded.stamp / NANOSECONDS
         self._service.take_pose(self._pose)
+        self._measured.take_pose(self._pose, now, (z, roll, pitch))
+        self._look_under_rover(now)
         if self._service.known_map is None:
             return  # what is driven before the first map cannot be judged
         if not self._drive.poses or self._begun.known_map is None:
@@ -158,6 +198,17 @@ class Replay:
         if self._drive.length >= self.questions.stretch:
             yield self._judge_drive()
             self._begun = self._service.situation(recorded.stamp)
+
+    def _look_under_rover(self, now: float) -> None:
+        """Fill unknown ground under the rover, at most every LOOK_PERIOD."""
+        standing = self._measured.standing(now)
+        is_due = self.parameters.fill_under_rover and now - self._looked >= LOOK_PERIOD
+        if standing is None or not is_due or self._service.known_map is None:
+            return
+        self._looked = now
+        filled = self._keeper.fill(standing, now)
+        if filled is not None:
+            self._service.amend_map(filled.terrain, filled.sources)
 
     def _take_path(self, recorded: Recorded) -> Iterator[Answer]:
         poses = path_to_poses(recorded.message, self.parameters.map_frame)

@@ -89,6 +89,27 @@ class SeenGround:
         )
         return BlindShare(blind, assumed / total, *firsts)
 
+    def refused_below(
+        self, rover: Rover, poses: NDArray[np.float64], rule: str
+    ) -> NDArray[np.bool_]:
+        """Return (n,) whether a rule of BLIND_GROUND refuses the ground under the belly at poses.
+
+        Ground off the map counts as never seen, as in `share`.
+        """
+        refused = np.zeros(len(poses), bool)
+        if rule == ALLOW or self._is_seen_around(rover, poses):
+            return refused
+        ny, nx = self.kinds.shape
+        near = self._is_near(rover, poses)
+        refused[~near] = True
+        rows_near = np.flatnonzero(near)
+        for start, rows, columns in self._cells_below(rover, poses[near]):
+            on_map = (rows >= 0) & (rows < ny) & (columns >= 0) & (columns < nx)
+            kinds = self.kinds[np.clip(rows, 0, ny - 1), np.clip(columns, 0, nx - 1)]
+            bad = ~on_map | (kinds == UNSEEN if rule == ALLOW_FOOTPRINT else kinds != SEEN)
+            refused[rows_near[start : start + len(rows)]] = bad.any(axis=1)
+        return refused
+
     def _is_near(self, rover: Rover, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return (n,) True for the poses at which the belly may be over the map."""
         reach = _reach(rover) + self.terrain.resolution

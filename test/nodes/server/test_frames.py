@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, TransformStamped
-from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
@@ -14,6 +13,7 @@ from rover_planner.nodes.nav2_services import PathValidity
 from rover_planner.nodes.navigation import frames
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
+from support.messages.transforms import send_transforms, transform_message
 from support.planner_client import GOAL, START, ask, verdict_of
 from support.ros_fixtures import wait_until
 
@@ -21,20 +21,8 @@ MAP_ODOM = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
 """Where odometry began, on the map."""
 
 
-def transform(parent, child, rigid, stamp):
-    message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = parent, stamp
-    place, turn = message.transform.translation, message.transform.rotation
-    place.x, place.y, place.z = rigid.translation.tolist()
-    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
-    return message
-
-
 def send(server, *edges, age=0.0, take="take"):
-    """Give the server transforms of an age [s], as a TFMessage; tf2_msgs is not on PyPI."""
-    stamp = (server.get_clock().now() - Duration(seconds=age)).to_msg()
-    made = [transform(*edge, stamp) for edge in edges]
-    getattr(server.frames, take)(SimpleNamespace(transforms=made))
+    send_transforms(server, getattr(server.frames, take), *edges, age=age)
 
 
 def on_map(pose):
@@ -164,11 +152,11 @@ def test_tf_topics_are_heard_where_their_type_is_installed(monkeypatch, start_se
     static = client.create_publisher(TransformStamped, "/tf_static", latched)
     moving = client.create_publisher(TransformStamped, "/tf", 10)
     stamp = client.get_clock().now().to_msg()
-    static.publish(transform("base_link", "camera", MAP_ODOM, stamp))
+    static.publish(transform_message("base_link", "camera", MAP_ODOM, stamp))
     server = start_server()
     wait_until(lambda: moving.get_subscription_count(), "the subscription")
     here = Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.3)
-    moving.publish(transform("map", "base_link", here, client.get_clock().now().to_msg()))
+    moving.publish(transform_message("map", "base_link", here, client.get_clock().now().to_msg()))
     wait_until(lambda: server.frames._tree.has_parent("base_link"), "/tf")
     wait_until(lambda: server.frames._tree.has_parent("camera"), "/tf_static")
     np.testing.assert_allclose(server.frames.find_here(), (1.0, 2.0, 0.3), atol=1e-9)
@@ -176,7 +164,7 @@ def test_tf_topics_are_heard_where_their_type_is_installed(monkeypatch, start_se
 
 @pytest.mark.parametrize("wrong", ["nan", "length", "name"])
 def test_a_transform_that_is_none_is_refused(server, wrong):
-    message = transform("map", "odom", MAP_ODOM, server.get_clock().now().to_msg())
+    message = transform_message("map", "odom", MAP_ODOM, server.get_clock().now().to_msg())
     if wrong == "nan":
         message.transform.translation.x = np.nan
     elif wrong == "length":

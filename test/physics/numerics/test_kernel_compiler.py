@@ -1,11 +1,15 @@
 """A kernel is compiled once with all that it calls, and can be called from Python as well."""
 
+import functools
+import threading
+import time
+
 import numpy as np
 import pytest
 
 from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
 from rover_physics.numerics.kernels import allocating_kernel, kernel
-from rover_physics.numerics.threads import run_chunks
+from rover_physics.numerics.threads import CALLS_IN_WORK, run_chunks, run_in_turn
 
 
 @kernel
@@ -84,3 +88,39 @@ def test_an_error_in_a_chunk_is_raised():
 
     with pytest.raises(ValueError, match="chunk 7"):
         run_chunks(fail, (), 20, 3)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_call_begins_when_the_one_whose_work_space_it_takes_has_ended(threads):
+    spaces = CALLS_IN_WORK * threads
+    ended = [threading.Event() for _ in range(50)]
+    early = []
+
+    def call(k):
+        if k >= spaces and not ended[k - spaces].is_set():
+            early.append(k)
+        time.sleep(0.002 * (k % 3))
+        ended[k].set()
+
+    run_in_turn((functools.partial(call, k) for k in range(50)), threads)
+    assert not early and all(one.is_set() for one in ended)
+
+
+def test_calls_are_drawn_while_others_run_and_an_error_among_them_ends_the_work():
+    ran = []
+
+    def calls():
+        for k in range(50):
+            if k == 20:
+                raise InterruptedError
+            yield functools.partial(ran.append, k)
+
+    with pytest.raises(InterruptedError):
+        run_in_turn(calls(), 3)
+    assert len(ran) >= 20 - CALLS_IN_WORK * 3 and set(ran) <= set(range(20))
+
+    def fail():
+        raise ValueError("call")
+
+    with pytest.raises(ValueError, match="call"):
+        run_in_turn(iter([fail] * 50), 3)

@@ -1,4 +1,4 @@
-"""All kernels of answers are compiled by the start of a server, so that no question waits."""
+"""All kernels of answers are among those that a server's start compiles: no question waits."""
 
 import subprocess
 import sys
@@ -8,23 +8,26 @@ import gc
 from dataclasses import replace
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 
-from rover_physics.warm_up import warm_up
+from rover_physics.numerics.kernel_compiler import Kernel
+from rover_planner.nodes.warm_up import GROUPS
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from support.grounds import make_terrain, rocky, wall_at, waves
 
 def compiled():
-    kernels = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
+    # A kernel that an earlier program left on disk is a new one on a fresh disk: both count.
+    kernels = [one for one in gc.get_objects() if isinstance(one, Kernel)]
     return {f"{one.__module__}.{one.__name__}": len(one.signatures) for one in kernels}
 
 def service(**parameters):
     values = TraverseServerParameters(waypoint_spacing=0.05, candidate_count=3, **parameters)
     return TraverseService(load_service_settings(values))
 
-warm_up()
+for group in GROUPS:
+    for step in group:
+        step.run()
 service()
 before = compiled()
 start, goal = (-1.0, 0.0, 0.0), (2.0, 0.2, 0.0)
@@ -39,11 +42,13 @@ for parameters in ({}, {"policy": "optimal"}, {"soil": "mars_simulant"}):
         answering.take_path(np.array([start, goal]))
         answering.check_last_path().complete()
 after = compiled()
-print({name: count - before[name] for name, count in after.items() if count > before[name]})
+print({name: count for name, count in after.items() if count > before.get(name, 0)})
 """
 
 
 def test_no_question_compiles_a_kernel():
+    warmed = subprocess.run([sys.executable, "-m", "rover_planner", "warm-up"], check=False)
+    assert warmed.returncode == 0
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "{}"

@@ -1,6 +1,10 @@
-"""Refuses paths over never seen ground under the belly, as the settings say, and reports it."""
+"""Refuses ways over never seen ground under the belly, as the settings say, and reports it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
@@ -41,10 +45,27 @@ class BlindCheck:
         codes[first] = CODE
         reasons[first] = (
             f"ground under the belly that was never seen: {100.0 * counted:.1f} % of that along "
-            f"the path (blind_ground is {self.rule})"
+            f"the path {self._name_rule()}"
         )
         verdict = with_refusals(candidate.verdict, codes, reasons)
         return replace(candidate, verdict=verdict, cost=_REFUSED_COST)
+
+    def refuses(self, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+        """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).
+
+        Each pose counts. `hold` looks at a path where the belly has moved on by a cell, so a path
+        of pieces that are not refused passes there.
+        """
+        refused = np.zeros(len(pieces), bool)
+        if self.rule == ALLOW or not pieces:
+            return refused
+        below = self.seen.refused_below(self.rover, np.concatenate(pieces), self.rule)
+        firsts = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
+        return np.logical_or.reduceat(below, firsts)
+
+    def describe(self) -> str:
+        """Return why the rover may not stand at a pose that `refuses` refuses, in words."""
+        return f"ground under the belly that was never seen {self._name_rule()}"
 
     def choose(self, search: PathSearch) -> PathSearch:
         """Return a search whose choice is among the candidates that the rule does not refuse.
@@ -58,6 +79,9 @@ class BlindCheck:
         if not answer.traversable:
             answer = replace(answer, nearest=search.answer.best)
         return replace(search, answer=answer)
+
+    def _name_rule(self) -> str:
+        return f"(blind_ground is {self.rule})"
 
     def _share(self, candidate: Candidate) -> BlindShare:
         return self.seen.share(self.rover, candidate.poses)

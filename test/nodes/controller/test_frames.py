@@ -1,0 +1,77 @@
+"""Odometry of another frame, and of a robot with another origin, is placed on the map."""
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import PointCloud2
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from rover_planner.nodes.navigation import frames
+from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.ros.qos import map_qos, sensor_qos
+from support.messages.transforms import send_transforms
+from support.ros_fixtures import wait_until
+from support.rough_grounds import plane
+
+MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
+"""Where odometry began, on the map."""
+
+
+@pytest.fixture
+def drive_in_odom(rover):
+    """Return a function that sends odometry in odom until a condition holds; there is a map."""
+    cloud = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    cloud.publish(terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time()))
+    sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
+    odometry = Odometry(child_frame_id="base_link")
+    odometry.header.frame_id = "odom"
+    odometry.pose.pose.position.x = 0.5
+
+    def drive(holds, what):
+        def send():
+            sender.publish(odometry)
+            return holds()
+
+        wait_until(send, what)
+
+    return drive
+
+
+def contact_source(rover):
+    values = {} if rover.status is None else {one.key: one.value for one in rover.status.values}
+    return values.get("contact_source")
+
+
+def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller, drive_in_odom):
+    controller = start_controller(transform_timeout=5.0)
+    known = controller._inputs.frames
+    send_transforms(controller, known.take, ("map", "odom", MAP_ODOM), age=7.5)
+    stale = "the transform from 'odom' to 'map' is stale: it is 7."
+    drive_in_odom(lambda: rover.count_lines(stale), "the refusal of a stale transform")
+    drive_in_odom(lambda: contact_source(rover) == "motion", "the drive without the map")
+    send_transforms(controller, known.take_static, ("map", "odom", MAP_ODOM), age=0.0)
+    drive_in_odom(lambda: contact_source(rover) == "map", "contacts from the map")
+    right = (1.0, 0.0, 0.4, np.pi / 2)
+    np.testing.assert_allclose(controller.service._pose, right, atol=1e-9)
+
+
+def test_odometry_of_a_robot_with_another_origin_is_that_of_the_body(
+    start_controller, drive_in_odom
+):
+    controller = start_controller(base_offset=[0.3, 0.0, 0.2, 0.0, 0.0, 0.0], map_frame="odom")
+    drive_in_odom(lambda: controller.service._pose.any(), "odometry")
+    np.testing.assert_allclose(controller.service._pose, (0.8, 0.0, 0.2, 0.0), atol=1e-9)
+
+
+def test_tf_is_heard_only_if_odometry_needs_it(
+    rover, start_controller, drive_in_odom, monkeypatch
+):
+    monkeypatch.setattr(frames, "tf_message", lambda: Odometry)  # stands for TFMessage
+    needs_none = start_controller(map_frame="odom")
+    drive_in_odom(lambda: needs_none.service._pose.any(), "odometry")
+    assert needs_none.count_subscribers("/tf") == 0
+    start_controller()
+    drive_in_odom(lambda: needs_none.count_subscribers("/tf") == 1, "the subscription")
+    refusal = "odometry not used: odometry is in frame 'odom'; it must be in 'map'"
+    wait_until(lambda: rover.count_lines(refusal), "the refusal without a transform")

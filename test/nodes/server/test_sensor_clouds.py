@@ -1,0 +1,128 @@
+"""Clouds in the frame of a sensor become the map that the same cloud in the map frame becomes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
+from sensor_msgs.msg import PointField
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.navigation.transforms import Rigid
+from support.grounds import make_terrain, rocky
+from support.ros_fixtures import wait_until
+
+ROBOT = Rigid.from_rpy(0.7, -0.4, 0.25, 0.03, -0.06, 0.8)
+"""Where the rover stands."""
+MOUNT = Rigid.from_rpy(0.3, 0.05, 0.45, 0.0, 0.5, -0.1)
+ENTRY = "front_camera:0.3:0.05:0.45:0.0:0.5:-0.1"
+CELL = 0.05
+
+
+@pytest.fixture
+def camera_server(start_server):
+    """Return a server that knows how a camera is mounted."""
+    return start_server(sensor_mounts=[ENTRY], map_resolution=CELL, transform_timeout=5.0)
+
+
+def points_of(terrain: Terrain) -> np.ndarray:
+    """Return a point (n, 3) somewhere in each cell, as a camera has them."""
+    rows, columns = np.indices(terrain.elevation.shape)
+    rng = np.random.default_rng(3)
+    x, y = (
+        start + CELL * (index + rng.uniform(-0.3, 0.3, index.shape))
+        for start, index in zip(terrain.origin, (columns, rows), strict=True)
+    )
+    return np.column_stack([x.ravel(), y.ravel(), terrain.elevation.ravel()])
+
+
+def cloud_of(points: np.ndarray, frame: str, stamp) -> object:
+    """Return an unorganised cloud of points (n, 3) in float32."""
+    cloud = terrain_to_point_cloud(Terrain(np.zeros((2, 2)), 1.0, (0.0, 0.0)), frame, stamp)
+    cloud.height, cloud.width = 1, len(points)
+    cloud.row_step = cloud.point_step * cloud.width
+    cloud.data = points.astype("<f4").tobytes()
+    assert cloud.fields[0].datatype == PointField.FLOAT32
+    return cloud
+
+
+def send_odometry(client, stamp) -> None:
+    message = Odometry(child_frame_id="base_link")
+    message.header.frame_id, message.header.stamp = "map", stamp
+    place, turn = message.pose.pose.position, message.pose.pose.orientation
+    place.x, place.y, place.z = ROBOT.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = ROBOT.rotation.as_quat().tolist()
+    client._send(client._odometry, message)
+
+
+def test_a_cloud_of_a_camera_gives_the_map_of_the_same_cloud_in_the_map_frame(
+    camera_server, client
+):
+    points = points_of(make_terrain(rocky))
+    now = client.get_clock().now().to_msg()
+    client.send_cloud(cloud_of(points, "map", now))
+    wait_until(lambda: camera_server.service.terrain is not None, "the map")
+    right = camera_server.service.terrain
+    send_odometry(client, now)
+    wait_until(lambda: camera_server.service.fresh_pose() is not None, "odometry")
+    back = ROBOT.then(MOUNT).inverse()
+    seen = back.rotation.apply(points) + back.translation
+    assert np.abs(seen - points).max() > 1.0
+    client.send_cloud(cloud_of(seen, "front_camera", now))
+    wait_until(lambda: camera_server.service.terrain is not right, "the camera's map")
+    found = camera_server.service.terrain
+    assert (found.resolution, found.elevation.shape) == (CELL, right.elevation.shape)
+    np.testing.assert_allclose(found.origin, right.origin, atol=1e-9)
+    np.testing.assert_allclose(found.elevation, right.elevation, atol=2e-6)
+    assert np.isfinite(found.elevation).mean() > 0.99
+
+
+def take_transform(server, parent: str, child: str, rigid: Rigid, stamp) -> None:
+    """Give the server a TFMessage; tf2_msgs is not on PyPI."""
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = parent, stamp
+    place, turn = message.transform.translation, message.transform.rotation
+    place.x, place.y, place.z = rigid.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
+    server.frames.take(SimpleNamespace(transforms=[message]))
+
+
+def test_tf_places_the_robot_and_the_camera_and_is_refused_when_stale(start_server, client):
+    server = start_server(map_resolution=CELL, transform_timeout=5.0)
+    points, now = points_of(make_terrain(rocky)), client.get_clock().now()
+    back = ROBOT.then(MOUNT).inverse()
+    seen = back.rotation.apply(points) + back.translation
+    old = (now - Duration(seconds=7.5)).to_msg()
+    take_transform(server, "base_link", "mast_camera", MOUNT, now.to_msg())
+    take_transform(server, "map", "base_link", ROBOT, old)
+    client.send_cloud(cloud_of(seen, "mast_camera", now.to_msg()))
+    client.wait_for_log("the transform from 'base_link' to 'map' is stale: it is 7.")
+    take_transform(server, "map", "base_link", ROBOT, now.to_msg())
+    client.send_cloud(cloud_of(seen, "mast_camera", client.get_clock().now().to_msg()))
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    found = server.service.terrain
+    x, y, _ = points[::50].T
+    near = np.abs(found.elevation_at(x, y) - make_terrain(rocky).elevation_at(x, y))
+    assert np.nanmax(near) < 0.05 and np.nanmedian(near) < 2e-3
+    assert np.isfinite(near).mean() > 0.9
+
+
+def test_a_cloud_whose_pose_is_stale_missing_or_unknown_is_refused_with_the_reason(
+    camera_server, client
+):
+    points, now = points_of(make_terrain(rocky)), client.get_clock().now()
+    refused = "elevation_cloud refused, there is no map yet: "
+    client.send_cloud(cloud_of(points, "front_camera", now.to_msg()))
+    client.wait_for_log(refused + "neither /tf nor odometry says where 'base_link' is in 'map'")
+    send_odometry(client, (now - Duration(seconds=7.5)).to_msg())
+    wait_until(lambda: camera_server.service.fresh_pose() is not None, "odometry")
+    client.send_cloud(cloud_of(points + 1.0, "front_camera", now.to_msg()))
+    client.wait_for_log(
+        refused + "by odometry: the transform from 'base_link' to 'map' is stale: it is 7."
+    )
+    client.send_cloud(cloud_of(points, "rear_camera", now.to_msg()))
+    client.wait_for_log(refused + "cloud is in frame 'rear_camera'; it must be in 'map', or")
+    assert camera_server.service.terrain is None

@@ -1,0 +1,108 @@
+"""Replays know the robot: IMU, mounted cameras, recorded transforms, names of joints."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import JointState
+
+from msg_adapters.stamps import ns_to_stamp
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.planning.navigation.transforms import Rigid
+from support.messages.recorded_drives import (
+    BEGIN,
+    cloud,
+    drive,
+    imu_at,
+    joints_of,
+    odometry_at,
+    record,
+    record_with_transforms,
+    replay,
+    transforms_of,
+    waves,
+)
+
+
+@pytest.mark.parametrize("imu_attitude", [False, True])
+def test_ground_under_the_rover_is_filled_as_the_imu_says(imu_attitude, tmp_path, capsys):
+    X, Y = np.meshgrid(np.arange(-1.0, 4.0, 0.04), np.arange(-2.0, 2.0, 0.04))
+    unseen = (np.abs(X - 1.0) < 0.5) & (np.abs(Y) < 0.45)
+    terrain = Terrain(np.where(unseen, np.nan, 0.0), 0.04, (-1.0, -2.0))
+    standing = dict.fromkeys(("rocker_right", "rocker_left", "bogie_right", "bogie_left"), 0.0)
+    messages = [
+        ("/joint_states", joints_of(standing)),
+        ("/odometry", odometry_at(1.0)),
+        ("/imu", imu_at(0.2)),
+        ("/other/imu_raw", imu_at(-0.5)),
+        ("/elevation_cloud", cloud(terrain)),
+    ]
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text(f"/**: {{ros__parameters: {{imu_attitude: {str(imu_attitude).lower()}}}}}\n")
+    words = ["--parameters", str(file), "--goal", "3,0,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["topics"]["imu"] == "/imu"
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    left, right = ground.elevation_at(np.array([1.0, 1.0]), np.array([0.3, -0.3]))
+    assert left - right == pytest.approx(0.6 * np.tan(0.2) if imu_attitude else 0.0, abs=0.03)
+
+
+def test_clouds_of_a_mounted_camera_are_replayed(tmp_path, capsys):
+    file, maps = tmp_path / "server.yaml", []
+    file.write_text(
+        "/**: {ros__parameters: {map_resolution: 0.04, sensor_mounts: ['camera:0.5:0:1:0:0:0']}}\n"
+    )
+    moved = replace(waves(), elevation=waves().elevation - 1.0, origin=(-2.5, -2.0))
+    for name, one in (("map", cloud(waves())), ("camera", cloud(moved, frame="camera"))):
+        odometry = odometry_at(1.0)
+        odometry.header.stamp = ns_to_stamp(BEGIN)
+        bag = record(tmp_path / name, [("/odometry", odometry), ("/elevation_cloud", one)])
+        words = ["--parameters", str(file), "--goal", "3,0.2,0"]
+        (answer,), total = replay(capsys, bag, tmp_path / f"out_{name}", *words)
+        assert total["refused_messages"] == {}
+        maps.append(load_terrain(tmp_path / f"out_{name}" / answer["map"]))
+    assert maps[0].elevation.shape == maps[1].elevation.shape
+    np.testing.assert_allclose(maps[1].origin, maps[0].origin, atol=1e-5)
+    np.testing.assert_allclose(maps[1].elevation, maps[0].elevation, atol=1e-5)
+
+
+def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, capsys):
+    map_odom = Rigid.from_rpy(2.0, -1.0, 0.3, 0.0, 0.0, 1.1)
+    mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
+    on_map = Rigid.from_rpy(1.0, 0.0, 0.25, 0.0, 0.0, 0.0)
+    in_odom, in_camera = map_odom.inverse().then(on_map), on_map.then(mount).inverse()
+    odometry = odometry_at(0.0, "odom")
+    place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
+    place.x, place.y, place.z = in_odom.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = in_odom.rotation.as_quat().tolist()
+    odometry.header.stamp = ns_to_stamp(BEGIN)
+    plain, seen = cloud(waves()), cloud(waves(), frame="camera")
+    points = np.frombuffer(plain.data, "<f4").reshape(-1, 3)
+    moved = in_camera.rotation.apply(points) + in_camera.translation
+    seen.data = moved.astype("<f4").tobytes()
+    transforms = {
+        "/tf": transforms_of("map", "odom", map_odom),
+        "/tf_static": transforms_of("base_link", "camera", mount),
+    }
+    messages = [("/odometry", odometry), ("/elevation_cloud", seen)]
+    bag = record_with_transforms(tmp_path / "bag", transforms, messages)
+    words = ["--resolution", "0.04", "--goal", "3,0.2,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["refused_messages"] == {} and total["topics"]["tf"] == "/tf"
+    ground, right = load_terrain(tmp_path / "out" / answer["map"]), waves()
+    x, y = np.meshgrid(np.arange(0.0, 4.0, 0.1), np.arange(-1.0, 1.0, 0.1))
+    np.testing.assert_allclose(ground.elevation_at(x, y), right.elevation_at(x, y), atol=2e-3)
+    poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
+    np.testing.assert_allclose(poses[0], [1.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_joints_with_the_names_of_the_robot_are_measured(tmp_path, capsys):
+    messages = [("/elevation_cloud", cloud(waves())), *drive(1.0)]
+    for _, message in messages:
+        if isinstance(message, JointState):
+            message.name = [name.replace("bogie_right", "bogie_r") for name in message.name]
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text("/**: {ros__parameters: {joint_map: ['bogie_right:bogie_r']}}\n")
+    (answer,), _ = replay(capsys, bag, tmp_path / "out", "--parameters", str(file))
+    measured = np.load(tmp_path / "out" / answer["measured"])
+    assert np.isfinite(measured["bogie_angle"]).all()
