@@ -19,13 +19,13 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.figures.pictures import STYLE, save_figure
+from rover_planner.figures.wheel_colours import WHEEL_COLOURS
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
 # The palette of Okabe and Ito, which is safe for colour-blind readers.
 PASSABLE = "#0072B2"
 REFUSED = "#D55E00"
 CHOSEN = "#F0E442"
-WHEEL_COLOURS = {"front": "#0072B2", "middle": "#E69F00", "rear": "#CC79A7"}
 SIDE_STYLES = {"right": "-", "left": (0, (3, 1.5))}
 
 # Ground is drawn in warm greys, so that the coloured paths stand out.

@@ -11,17 +11,21 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from rover_physics.traversability.classification import IMPASSABLE, TRAVERSABILITY_CLASSES
+from rover_physics.traversability.classification import IMPASSABLE
 from rover_planner.figures.pictures import STYLE, save_figure
-from rover_planner.figures.plots import REFUSED, hill_shade
+from rover_planner.figures.plots import hill_shade
 from rover_planner.survey.chunk_survey import open_map
 from rover_planner.survey.layers import CLASS_NUMBERS, LIMIT_NUMBERS, NOT_SURVEYED
-from rover_planner.survey.reachable import ReachableArea
+from rover_planner.survey.palette import (
+    CLASS_COLOURS,
+    CLASS_LABELS,
+    SOME_HEADINGS,
+    UNKNOWN_LABEL,
+)
+from rover_planner.survey.reach.kept_area import ReachableArea
 from rover_planner.survey.store import SurveyStore
 
-# The palette of Okabe and Ito, from best to worst class, and where the heading decides.
-_COLOURS = ("#009E73", "#56B4E9", "#E69F00", REFUSED, "#F0E442")
-_IMPASSABLE, _SOME_HEADINGS = CLASS_NUMBERS[IMPASSABLE], len(CLASS_NUMBERS)
+_IMPASSABLE = CLASS_NUMBERS[IMPASSABLE]
 _OFF_GROUND = [LIMIT_NUMBERS[code] for code in ("off_map", "unknown_ground")]
 _UNKNOWN, _INK = "#CCD6E6", "#222222"
 _MAX_CELLS = 1200
@@ -42,16 +46,15 @@ def draw_survey(path: Path, store: SurveyStore) -> None:
     every = _thinning(store)
     worst, best = (store.layer(name)[::every, ::every] for name in ("worst_class", "best_class"))
     decides = (worst == _IMPASSABLE) & (best < _IMPASSABLE)
-    shown = np.where(decides, _SOME_HEADINGS, worst).astype(float)
+    shown = np.where(decides, SOME_HEADINGS, worst).astype(float)
     limits = store.layer("first_limit")[::every, ::every]
     shown[(worst == NOT_SURVEYED) | ((best == _IMPASSABLE) & np.isin(limits, _OFF_GROUND))] = (
         np.nan
     )
-    names = (*TRAVERSABILITY_CLASSES, "passable at some headings")
-    labels = [*zip(names, _COLOURS, strict=True), ("unknown ground or edge", _UNKNOWN)]
+    labels = [*zip(CLASS_LABELS, CLASS_COLOURS, strict=True), (UNKNOWN_LABEL, _UNKNOWN)]
     rover = store.notes.description["rover"]["name"]
     title = f"{rover}: worst class over {store.notes.headings} headings"
-    _draw(path, store, shown, (ListedColormap(_COLOURS), 0.0, len(_COLOURS) - 1.0), labels, title)
+    _draw(path, store, shown, (ListedColormap(CLASS_COLOURS), 0.0, SOME_HEADINGS), labels, title)
 
 
 def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
@@ -68,8 +71,7 @@ def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
     every = _thinning(store)
     distance = area.distance[::every, ::every]
     shown = np.where(np.isfinite(distance), distance, np.nan)
-    farthest = area.farthest
-    longest = 0.0 if farthest is None else float(area.distance[farthest])
+    longest = area.longest or 0.0
     title = f"reached and returned from: {area.area:.0f} m2, longest way {longest:.1f} m"
     colours = matplotlib.colormaps["viridis"]
     labels = [(f"way of {share * longest:.0f} m", colours(share)) for share in (0.0, 0.5, 1.0)]

@@ -15,14 +15,12 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.verdict import judge
-from rover_planner.studies.study_file import Study, StudyDrive
+from rover_planner.studies.study_file import STEP_TOLERANCE, Study, StudyDrive
 
 SPACING = 0.02
 """Distance between waypoints [m]."""
 NO_LIMIT = 1e9
 """Value that disables a limit."""
-STEP_TOLERANCE = 0.002
-"""Tolerance of the height of the tallest step [m]."""
 SEARCH_STEP = 0.02
 """Increment of step heights in the search, before bisection [m]."""
 MAX_STEP = 10.0

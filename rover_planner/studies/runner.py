@@ -12,6 +12,7 @@ import numpy as np
 from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import evaluate, load_shares
 from rover_planner.studies.rover_keys import vary
@@ -67,6 +68,22 @@ class StudyResult:
         equals = [trial for trial in known if abs(trial.objective - best) <= 1e-9 * abs(best)]
         return sorted(equals, key=lambda trial: trial.values)[len(equals) // 2]
 
+    @property
+    def ties(self) -> tuple[Trial, ...]:
+        """The other trials of a sweep that are as good as the best within the resolution.
+
+        They are sorted by their values. An optimisation has none: it ends where all are equal.
+
+        Raises:
+            PlanningError: No trial could be judged.
+        """
+        if self.study.method == "optimise":
+            return ()
+        best = self.best
+        most = max(self.study.resolution, 1e-9 * abs(best.objective))
+        near = [t for t in self.trials if abs(t.objective - best.objective) <= most]
+        return tuple(sorted((t for t in near if t.values != best.values), key=lambda t: t.values))
+
     def write_csv(self, path: Path) -> None:
         """Write a CSV file with a row for each trial."""
         _, what, unit = OBJECTIVES[self.study.objective]
@@ -117,14 +134,27 @@ def run_study(study: Study, on_trial: Callable[[Trial], None] | None = None) -> 
     return StudyResult(study, baseline, tuple(trials))
 
 
-def _try(study: Study, values: tuple[float, ...]) -> Trial:
+def find_rover(study: Study, trial: Trial) -> Rover:
+    """Return the rover of a trial.
+
+    Raises:
+        RoverFileError, ModelError: It is invalid.
+    """
+    return _rover_of(study, trial.values)
+
+
+def _rover_of(study: Study, values: tuple[float, ...]) -> Rover:
     numbers = {
         key: value
         for parameter, value in zip(study.parameters, values, strict=True)
         for key in parameter.keys
     }
+    return vary(study.rover, numbers)
+
+
+def _try(study: Study, values: tuple[float, ...]) -> Trial:
     try:
-        rover = vary(study.rover, numbers)
+        rover = _rover_of(study, values)
         shares = tuple(load_shares(rover).tolist())
         score = evaluate(study, rover)
     except (RoverFileError, ModelError) as error:

@@ -36,6 +36,8 @@ OBJECTIVES = {
     "load_imbalance": ("smallest", "largest wheel load over the mean, level ground", ""),
 }
 """Objectives by name: best value, description, unit."""
+STEP_TOLERANCE = 0.002
+"""Tolerance of the height of the tallest step [m]."""
 MAX_TRIALS = 100_000
 """Largest number of rovers that a study tries."""
 ABOUT_DRIVES = ("worst_utilisation", "tip_over_margin", "drive_energy")
@@ -138,6 +140,11 @@ class Study(StudyOptions):
     def wants_largest(self) -> bool:
         """Whether larger values of the objective are better."""
         return OBJECTIVES[self.objective][0] == "largest"
+
+    @property
+    def resolution(self) -> float:
+        """How far the objective is found to, in its unit; 0 where it is computed exactly."""
+        return STEP_TOLERANCE if self.objective == "tallest_step" else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,13 +7,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from rover_physics.names import WHEELS
+from rover_physics.numerics.arrays import Floats
 from rover_planner.figures.pictures import STYLE, save_figure
+from rover_planner.figures.wheel_colours import WHEEL_COLOURS
 from rover_planner.studies.runner import StudyResult
 from rover_planner.studies.study_file import OBJECTIVES
+from rover_planner.studies.summary import describe_ties
 
 POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
 """Colours that are safe for colour-blind readers (Okabe and Ito); each has its own marker."""
+EQUAL = 1.0 / 6.0
+"""Load share of a wheel if all carry alike."""
 
 
 def draw_study(result: StudyResult, path: Path) -> None:
@@ -23,40 +30,103 @@ def draw_study(result: StudyResult, path: Path) -> None:
         PlanningError: The file cannot be written, or no trial could be judged.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.0, 4.0), layout="constrained")
-        FigureCanvasAgg(figure)
-        axes = figure.subplots()
-        if len(result.study.parameters) == 1:
-            _draw_curve(axes, result)
-        elif len(result.study.parameters) == 2:
-            _draw_map(figure, axes, result)
-        else:
-            _draw_progress(axes, result)
-        _, what, unit = OBJECTIVES[result.study.objective]
-        best = result.best
-        at = ", ".join(
-            f"{parameter.name} {value:.4g} {parameter.unit}".rstrip()
-            for parameter, value in zip(result.study.parameters, best.values, strict=True)
-        )
-        axes.set_title(f"{what}: best {best.objective:.4g} {unit}\nat {at}", fontsize=9)
-        save_figure(path, figure)
+        save_figure(path, _draw(result))
+
+
+def draw_pixels(result: StudyResult) -> NDArray[np.uint8]:
+    """Draw a study and return the pixels (height, width, 4), RGBA.
+
+    Raises:
+        PlanningError: No trial could be judged.
+    """
+    with matplotlib.rc_context({**STYLE, "figure.dpi": 130}):
+        canvas = FigureCanvasAgg(_draw(result))
+        canvas.draw()
+        return np.array(canvas.buffer_rgba(), dtype=np.uint8)
+
+
+def _draw(result: StudyResult) -> Figure:
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = _draw_shares(figure, result)
+    if len(result.study.parameters) == 1:
+        _draw_curve(axes, result)
+    elif len(result.study.parameters) == 2:
+        _draw_map(figure, axes, result)
+    else:
+        _draw_progress(axes, result)
+    _, what, unit = OBJECTIVES[result.study.objective]
+    best = result.best
+    at = ", ".join(
+        f"{parameter.name} {value:.4g} {parameter.unit}".rstrip()
+        for parameter, value in zip(result.study.parameters, best.values, strict=True)
+    )
+    lines = [f"{what}: best {best.objective:.4g} {unit}", f"at {at}", describe_ties(result)]
+    axes.set_title("\n".join(filter(None, lines)), fontsize=9)
+    return figure
 
 
 def _label(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
+def _draw_shares(figure: Figure, result: StudyResult) -> Axes:
+    """Draw the load shares of the rover as it is and of the best; return the axes beside them.
+
+    A study of the tallest step has none: its rovers hardly differ on level ground.
+    """
+    if result.study.objective == "tallest_step":
+        return figure.subplots()
+    figure.set_size_inches(7.4, 4.0)
+    main, bars = figure.subplots(1, 2, width_ratios=(2.4, 1.0))
+    for k, trial in enumerate((result.baseline, result.best)):
+        for j, (axle, colour) in enumerate(WHEEL_COLOURS.items()):
+            share = 0.5 * (trial.load_shares[j] + trial.load_shares[j + 3])
+            x, y = k + 0.27 * (j - 1), max(share, EQUAL) + 0.004
+            bars.bar(x, share, 0.25, color=colour, label=axle if k == 0 else None)
+            bars.text(x, y, f"{share:.3f}", fontsize=8, rotation=90, ha="center", va="bottom")
+    bars.axhline(EQUAL, color="black", linewidth=1.0, linestyle="--", label="equal: 1/6")
+    bars.set_xticks((0, 1), ("as it is", "best"))
+    bars.set_ylim(0.0, 1.5 * max(*result.best.load_shares, EQUAL))
+    bars.set_title("load share of a wheel\non level ground", fontsize=9)
+    bars.grid(visible=False)
+    bars.legend(fontsize=7, ncols=2, loc="upper center", columnspacing=0.8, handlelength=1.2)
+    return main
+
+
 def _draw_curve(axes: Axes, result: StudyResult) -> None:
-    parameter = result.study.parameters[0]
+    parameter, study = result.study.parameters[0], result.study
     points = np.array(sorted((t.values[0], t.objective) for t in result.trials))
     axes.plot(points[:, 0], points[:, 1], "-o", color=POINT, markersize=3)
+    if study.resolution:
+        _draw_band(axes, result, points)
     now = result.baseline
     axes.plot(now.values[0], now.objective, "s", color=NOW, markersize=7, label="as it is")
     axes.plot(*_best_point(result), "o", color=BEST, markersize=8, label="best")
-    axes.legend()
-    _, what, unit = OBJECTIVES[result.study.objective]
+    for k, tie in enumerate(result.ties):
+        axes.plot(tie.values[0], tie.objective, "o", color=BEST, markerfacecolor="none",
+                  markersize=10, label="as good" if k == 0 else None)  # fmt: skip
+    axes.legend(fontsize=8)
+    _, what, unit = OBJECTIVES[study.objective]
     axes.set_xlabel(_label(parameter.name, parameter.unit))
     axes.set_ylabel(_label(what, unit))
+
+
+def _draw_band(axes: Axes, result: StudyResult, points: Floats) -> None:
+    """Draw where the tallest step may lie, and which wheel ends the climb of a taller one."""
+    resolution = result.study.resolution
+    unit = OBJECTIVES[result.study.objective][2]
+    label = f"resolution {resolution:g} {unit}"
+    x, low = points.T
+    axes.fill_between(x, low, low + resolution, color=POINT, alpha=0.2, linewidth=0.0, label=label)
+    named: set[str] = set()
+    for trial in result.trials:
+        axle = next((wheel for wheel in WHEELS if wheel in trial.note), "").partition("_")[0]
+        if axle:
+            words = f"then a {axle} wheel fails" if axle not in named else None
+            named.add(axle)
+            axes.plot(trial.values[0], trial.objective + resolution, "v", markersize=5,
+                      color=WHEEL_COLOURS[axle], label=words)  # fmt: skip
 
 
 def _best_point(result: StudyResult) -> tuple[float, float]:

@@ -143,13 +143,18 @@ def _check_ros2(words: tuple[str, ...]) -> None:
     verb, rest = words[0], words[1:]
     if verb == "run":
         assert rest[0] == "rover_planner" and rest[1] in console_scripts(), rest
-        _check_node(rest[1], rest[2:])
+        check_command(rest[1:])
     elif verb == "launch":
         _check_launch(rest)
     elif verb == "param":
-        assert rest[0] in ("set", "get"), rest
+        assert rest[0] in ("set", "get", "describe"), rest
         if rest[0] == "set":
             _check_parameter(rest[1].lstrip("/"), rest[2], rest[3])
+    elif (verb, rest[0]) == ("node", "info"):
+        assert rest[1].lstrip("/") in PROGRAMS, rest
+    elif (verb, rest[0]) == ("topic", "echo"):
+        node, _, topic = rest[-1].strip("/").partition("/")
+        assert f"~/{topic}" in PROGRAMS[node].topics, f"{node} has no topic {topic}"
     else:
         assert (verb, rest[0]) == ("service", "call"), words
         _check_call(*rest[1:4])

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from rover_planner.viewer.panel.controls import CHANGED
+
 viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 sync_api = pytest.importorskip(
     "playwright.sync_api", reason="no playwright: pip install '.[test]'"
@@ -42,6 +44,11 @@ RECORD = """text => {
 }"""
 """Notes in the page when a text has appeared."""
 
+SMALL_SCENE = (
+    'div[style*="touch-action: none"] > div {width: 16px !important; height: 16px !important}'
+)
+"""Style of a scene of 16 x 16 pixels."""
+
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
 )
@@ -61,14 +68,21 @@ def wait_until(condition: Callable[[], Any], what: str) -> Any:
 class Visitor:
     """A simulated user of the page: reads texts and pixels, presses, drags and clicks."""
 
-    def __init__(self, browser: Any, url: str):
-        # A small window, because rendering without a graphics card is slow.
-        self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=0.4)
+    def __init__(self, browser: Any, url: str, scale: float = 0.4):
+        # Few pixels by default, because rendering without a graphics card is slow.
+        self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=scale)
         self.page_errors: list[str] = []
         self.tab.on("pageerror", lambda error: self.page_errors.append(str(error)))
         self.tab.set_default_timeout(1000.0 * WAIT)
         self.tab.goto(url)
         self.tab.wait_for_selector("#dashboard")
+
+    def shrink_scene(self) -> None:
+        """Let the browser draw few pixels of the scene, for a test that does not look at it.
+
+        Without a graphics card it then draws 60 times as many pictures.
+        """
+        self.tab.add_style_tag(content=SMALL_SCENE)
 
     def open_tab(self, name: str) -> None:
         """Open a tab of the panel."""
@@ -80,8 +94,16 @@ class Visitor:
             self.tab.get_by_text(name, exact=True)
         ).first.click()
 
-    def _row(self, label: str) -> Any:
+    def _buttons(self, label: str) -> Callable[[], list[str]]:
+        """Return what lists the names of the buttons in a row."""
         named = self.tab.get_by_text(label, exact=True)
+        row = named.locator("xpath=ancestor::*[.//button][1]")
+        return lambda: row.get_by_role("button").all_inner_texts()
+
+    def _row(self, label: str) -> Any:
+        named = self.tab.get_by_text(label, exact=True).or_(
+            self.tab.get_by_text(f"{CHANGED}{label}", exact=True)
+        )
         return named.locator("xpath=ancestor::*[.//input][1]")
 
     def set_slider(self, label: str, value: str) -> None:
@@ -102,6 +124,7 @@ class Visitor:
     def drag_slider(self, label: str, share: float) -> None:
         """Drag the thumb of a slider to a share of its range, through many values."""
         thumb = self._row(label).get_by_role("slider")
+        thumb.scroll_into_view_if_needed()
         track = thumb.locator("xpath=..").bounding_box()
         at = thumb.bounding_box()
         y = at["y"] + at["height"] / 2

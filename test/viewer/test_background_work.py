@@ -106,6 +106,41 @@ def test_slow_work_gives_way_to_a_newer_request_and_delivers_nothing(judge, spir
     assert {one.request.scenario for one in judge.take()} == {spirit}
 
 
+@pytest.mark.parametrize("is_hasty", [False, True])
+def test_a_newer_request_stops_at_once_what_follows_a_result_or_is_hasty(is_hasty):
+    steps = {"old": 0}
+
+    def count_steps(request, report):
+        if not is_hasty:
+            yield "first"
+        while request == "old" and steps["old"] < 1000:
+            steps["old"] += 1
+            report("step", 1, 1)
+            time.sleep(0.005)
+        yield "last"
+
+    work = BackgroundWork(count_steps, lambda: None, "counts", lambda _request: is_hasty)
+    work.ask("old")
+    wait_until(lambda: steps["old"] > 3, "the old work to begin")
+    work.ask("new")
+    asked_at = steps["old"]
+    wait_for_idle(work)
+    assert steps["old"] <= asked_at + 2
+    assert [(one.request, one.result) for one in work.take()][-1] == ("new", "last")
+    assert work.close()
+
+
+def test_a_slider_that_moves_on_stops_judging_of_all_paths_not_of_the_shown_one(spirit):
+    session = ViewSession(LSR1, spirit.terrain, spirit.start, spirit.goal, spirit.options)
+    session.judge_in_background(lambda: None)
+    is_hasty = session._background._is_hasty
+    session.change_rover([("friction",)], 0.7)
+    assert not is_hasty(session._asked)
+    session.plan_again()
+    assert is_hasty(session._asked)
+    assert session.close()
+
+
 def test_cancelled_work_stops_soon_and_is_never_delivered(judge, spirit):
     judge.ask(JudgeRequest(slow_scenario()))
     wait_until(lambda: judge.progress.step == 2, "the second path")

@@ -1,5 +1,6 @@
 """The page in a real browser: what a visitor sees after pressing, dragging and clicking."""
 
+import itertools
 import time
 from collections.abc import Iterator
 
@@ -10,10 +11,12 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.studies.rover_values import read_rover
 from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.state.reasons.explanation import explain
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.browser import (
     ARGUMENTS,
+    LAPTOP,
     PROGRAM,
     WAIT,
     Visitor,
@@ -26,8 +29,8 @@ from support.viewer.sessions import ramp
 pytestmark = [needs_browser, pytest.mark.slow]
 
 LSR1 = load_rover("lsr1")
-MIDDLE = (600, 420)
-"""A point of the screen on the ground [px]."""
+MIDDLE = (720, 420)
+"""A point of the screen on the ground, beside the notices of viser [px]."""
 
 
 def walled() -> Terrain:
@@ -82,15 +85,33 @@ def test_the_page_shows_the_rover_its_loads_and_the_verdict(visitor):
     assert dashboard.count(" N\n") + dashboard.endswith(" N") >= 6
     loads = [float(part.split()[-1]) for part in dashboard.split(" N")[:6]]
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.1)
-    for name in ("Time", "Distance", "Energy", "Speed", "stability margin", "slip ratio"):
+    for name in (
+        "Time",
+        "Distance",
+        "Energy",
+        "Speed",
+        "stability",
+        "T/(\u03bcN)",
+        "worst so far",
+    ):
         assert name in dashboard
     assert not visitor.page_errors
 
 
+def is_seen(visitor: Visitor, selector: str) -> bool:
+    """Return whether all of an element is on a laptop's screen."""
+    box = visitor.tab.locator(selector).bounding_box()
+    return box is not None and box["y"] >= 0.0 and box["y"] + box["height"] <= 720.0
+
+
+def assert_seen(visitor: Visitor) -> None:
+    """Assert that nothing of the drive tab is below the edge of the screen once it is drawn."""
+    for selector in ("#verdict:visible", "#dashboard", "#status", "#plots-legend"):
+        wait_until(lambda selector=selector: is_seen(visitor, selector), f"{selector} in sight")
+
+
 def test_the_drive_tab_fits_on_the_screen_of_a_laptop(visitor):
-    for selector in ("#verdict", "#dashboard", "#status", "#plots-legend"):
-        box = visitor.tab.locator(selector).bounding_box()
-        assert box["y"] >= 0.0 and box["y"] + box["height"] <= 720.0, selector
+    assert_seen(visitor)
 
 
 def test_play_moves_the_rover_and_pause_stops_it(visitor, page):
@@ -146,6 +167,54 @@ def test_every_typed_time_takes_effect_although_the_page_moves_the_scrubber_too(
         wait_until(lambda typed=typed: page.playback.time == float(typed), f"{typed} s")
         visitor.press("To the start")
         wait_until(lambda: visitor.slider_value("Time [s]") == 0.0, "the start")
+
+
+def test_a_time_typed_while_it_plays_is_not_overwritten_and_counts_on_enter(visitor, page):
+    page.requests.add(lambda: page.playback.go_to(50.0))
+    page.playback.speed, speed = 1.0, page.playback.speed
+    try:
+        visitor.press("Play")
+        box = visitor._row("Time [s]").locator("input").last
+        wait_until(lambda: float(box.input_value()) > 50.2, "the box to follow the drive")
+        box.click()
+        shown, then = box.input_value(), page.playback.time
+        wait_until(lambda: page.playback.time > then + 0.7, "the drive to go on")
+        assert box.input_value() == shown
+        box.press("Control+a")
+        for text in ("1", "12", "12.", "12.5"):
+            box.press(text[-1])
+            then = page.playback.time
+            wait_until(lambda then=then: page.playback.time > then + 0.3, "the drive to go on")
+            assert box.input_value() == text
+        box.press("Enter")
+        wait_until(lambda: page.playback.time == 12.5, "the typed time")
+        wait_until(lambda: box.input_value() == "12.5", "the box to show it")
+        visitor.press("Play")  # it leaves the box
+        wait_until(lambda: float(box.input_value()) > 12.7, "the box to follow the drive again")
+        box.click()
+        then = page.playback.time
+        wait_until(lambda: page.playback.time > then + 0.3, "the drive to go on")
+        visitor.press("Pause")
+        end = page.playback.time
+        wait_until(lambda: float(box.input_value()) == pytest.approx(end, abs=0.06), "the end")
+    finally:
+        page.playback.speed = speed
+
+
+def test_header_hint_and_notices_do_not_hide_each_other(visitor):
+    notice = visitor.tab.locator(".mantine-Notification-root").first
+    assert "Software WebGL" in notice.inner_text()
+    for width in (LAPTOP["width"], 900):
+        visitor.tab.set_viewport_size({**LAPTOP, "width": width})
+        scene = visitor.tab.locator("canvas").first
+        wait_until(lambda: (scene.bounding_box()["x"] > 20.0) == (width >= 1000), "the panels")  # noqa: B023
+        boxes = [visitor.tab.locator(name).bounding_box() for name in ("#header", "#hint")]
+        boxes.append(notice.bounding_box())
+        boxes.sort(key=lambda box: box["y"])
+        for above, below in itertools.pairwise(boxes):
+            assert above["y"] + above["height"] <= below["y"], (width, boxes)
+    visitor.tab.set_viewport_size(LAPTOP)
+    wait_until(lambda: scene.bounding_box()["x"] > 20.0, "the panels side by side")
 
 
 def test_a_time_typed_just_before_the_page_moves_the_scrubber_takes_effect(visitor, page):
@@ -230,7 +299,7 @@ def test_a_click_on_the_ground_sets_the_goal_and_plans_at_once(visitor, page):
     x, y, _ = page.session.goal
     assert abs(x) < 4.0 and abs(y) < 4.0
     assert page.session.start == start
-    assert "candidate paths" in visitor.text("#verdict")
+    assert "candidate paths" in visitor.text("#details")
 
 
 def test_a_click_with_shift_sets_the_start(visitor, page):
@@ -240,20 +309,41 @@ def test_a_click_with_shift_sets_the_start(visitor, page):
     assert page.session.goal[:2] == goal[:2]
 
 
+def test_a_refused_click_is_answered_in_every_tab(visitor):
+    visitor.open_tab("Ground and path")
+    visitor.click_scene(600, 100)  # the sky
+    visitor.wait_for("refused: the click is beside the known ground")
+    visitor.click_scene(*MIDDLE)
+    visitor.tab.locator("#refusal").wait_for(state="hidden")
+
+
 def test_a_path_through_a_wall_is_refused_and_its_reason_is_shown(visitor, page):
     before = visitor.picture()
     page.requests.add(lambda: page.plan(np.array([3.4, 0.0])))
     visitor.wait_for("not traversable")
-    assert page.session.shown.verdict.reason in visitor.text("#verdict")
+    wait_until(lambda: not page.is_busy, "all verdicts")
     assert not page.session.answer.traversable
+    failure = explain(page.session.finished).failure
+    wait_until(lambda: failure.headline in visitor.text("#verdict"), "the broken limit")
+    assert page.session.shown.verdict.reason in visitor.text("#details")
     wait_until(lambda: visitor.picture() != before, "ghosts in the scene")
+
+
+def test_the_board_of_a_refused_path_is_seen_without_scrolling(visitor, page):
+    page.requests.add(lambda: page.plan(np.array([3.4, 0.0])))
+    visitor.tab.get_by_role("button", name="Go to the failure").wait_for()
+    wait_until(lambda: not page.is_busy, "all verdicts")
+    visitor.wait_for("refused")
+    assert_seen(visitor)
 
 
 def test_a_predicted_layer_colours_the_ground(visitor):
     visitor.open_tab("Ground and path")
     before = visitor.picture()
+    assert not visitor.tab.get_by_text("Heading [deg]").is_visible()
     visitor.choose("Colour by", "tilt")
     visitor.wait_for("29.79 deg")
+    assert visitor.tab.get_by_text("Heading [deg]").is_visible()
     wait_until(lambda: visitor.picture() != before, "other colours")
     visitor.choose("Colour by", "height")
 
@@ -279,12 +369,15 @@ def test_a_slider_that_makes_the_shown_path_impassable_is_answered_and_the_page_
         visitor.wait_for("not traversable")
         friction = visitor.slider_value("friction [-]")
         wait_until(lambda: session.rover.friction == friction, "the last value")
-        wait_until(lambda: "slips" in visitor.text("#verdict"), "the reason")
+        wait_until(lambda: "slips" in visitor.text("#verdict:visible"), "the reason")
         visitor.set_slider("friction [-]", "0.9")
         wait_until(lambda: visitor.text("#verdict").startswith("traversable"), "the new verdict")
         assert visitor.page_errors == []
+        assert not visitor.tab.locator("#lost").is_visible()
     finally:
         steep.close()
+    visitor.wait_for("No connection to the program")
+    visitor.tab.close()
 
 
 def test_the_browser_reports_no_error_after_all_tests(visitor):

@@ -16,7 +16,9 @@ import viser
 from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.scene.labels import Labels
 from rover_planner.viewer.scene.overlays import PathOverlay
+from rover_planner.viewer.state.colours import REFUSED
 
 pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 
@@ -55,21 +57,23 @@ def fail(*_arguments) -> None:
 
 
 @pytest.fixture
-def scene():
+def server():
     server = viser.ViserServer(port=0, verbose=False)
-    yield server.scene
+    yield server
     server.stop()
 
 
-def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(scene):
+def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(server):
     session = session_on(ramp)
     assert session.shown.verdict.traversable
     assert session.change_rover([("friction",)], 0.4)
     assert not session.shown.verdict.traversable
-    overlay = PathOverlay(scene)
+    overlay = PathOverlay(server.scene, Labels(server.scene, server.gui))
     overlay.show(session.rover, session.terrain, session.candidates, session.shown.index)
-    names = {node.name for node in overlay._nodes}
-    assert {"/ghosts/0", f"/paths/{session.shown.index}-beyond"} <= names
+    driven, beyond, *cross = overlay.ribbons[session.shown.index].strands
+    assert driven.colour == REFUSED and driven.width > beyond.width
+    np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
+    assert beyond.colour != REFUSED and len(cross) == 2
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
@@ -111,8 +115,8 @@ def test_the_verdict_is_right_and_the_rover_drives_if_the_paths_cannot_be_drawn(
         do(page, page.playback.play)
         wait_until(lambda: page.playback.time > 0.0, "the rover to drive")
         assert "the paths are not drawn" in shown_errors(page)
-    do(page, page._show_path)
-    assert shown_errors(page) == ""
+    do(page, page.judged.show_path)
+    wait_until(lambda: not shown_errors(page), "the notice to go")
 
 
 def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
@@ -140,7 +144,7 @@ def test_all_candidates_are_judged_after_a_change_though_drawing_has_stopped(pag
     friction = next(v for v in page.rover_tab._sliders._sliders if v.label == "friction [-]")
     do(page, lambda: page._change_value(friction, 0.4))
     wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
-    wait_until(lambda: "0 of 5 candidate paths" in page.drive_tab._verdict.content, "the answer")
+    wait_until(lambda: "0 of 5 candidate paths" in page.drive_tab._details.content, "the answer")
 
 
 def test_an_error_of_a_judgement_is_shown_and_the_old_verdict_is_marked(page):
@@ -179,7 +183,7 @@ def test_a_closed_page_leaves_no_thread_behind():
 
 def test_a_path_that_does_not_exist_is_refused_by_its_number(page):
     do(page, lambda: page._choose_path(7))
-    assert "no path 8; there are paths 1 to" in page.drive_tab._verdict.content
+    assert "no path 8; there are paths 1 to" in page._notice._refusal.content
 
 
 @pytest.mark.slow

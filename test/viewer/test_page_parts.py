@@ -23,12 +23,12 @@ from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, session_on, straight
+from support.viewer.sessions import LSR1, straight
+from support.viewer.visits import FAR, shift
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, intersect_ground
-from rover_planner.viewer.scene.overlays import MAX_GHOSTS, choose_ghosts
 
 # Trajectories.
 
@@ -79,6 +79,41 @@ def test_a_trajectory_without_waypoints_has_no_state():
     assert trajectory.state_at(0.0) is None
 
 
+def test_a_rover_at_the_northing_of_a_map_stays_where_it_is():
+    far = shift(make_terrain(waves), FAR)
+    poses = straight() + np.array([*FAR, 0.0])
+    state = Trajectory(LSR1, *judge_path(LSR1, far, poses)).state_at(0.0)
+    assert state is not None
+    np.testing.assert_allclose(state.position[:2], poses[0, :2], atol=1e-6)
+    np.testing.assert_allclose(state.wheel_centres.mean(axis=0)[:2], poses[0, :2], atol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("height", "told"),
+    [
+        (lambda x, y: 0.0 * x, ()),
+        (lambda x, y: -0.1 * (x > 0.5), ("between waypoints the utilisation", "not asked while")),
+    ],
+    ids=["level", "edge"],
+)
+def test_what_lies_between_waypoints_and_what_is_exempt_is_said(height, told):
+    trajectory = trajectory_on(height, straight(3.0))
+    assert trajectory.verdict.traversable
+    prediction = trajectory.prediction
+    pairs = zip(trajectory.notes, told, strict=True)
+    assert all(note.startswith(begin) for note, begin in pairs)
+    if told:
+        between = prediction.between
+        largest = np.nanmax(between.friction_utilisation)
+        assert largest > 1.0  # more than the limit, though traversable
+        first, second = trajectory.notes
+        assert f"reaches {largest:.2f}" in first and "not asked" in first
+        assert "wheel lift, sinkage, friction and torque" in second
+        assert "front left and front right 1.20 to 1.26 m" in second
+        html = describe_verdict(True, "", "", "", notes=trajectory.notes)
+        assert html.count('class="note"') == 2
+
+
 # Playback.
 
 
@@ -104,10 +139,40 @@ def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
     assert playback.time == 0.0
 
 
-def test_another_trajectory_goes_on_at_the_same_share_of_its_duration():
-    playback = Playback(duration=10.0, time=5.0)
-    playback.set_duration(20.0)
-    assert playback.time == pytest.approx(10.0)
+METRE_PER_SECOND = np.linspace(0.0, 10.0, 11)
+
+
+def test_another_drive_goes_on_at_the_same_distance():
+    playback = Playback()
+    playback.set_drive(METRE_PER_SECOND, METRE_PER_SECOND)
+    playback.seek(4.5)
+    playback.set_drive(2.0 * METRE_PER_SECOND, METRE_PER_SECOND)
+    assert playback.time == pytest.approx(9.0)
+    playback.set_drive(METRE_PER_SECOND, METRE_PER_SECOND)
+    assert playback.time == pytest.approx(4.5)
+
+
+def test_a_drive_that_ends_early_does_not_forget_where_the_rover_was():
+    playback = Playback()
+    playback.set_drive(METRE_PER_SECOND, METRE_PER_SECOND)
+    playback.seek(8.0)
+    playback.set_drive(METRE_PER_SECOND[:4], METRE_PER_SECOND[:4])
+    assert playback.time == playback.duration == pytest.approx(3.0)
+    playback.set_drive(METRE_PER_SECOND, METRE_PER_SECOND)
+    assert playback.time == pytest.approx(8.0)
+    playback.set_drive(METRE_PER_SECOND[:4], METRE_PER_SECOND[:4])
+    playback.seek(2.0)
+    playback.set_drive(METRE_PER_SECOND, METRE_PER_SECOND)
+    assert playback.time == pytest.approx(2.0)
+
+
+def test_a_rover_that_turns_on_the_spot_goes_on_turning_there_in_another_drive():
+    times, distance = np.array([0.0, 1.0, 5.0, 6.0]), np.array([0.0, 1.0, 1.0, 2.0])
+    playback = Playback()
+    playback.set_drive(times, distance)
+    playback.seek(3.0)
+    playback.set_drive(2.0 * times, distance)
+    assert playback.time == pytest.approx(4.0)
 
 
 def test_steps_go_from_waypoint_to_waypoint():
@@ -216,7 +281,7 @@ def test_the_dashboard_shows_numbers_with_units():
     state = trajectory_on(waves).state_at(3.0)
     assert state is not None
     dashboard = draw_dashboard(LSR1, state, "paused")
-    for text in ("3.0 s", " cm", " J", " N<", "cm/s", "stability margin", "paused"):
+    for text in ("3.0 s", " cm", " J", " N<", "cm/s", ">stability<", ">margin<", "paused"):
         assert text in dashboard
 
 
@@ -257,23 +322,3 @@ def test_the_history_of_a_live_rover_keeps_known_values_every_centimetre():
     assert history.add(dataclasses.replace(state, distance=0.7))
     np.testing.assert_array_equal(history.distance, [0.5, 0.7])
     assert set(history.values) == set(PLOTS)
-
-
-# Ghosts.
-
-
-def test_ghosts_are_at_refused_waypoints_with_a_distance_between_them():
-    session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    candidates = session.candidates
-    ghosts = choose_ghosts(LSR1, candidates, shown=1)
-    assert 0 < len(ghosts) <= MAX_GHOSTS
-    assert ghosts[0] == (1, candidates[1].verdict.first_failure)
-    places = np.array([candidates[index].poses[row, :2] for index, row in ghosts])
-    assert all(candidates[index].verdict.reasons[row] for index, row in ghosts)
-    away = np.linalg.norm(places[:, None] - places[None], axis=2)
-    assert (away[~np.eye(len(places), dtype=bool)] > 0.8).all()
-
-
-def test_a_passable_path_has_no_ghosts():
-    session = session_on(lambda x, y: 0.0 * x)
-    assert choose_ghosts(LSR1, session.candidates, shown=0) == []

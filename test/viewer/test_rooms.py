@@ -1,4 +1,4 @@
-"""The rooms of the viewer import one way: state, then scene, panel and live, then pages."""
+"""The rooms of the viewer import one way: state, then scene, panel, live, browser, then pages."""
 
 import ast
 from pathlib import Path
@@ -13,7 +13,8 @@ ALLOWED = {
     "scene": {"state", "scene"},
     "panel": {"state", "panel"},
     "live": {"state", "live"},
-    "pages": {"state", "scene", "panel", "live", "pages"},
+    "browser": {"state", "browser"},
+    "pages": {"state", "scene", "panel", "live", "browser", "pages"},
 }
 """The rooms that the files of each room may import."""
 

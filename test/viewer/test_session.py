@@ -1,17 +1,26 @@
 """The session behind the page, without a browser: rovers, plans, recorded paths, ends."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rover_physics.errors import RoverFileError
 from rover_physics.names import WHEELS
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge_path import judge_path
-from rover_planner.command.prediction_files import read_prediction, write_prediction
-from rover_planner.command.view import choose_ends
+from rover_planner.command.prediction_files import (
+    read_prediction,
+    read_recorded_assumptions,
+    write_prediction,
+)
+from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
+from rover_planner.planning.assumptions import assume, read_assumptions
 from rover_planner.studies.rover_values import (
     get_value,
     list_values,
@@ -19,6 +28,7 @@ from rover_planner.studies.rover_values import (
     with_value,
     write_rover,
 )
+from rover_planner.viewer.state.context import describe_scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import make_terrain, wall_at, waves
@@ -162,6 +172,49 @@ def test_a_change_of_the_rover_judges_the_recorded_path_again(tmp_path):
     assert len(session.answer.candidates) > 1 and not session.recorded
 
 
+def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tmp_path):
+    ground = make_terrain(lambda x, y: 0.0 * x)
+    angles = {"arm_yaw": 0.5}
+    options = SweepOptions(
+        policy="optimal", soil="dry_sand", friction=0.7, payload=0.5, joint_angles=angles
+    )
+    prediction, verdict = judge_path(LSR1, ground, straight(), options)
+    assert verdict.max_sinkage > 0.0
+    file = tmp_path / "out.npz"
+    assumed = assume(LSR1, options, 2.0)
+    write_prediction(file, prediction, verdict, on_soil=True, assumptions=assumed)
+    assert read_recorded_assumptions(file) == assumed
+
+    session = ViewSession(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session.replay(*read_prediction(file), read_recorded_assumptions(file))
+    assert (session.rover.friction, session.rover.manipulator.payload) == (0.7, 0.5)
+    assert session.arm_angles == angles and session.options.policy == "optimal"
+    assert session.change_rover([("wheel", "width")], 0.07)
+    poses, rover = session.shown.candidate.poses, session.rover
+    again = replace(options, friction=None, payload=None)
+    _, expected = judge_path(rover, ground, poses, again, sigmas=2.0)
+    assert session.shown.verdict.max_sinkage == expected.max_sinkage > verdict.max_sinkage
+    assert session.shown.verdict.policy == "optimal"
+
+
+def test_a_file_that_tells_no_assumptions_is_replayed_without(tmp_path):
+    prediction, verdict = judge_path(LSR1, make_terrain(waves), straight())
+    write_prediction(tmp_path / "out.npz", prediction, verdict)
+    assert read_recorded_assumptions(tmp_path / "out.npz") is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", '{"rover": "lsr1"}', '{"rover": "lsr1", "policy": "worst"}',
+     '{"rover": "lsr1", "policy": "equal", "soil": 3}',
+     '{"rover": "lsr1", "policy": "equal", "friction": NaN}',
+     '{"rover": "lsr1", "policy": "equal", "colour": "red"}'],
+)  # fmt: skip
+def test_damaged_assumptions_are_refused(text):
+    with pytest.raises(PlanningError, match="assumptions are invalid"):
+        read_assumptions(text)
+
+
 def test_a_session_on_a_terrain_with_soil_uses_that_soil():
     flat = make_terrain(lambda x, y: 0.0 * x)
     soil = np.zeros(flat.elevation.shape, np.int32)
@@ -197,3 +250,13 @@ def test_where_the_rover_can_stand_nowhere_ends_are_chosen_all_the_same():
 def test_default_ends_on_a_large_map_are_10_m_apart():
     start, goal = choose_ends(LSR1, Terrain(np.zeros((1200, 1200)), 0.1, (0.0, 0.0)))
     assert np.hypot(goal[0] - start[0], goal[1] - start[1]) == pytest.approx(10.0)
+
+
+def test_every_ground_has_a_name_in_the_header(tmp_path, monkeypatch):
+    (tmp_path / "mars.zarr").mkdir()
+    monkeypatch.chdir(tmp_path / "mars.zarr")
+    assert name_ground(None, None) == f"made, seed {SEED}"
+    assert name_ground("maps/hill.npz", None) == "hill.npz"
+    assert name_ground(None, Path(".")) == name_ground(None, Path("../mars.zarr/")) == "mars.zarr"
+    session = session_on(waves)
+    assert describe_scenario(session.finished.scenario, session.ground_name).ground == "8 x 8 m"

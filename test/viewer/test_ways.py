@@ -11,7 +11,14 @@ from rover_physics.names import TORQUE_POLICIES
 from rover_physics.traversability.judge_path import judge_path
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.way_search import FOUND, NO_WAY, OUT_OF_TIME
-from rover_planner.viewer.state.judging import PATH, POLICY, WAY, JudgeRequest, judge_request
+from rover_planner.viewer.state.judging import (
+    BETTER,
+    PATH,
+    POLICY,
+    WAY,
+    JudgeRequest,
+    judge_request,
+)
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
 from support.ros_fixtures import wait_until
@@ -88,9 +95,20 @@ def value_at(way, places, pose) -> bool:
 
 
 def test_the_search_is_reported_after_paths_and_policies(closed, found):
-    before = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY]
+    before, way = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY], [6, *[POLICY] * 3, 6]
     assert steps_of(closed) == [*before, 5]
-    assert steps_of(found) == [*before, 6, *[POLICY] * 3, 6]
+    steps = steps_of(found)
+    assert steps in ([*before, *way, BETTER], [*before, *way, BETTER, *way])
+
+
+def test_the_first_way_is_shown_at_once_and_replaced_only_by_a_better_one(found):
+    judged = list(judge_request(JudgeRequest(found.wanted), lambda *_: None))
+    ways = [one.way for one in judged if one.way is not None]
+    costs = [one.cost for one in ways]
+    assert all(one.outcome == FOUND and one.path.verdict.traversable for one in ways)
+    assert costs == sorted(costs, reverse=True)
+    assert ways[0].edges_judged < ways[-1].edges_judged
+    assert len(judged[-1].answer.candidates) == 6
 
 
 def test_nothing_is_searched_where_a_candidate_passes_or_the_goal_is_off_the_map():

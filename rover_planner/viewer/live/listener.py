@@ -15,6 +15,7 @@ from nav_msgs.srv import GetPlan
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
@@ -34,8 +35,11 @@ from rover_planner.ros.qos import (
     topic_qos,
 )
 from rover_planner.viewer.live.live_state import LiveValues
+from rover_planner.viewer.live.topic_ages import TopicAge, TopicAges
 
 SERVER, CONTROLLER = "/traverse_server", "/traction_controller"
+ODOMETRY = "odometry"
+NO_ODOMETRY = TopicAge(ODOMETRY, None, True)
 PREDICTED_FIELDS = {
     "wheel_loads": "wheel_loads",
     "friction_utilisation": "friction_utilisation",
@@ -69,6 +73,13 @@ class LiveData:
     """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
     verdict: LiveVerdict | None
     """The verdict of the server."""
+    ages: tuple[TopicAge, ...] = ()
+    """The ages of all topics."""
+
+    @property
+    def odometry(self) -> TopicAge:
+        """The age of the odometry, without which nothing here is live."""
+        return next((one for one in self.ages if one.topic == ODOMETRY), NO_ODOMETRY)
 
 
 class LiveListener(Node):
@@ -85,6 +96,7 @@ class LiveListener(Node):
         self._plan: np.ndarray | None = None
         self._verdict: LiveVerdict | None = None
         self._estimated: set[str] = set()
+        self._ages = TopicAges()
         self._first_time: float | None = None
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
@@ -95,35 +107,60 @@ class LiveListener(Node):
 
     def _subscribe_to_rover(self) -> None:
         sensors = sensor_qos()
-        self.create_subscription(JointState, "joint_states", self._on_joint_states, sensors)
-        self.create_subscription(Odometry, "odometry", self._on_odometry, sensors)
+        self._listen(JointState, "joint_states", self._on_joint_states, sensors, is_stream=True)
+        self._listen(Odometry, ODOMETRY, self._on_odometry, sensors, is_stream=True)
         for qos in map_subscriptions_qos("either"):
-            self.create_subscription(PointCloud2, "elevation_cloud", self._on_cloud, qos)
+            self._listen(PointCloud2, "elevation_cloud", self._on_cloud, qos)
+
+    def _listen(
+        self,
+        kind: Any,
+        topic: str,
+        take: Callable[[Any], None],
+        qos: QoSProfile,
+        *,
+        is_stream: bool = False,
+    ) -> None:
+        """Subscribe to a topic and note the age of its messages."""
+        self._ages.expect(topic, is_stream=is_stream)
+
+        def hear(message: Any) -> None:
+            self._ages.hear(topic)
+            take(message)
+
+        self.create_subscription(kind, topic, hear, qos)
 
     def _subscribe_to_server(self) -> None:
         qos = result_qos()
-        self.create_subscription(Path, f"{SERVER}/plan", self._on_plan, qos)
-        self.create_subscription(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, qos)
+        self._listen(Path, f"{SERVER}/plan", self._on_plan, qos)
+        self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, qos)
         for topic, field in PREDICTED_FIELDS.items():
-            self.create_subscription(
-                Float64MultiArray, f"{SERVER}/{topic}", self._on_prediction_of(field), qos
-            )
+            take = self._on_prediction_of(field)
+            self._listen(Float64MultiArray, f"{SERVER}/{topic}", take, qos)
 
     def _subscribe_to_controller(self) -> None:
         qos = topic_qos()
-        for topic, field in ESTIMATED_FIELDS.items():
-            self.create_subscription(
-                Float64MultiArray, f"{CONTROLLER}/{topic}", self._on_estimate_of(field), qos
-            )
-        self.create_subscription(
-            Float64MultiArray, f"{CONTROLLER}/contact_angles", self._on_contact_angles, qos
-        )
+        takes = {name: self._on_estimate_of(field) for name, field in ESTIMATED_FIELDS.items()}
+        takes["contact_angles"] = self._on_contact_angles
+        for name, take in takes.items():
+            self._listen(Float64MultiArray, f"{CONTROLLER}/{name}", take, qos, is_stream=True)
 
     def latest(self) -> LiveData:
         """Return the latest data."""
+        ages = tuple(self._ages.list_all())
         with self._lock:
+            self._forget_stale_estimates()
             self._fill_from_prediction()
-            return LiveData(self._values.copy(), self._terrain, self._plan, self._verdict)
+            values = self._values.copy()
+            return LiveData(values, self._terrain, self._plan, self._verdict, ages)
+
+    def _forget_stale_estimates(self) -> None:
+        """Drop forces that the controller no longer publishes, so that none looks like now."""
+        for topic, field in ESTIMATED_FIELDS.items():
+            if field in self._estimated and self._ages.is_stale(f"{CONTROLLER}/{topic}"):
+                self._estimated.discard(field)
+                setattr(self._values, field, np.full(6, np.nan))
+                self._values.forces_from = ""
 
     def request_plan(self, goal: np.ndarray) -> str:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].

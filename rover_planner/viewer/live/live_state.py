@@ -96,6 +96,7 @@ class StateBuilder:
             wheel_loads=values.wheel_loads,
             tangential=torques / radius,
             lateral=np.zeros(6),
+            friction=np.full(6, self._rover.friction),
             friction_utilisation=values.friction_utilisation,
             torque_saturation=np.abs(torques) / self._rover.wheel.max_torque,
             slip_ratio=values.slip_ratio,

@@ -5,11 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rover_planner.viewer.panel.ground_tab import GroundTab
-from rover_planner.viewer.scene.ground_mesh import GroundMesh, build_ground_mesh
+from rover_physics.numerics.arrays import Floats
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_planner.viewer.panel.survey_legend import draw_survey_legend
+from rover_planner.viewer.panel.tabs.ground_tab import GroundTab
+from rover_planner.viewer.scene.ground_mesh import GroundMesh, build_ground_mesh, export_ground
 from rover_planner.viewer.scene.scene import Scene
+from rover_planner.viewer.scene.survey_mesh import SurveyMesh, build_survey_mesh
 from rover_planner.viewer.state.background_work import BackgroundWork, Report
 from rover_planner.viewer.state.scenario import Scenario
+from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,25 +25,49 @@ class PaintRequest:
     """Rover, ground and options."""
     layer: str
     """Name of the layer."""
-    heading: float
-    """Yaw of the rover, where the layer is predicted [rad]."""
+    heading: float | Floats
+    """Yaw of the rover, where the layer is predicted [rad]; or a path (n, 3) whose yaw at the
+    nearest waypoint it has."""
+    survey: ShownSurvey | None
+    """The survey whose layer it is; None if it is no survey's."""
+    origin: Floats
+    """(3,) origin of the scene [m], map frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class PaintedGround:
+    """The ground, ready to be sent."""
+
+    drawn: GroundMesh | SurveyMesh
+    """What is drawn, and what its colours mean."""
+    glb: bytes
+    """The same as a file for the scene."""
 
 
 class GroundPainter:
     """Draws the ground in the colours of the layer that the tab names."""
 
-    def __init__(self, scene: Scene, tab: GroundTab, wake: Callable[[], object]):
+    def __init__(
+        self,
+        scene: Scene,
+        tab: GroundTab,
+        wake: Callable[[], object],
+        survey: ShownSurvey | None = None,
+    ):
         """Start the thread; it calls `wake` when there is something for `show_painted`."""
-        self._scene, self._tab = scene, tab
+        self._scene, self._tab, self._survey = scene, tab, survey
         self._asked: PaintRequest | None = None
-        self.work: BackgroundWork[PaintRequest, GroundMesh] = BackgroundWork(
+        self.work: BackgroundWork[PaintRequest, PaintedGround] = BackgroundWork(
             _paint, wake, "ground"
         )
 
-    def paint(self, scenario: Scenario) -> None:
-        """Begin to colour the ground for a scenario."""
-        heading = float(np.radians(self._tab.heading))
-        self._asked = PaintRequest(scenario, self._tab.layer, heading)
+    def paint(self, scenario: Scenario, path: Floats) -> None:
+        """Begin to colour the ground for a scenario and its shown path (n, 3)."""
+        fixed = float(np.radians(self._tab.heading))
+        heading = path if self._tab.is_along_path else fixed
+        survey = self._survey if self._tab.is_surveyed else None
+        origin = self._scene.frame.origin
+        self._asked = PaintRequest(scenario, self._tab.layer, heading, survey, origin)
         self.work.ask(self._asked)
 
     def show_painted(self) -> None:
@@ -53,12 +82,33 @@ class GroundPainter:
             if one.error is not None:
                 raise one.error
             if one.result is not None:
-                self._scene.draw_ground(one.result.mesh)
-                self._tab.show_scale(one.result.scale)
+                self._scene.draw_ground(one.result.glb)
+                self._explain(one.request, one.result.drawn)
+
+    def _explain(self, request: PaintRequest, drawn: GroundMesh | SurveyMesh) -> None:
+        """Show what the colours mean."""
+        if isinstance(drawn, GroundMesh):
+            self._tab.show_scale(drawn.scale)
+        elif request.survey is not None:
+            asked, name = request.scenario, request.layer
+            differences = request.survey.find_differences(asked.rover, _options_of(asked))
+            told = request.survey.describe(name)
+            self._tab.show_legend(draw_survey_legend(name, told, drawn.meaning, differences))
 
 
-def _paint(request: PaintRequest, report: Report) -> Iterator[GroundMesh]:
+def _options_of(asked: Scenario) -> SweepOptions:
+    return asked.options.sweep_options(asked.arm_angles)
+
+
+def _paint(request: PaintRequest, report: Report) -> Iterator[PaintedGround]:
     report("colouring the ground", 1, 1)
+    drawn = _build(request)
+    yield PaintedGround(drawn, export_ground(drawn.mesh, request.origin))
+
+
+def _build(request: PaintRequest) -> GroundMesh | SurveyMesh:
     asked = request.scenario
-    options = asked.options.sweep_options(asked.arm_angles)
-    yield build_ground_mesh(asked.rover, asked.terrain, request.layer, request.heading, options)
+    if request.survey is not None:
+        return build_survey_mesh(asked.terrain, request.survey, request.layer)
+    options = _options_of(asked)
+    return build_ground_mesh(asked.rover, asked.terrain, request.layer, request.heading, options)

@@ -6,14 +6,21 @@ from typing import Any
 import numpy as np
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.live.listener import LiveData, LiveListener
+from rover_planner.viewer.live.listener import NO_ODOMETRY, LiveData, LiveListener
 from rover_planner.viewer.live.live_state import StateBuilder
+from rover_planner.viewer.live.topic_ages import TopicAge
 from rover_planner.viewer.pages.page_base import PageBase
+from rover_planner.viewer.panel.board import BoardNotes
 from rover_planner.viewer.panel.dashboard import describe_verdict
-from rover_planner.viewer.panel.drive_tab import DriveTab
-from rover_planner.viewer.panel.ground_tab import GroundActions, GroundTab
+from rover_planner.viewer.panel.header import Chip, verdict_chip
 from rover_planner.viewer.panel.history import History
-from rover_planner.viewer.scene.ground_mesh import build_ground_mesh
+from rover_planner.viewer.panel.plots import Curves
+from rover_planner.viewer.panel.tabs.drive_tab import DriveTab
+from rover_planner.viewer.panel.tabs.ground_tab import GroundActions, GroundTab
+from rover_planner.viewer.panel.topics import draw_topics
+from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, export_ground
+from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
+from rover_planner.viewer.state.context import Context
 from rover_planner.viewer.state.session import ViewSession
 
 DASHBOARD_PERIOD = 0.2
@@ -60,6 +67,9 @@ class LivePage(PageBase):
         self._last_terrain: Terrain | None = None
         self._updated_at = self._ground_at = 0.0
         self._camera_aimed = False
+        self._given_ground = session.ground_name if has_ground else "map not known yet"
+        """What the page calls the ground until a map comes."""
+        self._freshness = _describe_freshness(NO_ODOMETRY)
         super().__init__(session, host, port)
         self._builder = StateBuilder(session.rover)
         self.scene.draw_rover(session.rover, {})
@@ -70,15 +80,22 @@ class LivePage(PageBase):
     def fill_panel(self, tabs: Any) -> None:
         """Add the tabs Drive and Ground."""
         gui, add = self.server.gui, self.requests.add
-        with tabs.add_tab("Drive"):
-            self.drive_tab = DriveTab(gui, None, self.requests)
+        self.drive_tab = DriveTab(gui, tabs.add_tab("Drive"), None, self.requests)
         actions = GroundActions(
             recolour=lambda: add(self._draw_ground, "colours"),
             show_forces=lambda visible: add(lambda: self.scene.show_forces(visible)),
-            follow=lambda follows: add(lambda: setattr(self.scene, "follows", follows)),
         )
         with tabs.add_tab("Ground"):
             self.ground_tab = GroundTab(gui, actions, has_paths=False)
+
+    def describe_context(self) -> tuple[Context, tuple[Chip, ...]]:
+        """Return what is followed, the server's verdict, and whether the data are fresh."""
+        rover, terrain = self.session.rover, self.session.terrain
+        ground = "elevation_cloud" if self._last_terrain is not None else self._given_ground
+        context = Context(rover.name, ground, ", ".join(terrain.soil_names), "", "live")
+        verdict = self._shown.verdict if self._shown is not None else None
+        passable = None if verdict is None else verdict.traversable
+        return context, (verdict_chip(passable, ""), self._freshness)
 
     def click(self, point: np.ndarray | None, shift: bool) -> None:
         """Ask the server for a plan to a point."""
@@ -99,12 +116,13 @@ class LivePage(PageBase):
         tab, session = self.ground_tab, self.session
         heading = float(np.radians(tab.heading))
         ground = build_ground_mesh(session.rover, session.terrain, tab.layer, heading)
-        self.scene.draw_ground(ground.mesh)
+        self.scene.draw_ground(export_ground(ground.mesh, self.scene.frame.origin))
         tab.show_scale(ground.scale)
 
     def advance(self, seconds: float) -> None:
         """Show the latest data."""
         data = self._listener.latest()
+        self._freshness = _describe_freshness(data.odometry)
         now = time.monotonic()
         self._show_ground(data, now)
         self._show_plan(data)
@@ -115,6 +133,7 @@ class LivePage(PageBase):
         if state is None:
             if update:
                 self.drive_tab.show(self.session.rover, None, "waiting for odometry")
+                self.drive_tab.show_topics(draw_topics(data.ages))
             return
         self._turn_arm(data)
         if not self._camera_aimed:
@@ -123,9 +142,15 @@ class LivePage(PageBase):
         moved = self._history.add(state)
         if update:
             source = data.values.forces_from or "forces not known"
-            self.drive_tab.show(self.session.rover, state, f"live; {source}")
+            word = self._freshness.word
+            stale = data.odometry.is_stale
+            notes = BoardNotes(has_slip=bool(np.nan_to_num(state.slip_ratio).any()))
+            status = f"{word}; {source}"
+            self.drive_tab.show(self.session.rover, state, status, notes, stale=stale)
+            self.drive_tab.show_topics(draw_topics(data.ages))
         if moved and update:
-            self.plots.set_curves(self.session.rover, self._history.distance, self._history.values)
+            curves = Curves(self._history.distance, self._history.values)
+            self.plots.set_curves(self.session.rover, curves)
             self.plots.move_cursor(state.distance)
 
     def _show_ground(self, data: LiveData, now: float) -> None:
@@ -137,6 +162,8 @@ class LivePage(PageBase):
             return
         self._last_terrain = terrain
         self.session.move(terrain=terrain)
+        if self.scene.frame.move_to(terrain):
+            self._camera_aimed = False
         self._ground_at, self._has_ground, self._shown = now, True, None
         self._draw_ground()
 
@@ -174,3 +201,12 @@ class LivePage(PageBase):
         self.session.move(start=(float(position[0]), float(position[1]), 0.0), goal=ahead)
         for client in self.server.get_clients().values():
             self._aim_camera(client)
+
+
+def _describe_freshness(odometry: TopicAge) -> Chip:
+    """Return the chip that tells whether the page shows the rover as it is now."""
+    if odometry.age is None:
+        return Chip("waiting for odometry", UNKNOWN, "fresh")
+    if odometry.is_stale:
+        return Chip(f"not live: odometry is {odometry.age:.0f} s old", REFUSED, "fresh")
+    return Chip("live", PASSABLE, "fresh")

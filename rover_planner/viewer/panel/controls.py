@@ -1,6 +1,6 @@
 """The buttons and sliders of the page; they only pass on what a visitor does."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,15 +16,26 @@ class PlaybackActions:
     """What the controls of the playback do."""
 
     buttons: dict[str, Action]
-    """By the name of the button, of PLAY_BUTTONS and STEP_BUTTONS."""
+    """By the name of the button, of PLAY_BUTTONS, PAUSE_BUTTONS and STEP_BUTTONS."""
+    toggle: Action
+    """Plays if it is paused, else pauses."""
     seek: Callable[[float], None]
     """Goes to a time [s]."""
     set_speed: Callable[[float], None]
     """Chooses a speed."""
 
 
-PLAY_BUTTONS = ("Rewind", "Play", "Pause", "Fast forward")
+PLAY_BUTTONS = ("Rewind", "Play", "Fast forward")
+"""While it is paused."""
+PAUSE_BUTTONS = ("Rewind", "Pause", "Fast forward")
+"""While it plays."""
+FAILS = "fails"
+"""Word below the mark of a failure on the scrubber."""
+CHANGED = "\u25cf "
+"""What stands before the label of a number that differs from that of the loaded rover."""
 STEP_BUTTONS = ("Step back", "Step", "To the start")
+KEYS = {"Step back": "arrowleft", "Step": "arrowright", "To the start": "home"}
+"""Keys of buttons; the space bar plays and pauses."""
 
 
 def on_visitor_input(control: Any, action: Callable[[Any], None]) -> None:
@@ -44,18 +55,52 @@ def on_visitor_input(control: Any, action: Callable[[Any], None]) -> None:
 class PlaybackControls:
     """Play, pause, step, rewind, fast forward, speed and a scrubber."""
 
-    def __init__(self, gui: Any, actions: PlaybackActions, speed: float):
-        """Add the controls to the container that is open."""
-        for label, names in (("Playback", PLAY_BUTTONS), ("Waypoint", STEP_BUTTONS)):
-            group = gui.add_button_group(label, names)
-            group.on_click(lambda event: actions.buttons[event.target.value]())
+    def __init__(self, gui: Any, tab: Any, actions: PlaybackActions, speed: float):
+        """Add the controls to a tab."""
+        self._gui, self._tab, self._seek = gui, tab, actions.seek
+        self._failure_at: float | None = None
+        self._play = gui.add_button_group("Playback", PLAY_BUTTONS)
+        steps = gui.add_button_group("Waypoint", STEP_BUTTONS)
+
+        async def press(event: Any) -> None:
+            actions.buttons[event.target.value]()
+
+        for group in (self._play, steps):
+            group.on_click(press)
+        keys = {name: (key, actions.buttons[name]) for name, key in KEYS.items()}
+        for label, (key, action) in ({"Play or pause": ("space", actions.toggle)} | keys).items():
+            command = gui.add_command(label, hotkey=key)
+            command.on_trigger(lambda _event, action=action: action())
         self._scrubber = gui.add_slider("Time [s]", 0.0, 1.0, 0.1, 0.0)
-        on_visitor_input(self._scrubber, actions.seek)
+        on_visitor_input(self._scrubber, self._seek)
         speeds = [f"{s} x" for s in SPEEDS]
         self._speed = gui.add_dropdown("Speed", speeds, initial_value=f"{speed:g} x")
         self._speed.on_update(
             lambda event: actions.set_speed(float(event.target.value.removesuffix(" x")))
         )
+
+    def show_playing(self, playing: bool) -> None:
+        """Name the button in the middle by what it does next."""
+        names = PAUSE_BUTTONS if playing else PLAY_BUTTONS
+        if self._play.options != names:
+            self._play.options = names
+
+    def mark_failure(self, time: float | None, duration: float) -> None:
+        """Mark the time of a failure [s] on the scrubber of a drive of a duration; None: no mark.
+
+        Marks cannot be changed, so that another slider takes its place.
+        """
+        if time == self._failure_at:
+            return
+        self._failure_at = time
+        end, old = _end_of(duration), self._scrubber
+        marks = None if time is None else ((min(time, end), FAILS),)
+        with self._tab:
+            self._scrubber = self._gui.add_slider(
+                old.label, 0.0, end, 0.1, min(old.value, end), marks=marks, order=old.order
+            )
+        on_visitor_input(self._scrubber, self._seek)
+        old.remove()
 
     def move_scrubber(self, time: float, duration: float, *, resend: bool = False) -> None:
         """Move the scrubber to a time of a drive [s].
@@ -69,13 +114,18 @@ class PlaybackControls:
             # Another time may have been on its way to the browser when the visitor chose this one,
             # and a value is sent only where it changes.
             self._scrubber.value = self._scrubber.min
-        end = max(round(duration, 1), 0.1)
+        end = _end_of(duration)
         if end < self._scrubber.max:
             self._scrubber.value = min(round(time, 1), end)
             self._scrubber.max = end
         else:
             self._scrubber.max = end
             self._scrubber.value = min(round(time, 1), end)
+
+
+def _end_of(duration: float) -> float:
+    """Return the last time on the scrubber of a drive of a duration [s]."""
+    return max(round(duration, 1), 0.1)
 
 
 class RoverSliders:
@@ -104,3 +154,10 @@ class RoverSliders:
             now = get_value(data, value.keys[0])
             if abs(slider.value - now) > 1e-9:
                 slider.value = now
+
+    def mark(self, changed: Collection[str]) -> None:
+        """Mark the sliders of changed numbers by their labels."""
+        for value, slider in self._sliders.items():
+            label = f"{CHANGED}{value.label}" if value.label in changed else value.label
+            if slider.label != label:
+                slider.label = label

@@ -5,14 +5,15 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from rover_planner.viewer.state.colours import REFUSED, to_css
+from rover_planner.viewer.state.colours import FAILED, to_css
 from rover_planner.viewer.state.session import REFUSALS
 
 
 class ErrorNotice:
     """Runs parts of the page's work; an error in one of them is shown and stops no other.
 
-    A message stays until the same part succeeds. Showing it sets a text and draws nothing else.
+    A message stays until the same part succeeds. It is a red banner over the scene. Showing it
+    sets a text and draws nothing else.
     """
 
     def __init__(self, gui: Any):
@@ -54,7 +55,8 @@ class ErrorNotice:
             for what, why in self.messages.items()
         )
         self._box.content = (
-            f'<div id="errors" style="border-left:5px solid {to_css(REFUSED)};padding-left:.5em;'
-            f'margin:4px 8px;font-size:13px">{lines}</div>'
+            '<div id="errors" role="alert" class="over-scene" style="top:80px;z-index:20;'
+            f"display:block;background:{to_css(FAILED)};color:#fff;font-size:16px;"
+            f'padding:.6em 1em">{lines}</div>'
         )
         self._box.visible = bool(self.messages)

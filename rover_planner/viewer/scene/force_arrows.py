@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.rover.model import Rover
+from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import LOAD, TRACTION
 from rover_planner.viewer.state.trajectory import RoverState
 from rover_planner.viewer.state.turning import find_axles
@@ -16,8 +17,18 @@ WEIGHT_LENGTH = 4.0
 class ForceArrows:
     """An arrow for each normal force, and one for each force along the ground."""
 
-    def __init__(self, scene: Any, rover: Rover):
-        """Add arrows of no length to the scene."""
+    def __init__(
+        self,
+        scene: Any,
+        rover: Rover,
+        frame: LocalFrame | None = None,
+        name: str = "/forces",
+    ):
+        """Add arrows of no length to the scene, below a node `name`.
+
+        Without a frame it is drawn in the map frame.
+        """
+        self._frame = frame or LocalFrame()
         self._rover = rover
         self._scale = WEIGHT_LENGTH * rover.wheel.radius / (rover.weight / 6.0)
         radius = rover.wheel.radius
@@ -27,8 +38,8 @@ class ForceArrows:
             "head_radius": 0.16 * radius,
             "head_length": 0.35 * radius,
         }
-        self._normal = scene.add_arrows("/forces/normal", no_arrows, LOAD, **sizes)
-        self._along = scene.add_arrows("/forces/along", no_arrows, TRACTION, **sizes)
+        self._normal = scene.add_arrows(f"{name}/normal", no_arrows, LOAD, **sizes)
+        self._along = scene.add_arrows(f"{name}/along", no_arrows, TRACTION, **sizes)
 
     def show(self, state: RoverState) -> None:
         """Draw the forces of a state, in proportion; one that is not known has no length."""
@@ -37,7 +48,7 @@ class ForceArrows:
         normal = outwards - (outwards * axis).sum(axis=1, keepdims=True) * axis
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         along = np.cross(axis, normal)
-        points = state.contact_points
+        points = self._frame.to_scene(state.contact_points)
         N, T, S = (
             self._scale * np.nan_to_num(values)[:, None]
             for values in (state.wheel_loads, state.tangential, state.lateral)

@@ -14,7 +14,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.state.colours import ColourScale, map_colours
+from rover_planner.viewer.state.colours import BEYOND, GOOD, ColourScale, map_colours
 from rover_planner.viewer.state.layers import (
     LAYERS,
     SLOPE,
@@ -33,6 +33,10 @@ LIGHT = (-0.6, 0.5, 1.0)
 """Direction to the light of the hillshade."""
 RELIEF = 1.3
 """Contrast of the hillshade; 1 is that of a matt surface."""
+HATCH_PERIOD, MIN_PERIOD = 0.16, 5
+"""Period of the stripes where a limit is broken [m], and the least one [pixels]."""
+HATCH_SHADE = 0.5
+"""Brightness of the stripes, relative to the ground."""
 LINE_SHADE = 0.82
 """Brightness of the grid lines, one every metre, relative to the ground."""
 
@@ -51,7 +55,7 @@ def build_ground_mesh(
     rover: Rover,
     terrain: Terrain,
     layer_name: str,
-    heading: float = 0.0,
+    heading: float | Floats = 0.0,
     options: SweepOptions = DEFAULT_OPTIONS,
 ) -> GroundMesh:
     """Return the ground in the colours of a layer, without unknown cells.
@@ -60,7 +64,8 @@ def build_ground_mesh(
         rover: The rover, for layers that are predicted.
         terrain: The ground.
         layer_name: One of LAYERS.
-        heading: Yaw of the rover, where layers are predicted [rad].
+        heading: Yaw of the rover, where layers are predicted [rad]; or a path (n, 3) whose yaw at
+            the nearest waypoint it has.
         options: Options of the model for those.
 
     Raises:
@@ -72,14 +77,27 @@ def build_ground_mesh(
         coarse_x, coarse_y, _ = subsample(terrain, MAX_PREDICTED)
         at = (coarse_x, coarse_y)
         values = predict_layer(layer, rover, terrain, heading, at, options)
+        beyond = _resample_nearest(layer.find_beyond(rover, values), at, (x, y))
         low, high = colour_span(layer, rover, values)
+        if layer.has_classes:
+            values = np.where(values == 1.0, values, np.nan)
         colours = _resample_nearest(map_colours(values, low, high), at, (x, y))
+        if layer.has_classes:
+            known = _resample_nearest(np.isfinite(values), at, (x, y))
+            colours[known] = GOOD
+        colours[beyond] = BEYOND
     else:
         values = compute_slope(x, y, heights) if layer_name == SLOPE else heights
+        beyond = np.zeros(heights.shape, bool)
         low, high = colour_span(layer, rover, values)
         colours = map_colours(values, low, high)
-    texture = _texture(_hillshade(colours, x, y, heights), x, y)
-    return GroundMesh(_mesh(x, y, heights, texture), ColourScale(low, high, layer.unit))
+    texture = _texture(shade_hills(colours, x, y, heights), x, y, beyond)
+    limit = None if layer.limit is None else layer.limit(rover)
+    classes = (("keeps all limits", GOOD),) if layer.has_classes else ()
+    return GroundMesh(
+        build_textured_mesh(x, y, heights, texture),
+        ColourScale(low, high, layer.unit, limit, classes),
+    )
 
 
 def subsample(terrain: Terrain, max_cells: int = MAX_CELLS) -> tuple[Floats, Floats, Floats]:
@@ -93,17 +111,17 @@ def subsample(terrain: Terrain, max_cells: int = MAX_CELLS) -> tuple[Floats, Flo
 
 
 def _resample_nearest(
-    colours: NDArray[np.uint8], given: tuple[Floats, Floats], wanted: tuple[Floats, Floats]
-) -> NDArray[np.uint8]:
-    """Return colours (ny, nx, 3) at wanted x and y, each that of the nearest given point."""
+    values: NDArray[Any], given: tuple[Floats, Floats], wanted: tuple[Floats, Floats]
+) -> NDArray[Any]:
+    """Return values (ny, nx, ...) at wanted x and y, each that of the nearest given point."""
     columns, rows = (
         np.clip(np.rint((at - was[0]) / (was[1] - was[0])).astype(int), 0, len(was) - 1)
         for at, was in zip(wanted, given, strict=True)
     )
-    return colours[rows][:, columns]
+    return values[rows][:, columns]
 
 
-def _hillshade(
+def shade_hills(
     colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats
 ) -> NDArray[np.uint8]:
     """Return colours (ny, nx, 3) as if lit from LIGHT.
@@ -121,12 +139,25 @@ def _hillshade(
     return np.clip(colours * factor[..., None], 0, 255).astype(np.uint8)
 
 
-def _texture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
-    """Return a finer picture of the colours with thin lines every metre."""
-    factor = max(1, min(8, MAX_PIXELS // max(colours.shape[:2])))
+def _texture(
+    colours: NDArray[np.uint8], x: Floats, y: Floats, beyond: NDArray[np.bool_]
+) -> NDArray[np.uint8]:
+    """Return a finer picture of the colours, hatched where asked, with thin lines every metre."""
+    factor = count_pixels(colours)
     fine = ndimage.zoom(colours, (factor, factor, 1), order=1, mode="nearest", grid_mode=True)
+    _hatch(fine, np.kron(beyond, np.ones((factor, factor), bool)), (x[1] - x[0]) / factor)
+    return draw_grid_lines(fine, x, y)
+
+
+def count_pixels(grid: NDArray) -> int:
+    """Return the number of pixels along a side of a cell of a grid (ny, nx, ...)."""
+    return max(1, min(8, MAX_PIXELS // max(grid.shape[:2])))
+
+
+def draw_grid_lines(fine: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
+    """Draw thin lines every metre into a picture that has some pixels for each x and y [m]."""
     for axis, places in enumerate((y, x)):
-        step = places[1] - places[0]
+        step, factor = places[1] - places[0], fine.shape[axis] // len(places)
         pixels = places[0] + step * ((np.arange(fine.shape[axis]) + 0.5) / factor - 0.5)
         lines = np.flatnonzero(np.diff(np.floor(pixels)))
         index = (lines, slice(None)) if axis == 0 else (slice(None), lines)
@@ -134,7 +165,18 @@ def _texture(colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uin
     return np.asarray(fine, np.uint8)
 
 
-def _mesh(x: Floats, y: Floats, heights: Floats, texture: NDArray[np.uint8]) -> trimesh.Trimesh:
+def _hatch(picture: NDArray[np.uint8], where: NDArray[np.bool_], pixel: float) -> None:
+    """Darken diagonal stripes of a picture with a pixel size [m] where asked."""
+    period = max(MIN_PERIOD, round(HATCH_PERIOD / pixel))
+    row, column = np.ogrid[: where.shape[0], : where.shape[1]]
+    stripes = where & ((row + column) % period < 0.4 * period)
+    picture[stripes] = (HATCH_SHADE * picture[stripes]).astype(np.uint8)
+
+
+def build_textured_mesh(
+    x: Floats, y: Floats, heights: Floats, texture: NDArray[np.uint8]
+) -> trimesh.Trimesh:
+    """Return the surface of heights (ny, nx) [m] at x and y [m] with a picture on it."""
     from PIL import Image
 
     gx, gy = np.meshgrid(x, y)
@@ -161,8 +203,8 @@ def join_cells(known: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.concatenate([lower, np.column_stack([a[whole], c[whole], d[whole]])])
 
 
-def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
-    """Return a mesh as a binary glTF file whose texture is shown without lights.
+def as_unlit_glb(mesh: trimesh.Trimesh | trimesh.Scene) -> bytes:
+    """Return a mesh, or several, as a binary glTF file whose texture is shown without lights.
 
     Without a graphics card, a matt surface that fills the screen takes most of the time of a
     picture. The glTF extension KHR_materials_unlit avoids that; trimesh does not write it.
@@ -177,6 +219,17 @@ def as_unlit_glb(mesh: trimesh.Trimesh) -> bytes:
     text += b" " * (-len(text) % 4)
     chunk = struct.pack("<I4s", len(text), b"JSON") + text + glb[20 + length :]
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
+
+
+def export_ground(mesh: trimesh.Trimesh, origin: Floats) -> bytes:
+    """Return a ground in the map frame as a binary glTF file about an origin (3,) [m].
+
+    It takes a quarter of a second: most of it to compress the texture.
+    """
+    if origin.any():
+        mesh = mesh.copy()
+        mesh.apply_translation(-origin)
+    return as_unlit_glb(mesh)
 
 
 def intersect_ground(terrain: Terrain, origin: Floats, direction: Floats) -> Floats | None:

@@ -2,6 +2,8 @@
 
 import itertools
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -11,7 +13,8 @@ from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
-from rover_physics.rover.model import Manipulator, Rover
+from rover_physics.rover.model import Belly, Manipulator, Rover
+from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import BODY, DARK, METAL, colour_utilisation
 from rover_planner.viewer.state.trajectory import RoverState
 
@@ -22,59 +25,86 @@ GROUSERS = 16
 class RoverVisual:
     """The rover's nodes of the scene: body, rockers, bogies, wheels and arm, with their joints."""
 
-    def __init__(self, scene: Any, rover: Rover, name: str = "/rover", arm_angles: Any = None):
-        """Add the nodes below a node `name`; they replace nodes of the same name."""
-        self._scene, self._name = scene, name
+    def __init__(
+        self,
+        scene: Any,
+        rover: Rover,
+        name: str = "/rover",
+        arm_angles: Any = None,
+        frame: LocalFrame | None = None,
+        opacity: float | None = None,
+    ):
+        """Add the nodes below a node `name`.
+
+        Without a frame it is drawn in the map frame, without an opacity it is opaque.
+        """
+        self._scene, self._name, self._opacity = scene, name, opacity
+        self._frame = frame or LocalFrame()
         self._root = scene.add_frame(name, show_axes=False)
         self._joints: dict[str, Any] = {}
-        self._tyres: list[Any] = []
-        self._add("body", make_body(rover), BODY)
+        self._meshes: dict[str, Any] = {}
+        self._tyres: dict[str, Any] = {}
+        self.shape(rover, arm_angles or {})
+
+    def shape(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
+        """Give the nodes the shapes of a rover with the same parts, and turn its arm."""
+        self._put("body", make_body(rover), BODY)
         wheel = make_wheel(rover)
         for side in SIDES:
-            self._add_side(rover, side, wheel)
-        self.turn_arm(rover, arm_angles or {})
+            self._put_side(rover, side, wheel)
+        self.turn_arm(rover, arm_angles)
 
-    def _add(self, name: str, mesh: trimesh.Trimesh, colour: tuple[int, int, int]) -> Any:
-        return self._scene.add_mesh_simple(
-            f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, flat_shading=True
-        )
+    def _put(self, name: str, mesh: trimesh.Trimesh, colour: tuple[int, int, int]) -> Any:
+        """Add a mesh, or give the one of this name another shape."""
+        node = self._meshes.get(name)
+        if node is not None:
+            node.vertices, node.faces = mesh.vertices, mesh.faces
+            return node
+        self._meshes[name] = self._scene.add_mesh_simple(
+            f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, flat_shading=True,
+            opacity=self._opacity, cast_shadow=self._opacity is None,
+        )  # fmt: skip
+        return self._meshes[name]
 
-    def _add_joint(self, key: str, path: str, position: Floats) -> None:
+    def _put_joint(self, key: str, path: str, position: Floats) -> None:
+        if key in self._joints:
+            self._joints[key].position = position
+            return
         self._joints[key] = self._scene.add_frame(
             f"{self._name}/{path}", show_axes=False, position=position
         )
 
-    def _add_side(
+    def _put_side(
         self, rover: Rover, side: str, wheel: tuple[trimesh.Trimesh, trimesh.Trimesh]
     ) -> None:
-        """Add rocker, bogie and wheels of a side; `wheel` is as `make_wheel` returns it."""
+        """Put rocker, bogie and wheels of a side; `wheel` is as `make_wheel` returns it."""
         suspension = rover.suspension
         rocker = on_side(suspension.rocker_pivot, side)
         bogie = on_side(suspension.bogie_pivot, side)
         wheels = {name: on_side(suspension.wheels[name], side) for name in WHEEL_POSITIONS}
         rocker_path, bogie_path = f"rocker_{side}", f"rocker_{side}/bogie"
-        self._add_joint(rocker_path, rocker_path, rocker)
-        self._add_joint(f"bogie_{side}", bogie_path, bogie - rocker)
+        self._put_joint(rocker_path, rocker_path, rocker)
+        self._put_joint(f"bogie_{side}", bogie_path, bogie - rocker)
         radius = 0.16 * rover.wheel.radius
         ends = [bogie - rocker, wheels[suspension.rocker_wheel] - rocker]
-        self._add(f"{rocker_path}/beams", make_beams(ends, radius), METAL)
+        self._put(f"{rocker_path}/beams", make_beams(ends, radius), METAL)
         ends = [wheels[name] - bogie for name in suspension.bogie_wheels]
-        self._add(f"{bogie_path}/beams", make_beams(ends, radius), METAL)
+        self._put(f"{bogie_path}/beams", make_beams(ends, radius), METAL)
         for name, centre in wheels.items():
             on_bogie = name in suspension.bogie_wheels
             path = f"{bogie_path if on_bogie else rocker_path}/{name}"
-            self._add_joint(f"{name}_{side}", path, centre - (bogie if on_bogie else rocker))
-            self._tyres.append(self._add(f"{path}/tyre", wheel[0], METAL))
-            self._add(f"{path}/grousers", wheel[1], DARK)
+            self._put_joint(f"{name}_{side}", path, centre - (bogie if on_bogie else rocker))
+            self._tyres[f"{name}_{side}"] = self._put(f"{path}/tyre", wheel[0], METAL)
+            self._put(f"{path}/grousers", wheel[1], DARK)
 
     def turn_arm(self, rover: Rover, angles: Mapping[str, float]) -> None:
         """Show the arm at angles [rad] by joint name; joints without an angle are stowed."""
         if rover.manipulator is not None:
-            self._add("arm", make_arm(rover.manipulator, angles, rover.wheel.radius), DARK)
+            self._put("arm", make_arm(rover.manipulator, angles, rover.wheel.radius), DARK)
 
     def show(self, state: RoverState) -> None:
         """Bring the joints and the colours of the wheels to a state."""
-        self._root.position = state.position
+        self._root.position = self._frame.to_scene(state.position)
         self._root.wxyz = wxyz_from_rpy(*state.attitude)
         for k, side in enumerate(SIDES):
             self._joints[f"rocker_{side}"].wxyz = wxyz_about_y(float(state.rocker_angle[k]))
@@ -82,7 +112,11 @@ class RoverVisual:
         for k, wheel in enumerate(WHEELS):
             turn = 0.0, float(state.spin[k]), float(state.steering_angle[k])
             self._joints[wheel].wxyz = wxyz_from_rpy(*turn)
-            self._tyres[k].color = colour_utilisation(float(state.friction_utilisation[k]))
+            self._tyres[wheel].color = colour_utilisation(float(state.friction_utilisation[k]))
+
+    def remove(self) -> None:
+        """Remove all nodes."""
+        self._root.remove()
 
     @property
     def visible(self) -> bool:
@@ -92,6 +126,22 @@ class RoverVisual:
     @visible.setter
     def visible(self, value: bool) -> None:
         self._root.visible = value
+
+
+def look_alike(one: Rover, other: Rover) -> bool:
+    """Return whether two rovers are drawn the same, with their forces."""
+    wheel = replace(one.wheel, max_torque=other.wheel.max_torque)
+    friction, speed, limits = other.friction, other.nominal_speed, other.limits
+    return (
+        replace(one, wheel=wheel, friction=friction, nominal_speed=speed, limits=limits) == other
+    )
+
+
+def have_same_parts(one: Rover, other: Rover) -> bool:
+    """Return whether two rovers differ in shape only: the same links, and an arm or none."""
+    a, b = one.suspension, other.suspension
+    same = (a.rocker_wheel, a.bogie_wheels) == (b.rocker_wheel, b.bogie_wheels)
+    return same and (one.manipulator is None) == (other.manipulator is None)
 
 
 def on_side(point: tuple[float, float, float], side: str) -> Floats:
@@ -114,24 +164,40 @@ def make_bar(start: Floats, end: Floats, radius: float) -> trimesh.Trimesh:
 
 def make_beams(ends: list[Floats], radius: float) -> trimesh.Trimesh:
     """Return bars of a radius from the origin to ends (3,) [m]."""
-    return join_meshes([make_bar(np.zeros(3), end, radius) for end in ends])
+    return _make_beams(tuple(tuple(end.tolist()) for end in ends), radius)
+
+
+@lru_cache(maxsize=8)
+def _make_beams(ends: tuple[tuple[float, ...], ...], radius: float) -> trimesh.Trimesh:
+    """Make the beams; the ghost of a failure has the same, as in the functions below."""
+    return join_meshes([make_bar(np.zeros(3), np.array(end), radius) for end in ends])
 
 
 def make_body(rover: Rover) -> trimesh.Trimesh:
     """Return a box on the belly rectangle, 1.4 wheel radii high, and the axle of the rockers."""
-    belly = rover.belly
+    return _make_body(rover.belly, rover.suspension.rocker_pivot, rover.wheel.radius)
+
+
+@lru_cache(maxsize=4)
+def _make_body(
+    belly: Belly, pivot: tuple[float, float, float], wheel_radius: float
+) -> trimesh.Trimesh:
     low = np.array([belly.x[0], belly.y[0], belly.z])
-    high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * rover.wheel.radius])
+    high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * wheel_radius])
     box = trimesh.creation.box(high - low)
     box.apply_translation(0.5 * (low + high))
-    pivot = rover.suspension.rocker_pivot
-    axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * rover.wheel.radius)
+    axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * wheel_radius)
     return join_meshes([box, axle])
 
 
 def make_wheel(rover: Rover) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
     """Return tyre and grousers of a wheel about its centre, with its axis along y."""
-    radius, width = rover.wheel.radius, rover.wheel.width
+    return _make_wheel(rover.wheel.radius, rover.wheel.width)
+
+
+@lru_cache(maxsize=4)
+def _make_wheel(radius: float, width: float) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
+    """Make a wheel of a radius and a width [m]."""
     across = [[0.0, -0.5 * width, 0.0], [0.0, 0.5 * width, 0.0]]
     tyre = trimesh.creation.cylinder(radius=0.96 * radius, segment=across, sections=32)
     grousers = []
@@ -157,15 +223,3 @@ def make_arm(
     tip = trimesh.creation.icosphere(1, 0.25 * wheel_radius)
     tip.apply_translation(points[-1])
     return join_meshes([*links, tip])
-
-
-def make_ghost(rover: Rover) -> trimesh.Trimesh:
-    """Return body and wheels, in their places on flat ground, as one mesh."""
-    parts = [make_body(rover)]
-    tyre, _ = make_wheel(rover)
-    for centre in rover.suspension.wheels.values():
-        for side in SIDES:
-            placed = tyre.copy()
-            placed.apply_translation(on_side(centre, side))
-            parts.append(placed)
-    return join_meshes(parts)

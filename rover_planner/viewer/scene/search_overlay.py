@@ -11,6 +11,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.ways.way_search import WayAnswer
 from rover_planner.viewer.scene.ground_mesh import join_cells, subsample
+from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, SEARCHED, UNKNOWN, Colour
 
 CLOSED, ASKED = "/search/closed", "/search/asked"
@@ -24,9 +25,10 @@ OPACITY = 0.5
 class SearchOverlay:
     """What a search for a way has found out about the ground."""
 
-    def __init__(self, scene: Any):
-        """Draw nothing yet."""
+    def __init__(self, scene: Any, frame: LocalFrame | None = None):
+        """Draw nothing yet; without a frame the scene is drawn in the map frame."""
         self._scene = scene
+        self._frame = frame or LocalFrame()
         self._layers: dict[str, tuple[Any, Colour]] = {}
         """The layers by name, with their colours."""
         self._asked_shown = False
@@ -73,8 +75,8 @@ class SearchOverlay:
         if not len(faces):
             return
         layer = self._scene.add_mesh_simple(
-            name, vertices, faces, color=colour, opacity=OPACITY, flat_shading=False,
-            side="double", cast_shadow=False, receive_shadow=False,
+            name, self._frame.to_scene(vertices), faces, color=colour, opacity=OPACITY,
+            flat_shading=False, side="double", cast_shadow=False, receive_shadow=False,
             position=(0.0, 0.0, HEIGHTS[name] * rover.wheel.radius),
         )  # fmt: skip
         self._layers[name] = layer, colour

@@ -11,8 +11,8 @@ from rover_physics.numerics.interruption import interruptible
 from rover_planner.errors import PlanningError
 
 PATIENCE = 0.2
-"""Time for which work may go on although a newer request waits [s]: a slider that is dragged still
-gets results where they take less."""
+"""Time for which work may go on to its first result although a newer request waits [s]: a slider
+that is dragged still gets results where they take less."""
 END_TIME = 5.0
 """Longest wait for the thread when the work is closed [s]."""
 
@@ -66,28 +66,35 @@ class _Job(Generic[Request]):
     request: Request
     began: float
     is_stopped: bool = False
+    has_result: bool = False
 
 
 class BackgroundWork(Generic[Request, Result]):
     """Does one request at a time, the newest; those that a newer one replaces are dropped.
 
-    Work that takes longer than PATIENCE is stopped by a newer request. What is finished is handed
-    over by `take`, each result once and in the order of the requests. The methods may be called
-    from any thread.
+    A newer request stops work that has had PATIENCE, or has given its first result. What is
+    finished is handed over by `take`, each result once and in the order of the requests. The
+    methods may be called from any thread.
     """
 
     def __init__(
-        self, work: Work[Request, Result], wake: Callable[[], object], name: str = "background"
+        self,
+        work: Work[Request, Result],
+        wake: Callable[[], object],
+        name: str = "background",
+        is_hasty: Callable[[Request], bool] = lambda _request: False,
     ):
         """Start the thread.
 
         Args:
             work: Does a request. Between the slices of the model's sweeps and at each report it
                 may be stopped by an error, which it must let pass.
-            wake: Called in the thread when there is something to take.
+            wake: Called in the thread when there is something to take. It may wait until that
+                was taken.
             name: Name of the thread.
+            is_hasty: Returns whether a newer request stops a request at once (default: none).
         """
-        self._work, self._wake = work, wake
+        self._work, self._wake, self._is_hasty = work, wake, is_hasty
         self._changed = threading.Condition()
         # The lock of _changed guards all that follows.
         self._waiting: Request | None = None
@@ -163,9 +170,12 @@ class BackgroundWork(Generic[Request, Result]):
 
     def _do(self, job: _Job[Request]) -> None:
         def check() -> None:
-            late = time.monotonic() - job.began > PATIENCE
-            if job.is_stopped or (late and self._waiting is not None):
+            if job.is_stopped or (self._waiting is not None and not has_time()):
                 raise _StoppedError("a newer request or a visitor stopped the work")
+
+        def has_time() -> bool:
+            late = time.monotonic() - job.began > PATIENCE
+            return not (late or job.has_result or self._is_hasty(job.request))
 
         def report(what: str, step: int, steps: int) -> None:
             check()
@@ -189,6 +199,7 @@ class BackgroundWork(Generic[Request, Result]):
             if wanted:
                 self._done.append(done)
                 self._since = time.monotonic()
+                job.has_result = True
             if replaced:
                 job.is_stopped = True
         if wanted:

@@ -18,16 +18,22 @@ TRACTION = (230, 159, 0)
 """Orange: tangential forces, slip."""
 NOTICE = (204, 121, 167)
 """Reddish purple: a change that was refused."""
+FAILED = (176, 0, 32)
+"""Red, with white letters: a part of the page has failed."""
 SEARCHED = (0, 158, 115)
 """Bluish green: places that a search has asked the model about."""
 MIDDLE = (240, 228, 66)
 """Yellow: half-way from blue to vermillion."""
 METAL, DARK, BODY = (150, 155, 160), (50, 52, 56), (225, 220, 205)
+BEYOND = REFUSED
+"""Vermillion, hatched: ground where a limit is broken."""
+GOOD = (143, 196, 224)
+"""Pale blue: ground where the rover keeps its limits."""
 UNKNOWN = (110, 110, 110)
-WHEEL_COLOURS = ("#0072b2", "#e69f00", "#cc79a7", "#0072b2", "#e69f00", "#cc79a7")
-"""Curves of rear, middle and front wheels in the plots, in wheel order."""
-SIDE_DASHES = ((), (5.0, 3.0))
-"""Dashes of the curves of the right and the left side; none is a solid line."""
+CASING, RING = (16, 16, 16), (255, 255, 255)
+"""Dark and light halo around lines on the ground."""
+MIN_CONTRAST = 3.0
+"""Least contrast of a line with what is beside it (WCAG 2.1, graphical objects)."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,10 @@ class ColourScale:
     """Value of the last colour."""
     unit: str
     """Unit of both, empty for none."""
+    limit: float | None = None
+    """Limit of the rover; None if it has none. Ground beyond it is hatched in BEYOND."""
+    classes: tuple[tuple[str, Colour], ...] = ()
+    """Words and colours of classes, for a layer without a scale."""
 
 
 def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
@@ -77,6 +87,33 @@ def blend(first: Colour, second: Colour, share: float) -> Colour:
     return red, green, blue
 
 
+def find_contrast(one: Colour, other: Colour) -> float:
+    """Return the contrast of two colours, 1 to 21 (WCAG 2.1)."""
+    lights = sorted((_luminance(one), _luminance(other)))
+    return (lights[1] + 0.05) / (lights[0] + 0.05)
+
+
+def _luminance(colour: Colour) -> float:
+    """Return the relative luminance of an sRGB colour, 0 to 1."""
+    share = np.array(colour) / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+def choose_halo(colour: Colour) -> tuple[Colour, ...]:
+    """Return the halos of a line from the outside in: dark, and light too if the line is dark.
+
+    Whatever the ground is like, dark or light stands out from it, and each from the next.
+    """
+    return (CASING,) if find_contrast(colour, CASING) > 7.0 else (CASING, RING)
+
+
 def to_css(colour: Colour) -> str:
     """Return a colour as CSS writes it, such as #0072b2."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def from_css(text: str) -> Colour:
+    """Return a colour from text such as #0072b2."""
+    red, green, blue = bytes.fromhex(text.removeprefix("#"))
+    return red, green, blue

@@ -16,13 +16,14 @@ from rover_planner.planning.path_query import (
 )
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import find_way
+from rover_planner.planning.ways.way_search import WayAnswer, find_way
 from rover_planner.viewer.state.background_work import Report
 from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.scenario import Judgement, Scenario, ShownPath
 from rover_planner.viewer.state.trajectory import Trajectory
 
 PATH, POLICY, WAY = "judging path", "judging policy", "searching a way"
+BETTER = "way found, searching a better one"
 """What is reported to be worked on."""
 
 
@@ -45,8 +46,8 @@ def judge_request(
 ) -> Iterator[Judgement]:
     """Yield the judgement with the verdict, then the same with those of all policies.
 
-    If all candidates are refused, it follows with a way around obstacles, or with why there is
-    none.
+    If all candidates are refused, it follows with the first way around obstacles and with the best
+    of the search's budget, or with why there is none.
 
     Args:
         request: What to judge.
@@ -63,11 +64,10 @@ def judge_request(
     judged = _add_policies(judged, report)
     yield judged
     if request.searches and judged.needs_way:
-        refused = judged.shown
-        judged = _search_way(judged, report, memory)
-        yield judged
-        if judged.shown is not refused:
-            yield _add_policies(judged, report)
+        for found in _search_ways(judged, report, memory or EdgeMemory()):
+            yield found
+            if found.shown is not judged.shown:
+                yield _add_policies(found, report)
 
 
 def _judge_all(request: JudgeRequest, report: Report) -> Judgement:
@@ -140,16 +140,33 @@ def _add_policies(judgement: Judgement, report: Report) -> Judgement:
     return replace(judgement, shown=replace(judgement.shown, by_policy=tuple(found)))
 
 
-def _search_way(judgement: Judgement, report: Report, memory: EdgeMemory | None) -> Judgement:
-    """Return a judgement with a way around obstacles as one more candidate, or why there is none.
+def _search_ways(judgement: Judgement, report: Report, memory: EdgeMemory) -> Iterator[Judgement]:
+    """Yield a judgement with the first way around obstacles, and with a better one if there is.
+
+    Without a way, the judgement has the reason.
+    """
+    report(WAY, 1, 1)
+    asked = judgement.scenario
+    ends = asked.start, asked.goal
+    question = WayQuestion(asked.rover, asked.terrain, *ends, asked.options, asked.arm_angles)
+    first = find_way(question, replace(asked.search, ends_at_first=True), memory)
+    yield _add_way(judgement, first)
+    left = asked.search.budget - first.seconds
+    if first.path is None or left <= 0.0:
+        return
+    report(BETTER, 1, 1)
+    better = find_way(question, replace(asked.search, budget=left), memory)
+    if better.cost < first.cost:
+        seconds = first.seconds + better.seconds
+        yield _add_way(judgement, replace(better, seconds=seconds))
+
+
+def _add_way(judgement: Judgement, way: WayAnswer) -> Judgement:
+    """Return a judgement of refused candidates with a way as one more, or why there is none.
 
     The way is shown unless a visitor has chosen another path than the best.
     """
-    report(WAY, 1, 1)
     asked, answer, shown = judgement.scenario, judgement.answer, judgement.shown
-    ends = asked.start, asked.goal
-    question = WayQuestion(asked.rover, asked.terrain, *ends, asked.options, asked.arm_angles)
-    way = find_way(question, asked.search, memory)
     if way.path is None:
         return replace(judgement, way=way)
     candidates = (*answer.candidates, way.path)

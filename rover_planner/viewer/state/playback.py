@@ -1,8 +1,10 @@
 """The clock of the page: play, pause, step, rewind and fast forward at a chosen speed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from rover_physics.numerics.arrays import Floats
 
 SPEEDS = (1, 2, 5, 10, 20, 50, 100)
 """Speeds to choose from, in seconds of the drive per second of the visitor."""
@@ -23,10 +25,23 @@ class Playback:
     rate: float = 0.0
     """Factor on the speed: 0 paused, 1 playing, FAST and -FAST fast forward and rewind."""
 
+    _times: Floats = field(default_factory=lambda: np.zeros(1))
+    _distance: Floats = field(default_factory=lambda: np.zeros(1))
+    _kept: tuple[float, float] | None = None
+    """Where the rover is by `set_drive` until the time is moved: distance [m], and the time it
+    has turned there [s]; None if the time tells."""
+
+    def toggle(self) -> None:
+        """Play if it is paused, else pause."""
+        if self.rate == 0.0:
+            self.play()
+        else:
+            self.pause()
+
     def play(self) -> None:
         """Play from the shown time, or from the start if that is the end."""
         if self.time >= self.duration:
-            self.time = 0.0
+            self.seek(0.0)
         self.rate = 1.0
 
     def pause(self) -> None:
@@ -44,6 +59,12 @@ class Playback:
     def seek(self, time: float) -> None:
         """Go to a time [s], limited to the drive."""
         self.time = float(np.clip(time, 0.0, self.duration))
+        self._kept = None
+
+    def go_to(self, time: float) -> None:
+        """Pause, and go to a time [s], limited to the drive."""
+        self.pause()
+        self.seek(time)
 
     def step(self, times: np.ndarray, by: int = 1) -> None:
         """Pause, and go to the next of `times` (n,) [s], or to the previous one if `by` is -1."""
@@ -70,8 +91,33 @@ class Playback:
         word = {1.0: "playing", FAST: "fast forward", -FAST: "rewinding"}[self.rate]
         return f"{word}, {abs(self.rate) * self.speed:g} times as fast as the rover"
 
-    def set_duration(self, duration: float) -> None:
-        """Take the duration of another drive [s], at the same share of it."""
-        share = self.time / self.duration if self.duration > 0.0 else 0.0
-        self.duration = duration
-        self.seek(share * duration)
+    def set_drive(self, times: Floats, distance: Floats) -> None:
+        """Take another drive and go to the place where the rover is: the same distance driven.
+
+        A drive that ends before that place is shown at its end, and the place is kept for the
+        next one until the time is moved.
+
+        Args:
+            times: (n,) times of its waypoints [s], ascending, n >= 1.
+            distance: (n,) distances driven there [m], ascending.
+        """
+        if self._kept is not None:
+            driven, turning = self._kept
+        else:
+            driven = float(np.interp(self.time, self._times, self._distance))
+            turning = max(self.time - _first_time_at(self._times, self._distance, driven), 0.0)
+        self._times, self._distance = times, distance
+        self.duration = float(times[-1])
+        arrival = _first_time_at(times, distance, driven)
+        departure = float(times[np.searchsorted(distance, driven, side="right") - 1])
+        self.seek(min(arrival + turning, max(arrival, departure)))
+        self._kept = driven, turning
+
+
+def _first_time_at(times: Floats, distance: Floats, driven: float) -> float:
+    """Return the first time at which a distance was driven, at most the last time [s]."""
+    after = min(int(np.searchsorted(distance, driven, side="left")), len(times) - 1)
+    if after == 0:
+        return float(times[0])
+    pair = slice(after - 1, after + 1)
+    return float(np.interp(driven, distance[pair], times[pair]))

@@ -16,11 +16,13 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import judge
 from rover_planner.errors import PlanningError
+from rover_planner.planning.assumptions import Assumptions
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.studies.rover_values import with_value
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
+from rover_planner.viewer.state.context import name_ground
 from rover_planner.viewer.state.judging import JudgeRequest, judge_request
 from rover_planner.viewer.state.scenario import Judgement, Pose, Scenario, ShownPath
 from rover_planner.viewer.state.trajectory import Trajectory
@@ -63,6 +65,8 @@ class ViewSession:
             rover, rover, terrain, start, goal, options, {}, search=search or LatticeSettings()
         )
         """What visitors want judged."""
+        self.ground_name = name_ground(terrain)
+        """What the page calls the ground; by default its size."""
         self.refusal = ""
         """Why the last change was refused, empty if it was not."""
         self.is_stopped = False
@@ -171,13 +175,20 @@ class ViewSession:
         pose = (float(start[0]), float(start[1]), yaw)
         return self._want(start=pose, goal=(goal[0], goal[1], yaw), recorded=None)
 
+    def restore_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> bool:
+        """Take other numbers of the same rover, such as those before a change.
+
+        The shown path is judged again.
+        """
+        return self._judge_shown(rover=rover, arm_angles=dict(arm_angles))
+
     def change_options(self, **changes: object) -> bool:
         """Change fields of PathQueryOptions and plan again."""
         return self._want(options=dataclasses.replace(self.wanted.options, **changes))  # type: ignore[arg-type]
 
-    def take_rover(self, rover: Rover) -> bool:
-        """Take another rover and plan again."""
-        return self._want(loaded=rover, rover=rover, arm_angles={})
+    def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
+        """Take another rover, changed from a loaded one (default: not), and plan again."""
+        return self._want(loaded=loaded or rover, rover=rover, arm_angles={})
 
     def plan_again(self) -> bool:
         """Judge all candidates again, after a change of the rover."""
@@ -202,6 +213,10 @@ class ViewSession:
     def change_arm(self, joint: str, angle: float) -> bool:
         """Turn a joint of the arm to an angle [rad]; otherwise like `change_rover`."""
         return self._judge_shown(arm_angles={**self.wanted.arm_angles, joint: angle})
+
+    def take_scenario(self, scenario: Scenario) -> bool:
+        """Plan for a whole scenario on the same ground."""
+        return self._ask(scenario)
 
     def _want(self, **changes: Any) -> bool:
         """Plan with other values."""
@@ -262,7 +277,7 @@ class ViewSession:
         Args:
             wake: Called in that thread when there is something to take with `take_finished`.
         """
-        self._background = BackgroundWork(self._judge, wake, "judge")
+        self._background = BackgroundWork(self._judge, wake, "judge", _judges_all)
         if self.finished.needs_way:
             self._ask(self.wanted, self._index)
 
@@ -310,11 +325,27 @@ class ViewSession:
         self.finished = dataclasses.replace(self.finished, scenario=scenario)
         self.wanted = scenario
 
-    def replay(self, prediction: PathPrediction, reasons: Sequence[str]) -> None:
-        """Show a recorded prediction with the recorded reasons (n,) of its waypoints."""
+    def replay(
+        self,
+        prediction: PathPrediction,
+        reasons: Sequence[str],
+        assumptions: Assumptions | None = None,
+    ) -> None:
+        """Show a recorded prediction with the recorded reasons (n,) of its waypoints.
+
+        Changed values are judged under the assumptions of the record, where it tells them.
+        """
+        if assumptions is not None:
+            rover, options = self.wanted.rover, self.wanted.options
+            self.wanted = dataclasses.replace(
+                self.wanted,
+                rover=assumptions.change(rover),
+                options=assumptions.change_options(options),
+                arm_angles=assumptions.joint_angles or {},
+            )
         first = next((k for k, reason in enumerate(reasons) if reason), -1)
         verdict = dataclasses.replace(
-            judge(self.rover, prediction),
+            judge(self.wanted.rover, prediction),
             traversable=first < 0,
             reasons=tuple(reasons),
             first_failure=first,
@@ -327,8 +358,15 @@ class ViewSession:
         self.wanted = scenario = dataclasses.replace(
             self.wanted, start=start, goal=goal, recorded=poses
         )
-        shown = ShownPath(0, candidate, Trajectory(self.rover, prediction, verdict), "recorded")
+        shown = ShownPath(
+            0, candidate, Trajectory(scenario.rover, prediction, verdict), "recorded"
+        )
         self.finished, self._index = Judgement(scenario, answer, scenario, shown), 0
+
+
+def _judges_all(request: JudgeRequest) -> bool:
+    """Return whether a request is for all paths, which a slider that moves on makes worthless."""
+    return request.before is None
 
 
 def _ignore(_what: str, _step: int, _steps: int) -> None:

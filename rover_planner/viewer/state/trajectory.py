@@ -5,15 +5,19 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.names import SERVO
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.viewer.state.exemptions import tell_exemptions
 
 MAX_SLIP = 0.95
 """Slip ratio at which the shown rate of a wheel is limited."""
 MAX_VALUE = 1e6
 """Largest magnitude that is shown: a wheel that lifts off has infinite friction utilisation."""
+PLACES = ("position", "wheel_centres", "contact_points")
+"""Fields that are places: the northing of a map may be larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +56,8 @@ class RoverState:
     """(6,) tractions T [N]."""
     lateral: Floats
     """(6,) lateral forces S [N]."""
+    friction: Floats
+    """(6,) friction coefficients mu at the contacts."""
     friction_utilisation: Floats
     """(6,)"""
     torque_saturation: Floats
@@ -77,6 +83,8 @@ class Trajectory:
             end = min(end, verdict.first_failure + 1)
         self.length = end
         """Number of waypoints; 0 where the rover does not settle at the start."""
+        self.notes = tell_exemptions(prediction, end)
+        """Sentences on what lies between the waypoints, and on what the verdict did not ask."""
         self._series = self._collect(rover, prediction, end) if end else {}
 
     def _collect(self, rover: Rover, prediction: PathPrediction, n: int) -> dict[str, Floats]:
@@ -96,9 +104,17 @@ class Trajectory:
         series["spin"] = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
         series["speed"] = np.hypot(series["motion"][:, 0], series["motion"][:, 1])
         return {
-            name: np.clip(np.nan_to_num(values), -MAX_VALUE, MAX_VALUE)
+            name: values
+            if name in PLACES
+            else np.clip(np.nan_to_num(values), -MAX_VALUE, MAX_VALUE)
             for name, values in series.items()
         }
+
+    @property
+    def has_slip(self) -> bool:
+        """Whether slip is predicted: on yielding soil, or with speed servos."""
+        prediction = self.prediction
+        return prediction.policy == SERVO or bool(np.any(prediction.sinkage > 0.0))
 
     @staticmethod
     def empty_times() -> Floats:
@@ -109,6 +125,11 @@ class Trajectory:
     def times(self) -> Floats:
         """(length,) times of the waypoints [s]."""
         return self._series["time"] if self.length else self.empty_times()
+
+    @property
+    def distance(self) -> Floats:
+        """(length,) distances driven at the waypoints [m]."""
+        return self._series["distance"] if self.length else self.empty_times()
 
     @property
     def duration(self) -> float:

@@ -1,6 +1,6 @@
 """The tab of the rover: presets, rover files, and a slider for each of its numbers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,6 +10,9 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_planner.studies.rover_values import RoverValue, read_rover, write_rover
 from rover_planner.viewer.panel.controls import RoverSliders, on_visitor_input
+from rover_planner.viewer.panel.reasons.changes import Changes
+from rover_planner.viewer.state.reasons.before_after import Difference
+from rover_planner.viewer.state.visitor_requests import Action
 
 FULL_TURN = 3.15
 """Largest angle, both ways, of the slider of an arm's joint without limits [rad]."""
@@ -27,6 +30,10 @@ class RoverActions:
     """Turns a joint of the arm to an angle [rad]."""
     current: Callable[[], Rover]
     """Returns the rover."""
+    undo: Action
+    """Takes the last rover again."""
+    reset: Action
+    """Takes the rover as it was loaded."""
 
 
 class RoverTab:
@@ -37,12 +44,14 @@ class RoverTab:
         self._gui, self._tab, self._actions = gui, tab, actions
         with tab:
             self._verdict = gui.add_html("")
-            preset = gui.add_dropdown("Preset", preset_names(), initial_value="lsr1")
-            preset.on_update(self._load_preset)
+            self._changes = Changes(gui, actions.undo, actions.reset)
+            self._preset = gui.add_dropdown("Preset", preset_names())
+            self._preset.on_update(self._load_preset)
             upload = gui.add_upload_button("Load a rover file", mime_type=".yaml,.yml")
             upload.on_upload(self._load_file)
             save = gui.add_button("Save as rover file")
             save.on_click(self._save)
+        self._loaded: Rover | None = None
         self._sliders: RoverSliders | None = None
         self._folder: Any = None
         """The folder of the sliders."""
@@ -50,7 +59,8 @@ class RoverTab:
 
     def _load_preset(self, event: Any) -> None:
         name = event.target.value
-        self._actions.load(lambda: load_rover(name))
+        if event.client is not None and name in preset_names():
+            self._actions.load(lambda: load_rover(name))
 
     def _load_file(self, event: Any) -> None:
         file = event.target.value
@@ -62,8 +72,26 @@ class RoverTab:
         name = f"{Path(rover.name).stem}.yaml"
         event.client.send_file_download(name, write_rover(rover).encode(), save_immediately=True)
 
+    def show_rover(self, loaded: Rover, rover: Rover, arm_angles: Mapping[str, float]) -> None:
+        """Show a rover that was loaded, and its values.
+
+        Args:
+            loaded: The rover as it was loaded; another one gets other sliders.
+            rover: The same with its numbers as they were changed since.
+            arm_angles: Angles [rad] of the arm's joints by name; others are stowed.
+        """
+        if self._loaded is not loaded:
+            self._loaded = loaded
+            self.set_rover(loaded)
+        self.show_values(rover, arm_angles)
+
     def set_rover(self, rover: Rover) -> None:
-        """Replace the sliders by those of another rover."""
+        """Replace the sliders by those of another rover, and name it in the box of presets."""
+        name = rover.name
+        if name not in preset_names() or load_rover(name) != rover:
+            name = f"{name} (file)"
+        self._preset.options = tuple(dict.fromkeys((*preset_names(), name)))
+        self._preset.value = name
         if self._folder is not None:
             self._folder.remove()
         with self._tab:
@@ -86,7 +114,24 @@ class RoverTab:
         """Show a verdict, HTML."""
         self._verdict.content = text
 
-    def show_values(self, rover: Rover) -> None:
-        """Move the sliders to the values of the rover, after one was refused."""
+    def show_changes(
+        self, changed: Mapping[str, tuple[float, float]], differences: Sequence[Difference]
+    ) -> None:
+        """Show changed numbers by label, mark their sliders, and show what that has changed."""
+        self._changes.show(changed, differences)
+        if self._sliders is not None:
+            self._sliders.mark(changed)
+
+    def show_values(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
+        """Move the sliders to values that no visitor has typed, as after one was refused.
+
+        Args:
+            rover: The rover.
+            arm_angles: Angles [rad] of the arm's joints by name; others are stowed.
+        """
         if self._sliders is not None:
             self._sliders.show(rover)
+        arm = rover.manipulator
+        stowed = {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
+        for joint, slider in self._arm.items():
+            slider.value = arm_angles.get(joint, stowed[joint])

@@ -1,8 +1,10 @@
 """Tests of the verdicts under all torque policies, side by side."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from rover_planner.viewer.panel.dashboard import describe_verdict
 from rover_planner.viewer.state.comparison import PolicyVerdict
@@ -49,3 +51,20 @@ def test_the_page_shows_a_box_for_each_policy_with_its_reason():
     text = describe_verdict(False, "a wheel slips", "", "", compared)
     assert text.count("<b>passes</b>") == text.count("<b>not judged</b>") == 1
     assert 'title="a &lt;wheel&gt; slips"' in text
+
+
+def test_with_speed_servos_the_plot_of_friction_has_no_limit_that_a_passing_path_may_cross():
+    pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
+    from rover_planner.viewer.pages.page import Page
+
+    session = session_on(ramp)
+    page = Page(session, port=0)
+    try:
+        assert page.plots.limits["friction_utilisation"] == LSR1.limits.friction_utilisation
+        session.change_options(policy="servo")
+        deadline = time.monotonic() + 30.0
+        while page.plots.limits["friction_utilisation"] and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert page.plots.limits["friction_utilisation"] == 0.0
+    finally:
+        page.close()

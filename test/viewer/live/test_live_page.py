@@ -50,11 +50,18 @@ def visitor(page):
 def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, visitor, tmp_path):
     visitor.wait_for("waiting for odometry")
     assert "no verdict" in visitor.text("#verdict")
+    assert "map not known yet" in visitor.text("#header")
+    given = LivePage(page.session, page._listener, port=0, has_ground=True)
+    try:
+        assert given.describe_context()[0].ground == page.session.ground_name == "7.95 x 7.95 m"
+    finally:
+        given.close()
     empty = visitor.picture()
     save_terrain(tmp_path / "waves.npz", make_terrain(waves))
     values = {"terrain_file": str(tmp_path / "waves.npz"), "start_x": -1.0}
     parameters = [Parameter(name, value=value) for name, value in values.items()]
-    ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
+    simulator = RoverSimulator(context=ros.context, parameter_overrides=parameters)
+    ros.spin(simulator)
     ros.spin(TraverseServer(context=ros.context))
     visitor.wait_for("live; forces not known")
     wait_until(lambda: visitor.picture() != empty, "rover and ground in the scene")
@@ -73,4 +80,18 @@ def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, vis
     lines = visitor.text("#dashboard").splitlines()
     loads = [float(line.removesuffix(" N")) for line in lines if line.endswith(" N")]
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
+    assert age_of(visitor, "odometry")[1] == "false"
+
+    for timer in list(simulator.timers):  # the simulator falls silent, as if it was killed
+        simulator.destroy_timer(timer)
+    visitor.wait_for("not live: odometry is ")
+    wait_until(lambda: age_of(visitor, "odometry")[1] == "true", "the stale topic")
+    assert "stale, " in age_of(visitor, "odometry")[0]
+    assert age_of(visitor, "/traverse_server/plan")[1] == "false"
     assert visitor.page_errors == []
+
+
+def age_of(visitor: Visitor, topic: str) -> tuple[str, str]:
+    """Return what the page says of a topic's age, and whether it is stale."""
+    row = visitor.tab.locator(f'[data-topic="{topic}"]')
+    return row.inner_text(), row.get_attribute("data-stale")

@@ -1,0 +1,1 @@
+"""What the page needs of the browser itself: keys, boxes, the address, and files to send."""

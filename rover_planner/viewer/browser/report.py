@@ -1,0 +1,134 @@
+"""What a sent page says in words and numbers beside its scene: verdict, failing pose, versions."""
+
+import html
+import platform
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+import rover_physics
+from rover_physics.names import WHEELS
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.rover.model import Rover
+from rover_physics.traversability.limit_checks import check_limits
+from rover_planner.studies.rover_values import write_rover
+from rover_planner.viewer.state.context import Context
+from rover_planner.viewer.state.scenario import Judgement
+
+PACKAGES = ("numpy", "scipy", "numba", "viser")
+WHEEL_ROWS = {
+    "normal force N [N]": ("wheel_loads", 1),
+    "traction T [N]": ("tangential", 1),
+    "lateral force S [N]": ("lateral", 1),
+    "friction utilisation": ("friction_utilisation", 2),
+    "torque saturation": ("torque_saturation", 2),
+    "slip ratio": ("slip_ratio", 2),
+    "sinkage [mm]": ("sinkage", 1),
+}
+"""Rows of the table of wheels: field of the prediction and digits."""
+MILLI = 1e3
+
+
+def describe_judgement(judgement: Judgement, context: Context, query: str) -> str:
+    """Return the verdict on the shown path with its numbers as HTML.
+
+    Args:
+        judgement: What was judged.
+        context: What it is about.
+        query: The link to it, as `write_link` returns it; empty if it would be too long.
+    """
+    scenario, shown = judgement.scenario, judgement.shown
+    verdict, prediction = shown.verdict, shown.candidate.prediction
+    facts = {
+        "rover": context.rover,
+        "map": f"{context.ground}, {scenario.terrain.elevation.shape[1]} x "
+        f"{scenario.terrain.elevation.shape[0]} cells of {scenario.terrain.resolution:g} m",
+        "soil": context.soil,
+        "torques": context.policy,
+        "start": _pose(scenario.start),
+        "goal": _pose(scenario.goal),
+        "path": f"{shown.index + 1} of {len(judgement.answer.candidates)}, "
+        f"{shown.candidate.length:.2f} m",
+        "largest friction utilisation": f"{verdict.max_friction_utilisation:.2f}",
+        "largest torque saturation": f"{verdict.max_torque_saturation:.2f}",
+        "smallest stability margin": f"{verdict.min_tip_over_ratio:.2f}",
+        "largest tilt": f"{np.degrees(verdict.max_tilt):.1f} deg",
+        "smallest belly clearance": f"{MILLI * verdict.min_belly_clearance:.0f} mm",
+        "versions": _versions(),
+        "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "link": f"?{query}" if query else "too long; the rover file is below",
+    }
+    parts = []
+    if judgement.reason:
+        parts.append(f'<p id="reason"><b>{html.escape(judgement.reason)}</b></p>')
+    if not verdict.traversable:
+        parts.append(_failing_pose(scenario.rover, prediction, verdict.first_failure))
+    parts += [f"<p>{html.escape(note)}</p>" for note in shown.trajectory.notes]
+    parts.append(_list(facts))
+    rover_file = html.escape(write_rover(scenario.rover))
+    parts.append(f"<details><summary>rover file</summary><pre>{rover_file}</pre></details>")
+    return "".join(parts)
+
+
+def _failing_pose(rover: Rover, prediction: PathPrediction, waypoint: int) -> str:
+    """Return where the path is refused, and a table of the wheels there."""
+    part, row, where = _find_row(rover, prediction, waypoint)
+    x, y, yaw = part.poses[row]
+    facts = {
+        "refused at": f"{where}, {prediction.distance[waypoint]:.2f} m from the start",
+        "pose": _pose((x, y, yaw)),
+    }
+    if not part.settled[row]:
+        return _list(facts) + "<p>The rover does not settle there.</p>"
+    facts["roll and pitch"] = ", ".join(
+        f"{np.degrees(angle):.1f} deg" for angle in (part.roll[row], part.pitch[row])
+    )
+    return _list(facts) + _wheel_table(part, row)
+
+
+def _find_row(
+    rover: Rover, prediction: PathPrediction, waypoint: int
+) -> tuple[PathPrediction, int, str]:
+    """Return the prediction and its row in which a waypoint's limit is broken, and its name."""
+    between = prediction.between
+    here = any(check.breaks for check in check_limits(rover, prediction.select([waypoint])))
+    if between is not None and prediction.settled[waypoint] and not here:
+        for row in np.flatnonzero(between.waypoint == waypoint).tolist():
+            one = between.select([row])
+            if not one.settled[0] or any(c.breaks for c in check_limits(rover, one)):
+                return between, row, f"on the way to waypoint {waypoint}"
+    return prediction, waypoint, f"waypoint {waypoint}"
+
+
+def _wheel_table(part: PathPrediction, row: int) -> str:
+    head = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in WHEELS)
+    lines = []
+    for title, (field, digits) in WHEEL_ROWS.items():
+        values = getattr(part, field)[row] * (MILLI if "[mm]" in title else 1.0)
+        cells = "".join(f"<td>{value:.{digits}f}</td>" for value in values)
+        lines.append(f"<tr><th>{title}</th>{cells}</tr>")
+    return f'<table id="wheels"><tr><th></th>{head}</tr>{"".join(lines)}</table>'
+
+
+def _list(facts: dict[str, str]) -> str:
+    rows = "".join(
+        f"<tr><th>{name}</th><td>{html.escape(text)}</td></tr>" for name, text in facts.items()
+    )
+    return f"<table>{rows}</table>"
+
+
+def _pose(pose: Sequence[float]) -> str:
+    x, y, yaw = pose
+    return f"x {x:.3f} m, y {y:.3f} m, yaw {np.degrees(yaw):.1f} deg"
+
+
+def _versions() -> str:
+    found = {"rover_planner": rover_physics.__version__, "python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return ", ".join(f"{name} {text}" for name, text in found.items())

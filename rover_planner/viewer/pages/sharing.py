@@ -1,0 +1,166 @@
+"""Sends what the page shows as a file or a link, and shows again what a link holds."""
+
+import dataclasses
+from typing import Any
+
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.studies.rover_values import read_rover, write_rover
+from rover_planner.viewer.browser.channel import run_for
+from rover_planner.viewer.browser.export import write_page
+from rover_planner.viewer.browser.link import (
+    Link,
+    change_values,
+    fingerprint,
+    list_changed_values,
+    write_link,
+)
+from rover_planner.viewer.browser.report import describe_judgement
+from rover_planner.viewer.panel.tabs.ground_tab import GroundTab
+from rover_planner.viewer.panel.tabs.share_tab import ShareTab
+from rover_planner.viewer.state.context import describe_scenario
+from rover_planner.viewer.state.playback import Playback
+from rover_planner.viewer.state.scenario import Scenario
+from rover_planner.viewer.state.session import ViewSession
+
+
+class Sharing:
+    """Writes and opens links, and writes files."""
+
+    def __init__(
+        self,
+        session: ViewSession,
+        playback: Playback,
+        ground_tab: GroundTab,
+        share_tab: ShareTab,
+    ):
+        """Open no link yet."""
+        self._session, self._playback = session, playback
+        self._ground_tab, self._share_tab = ground_tab, share_tab
+        self._fingerprint: tuple[Terrain | None, str] = (None, "")
+        self._opening: Link | None = None
+        """The link whose path and time are not shown yet."""
+
+    def save(self, server: Any, client: Any) -> None:
+        """Send a visitor the scene and its report as one HTML file."""
+        session, link = self._session, self.make_link()
+        judgement = session.finished
+        context = describe_scenario(judgement.scenario, session.ground_name)
+        word = "traversable" if session.shown.verdict.traversable else "not traversable"
+        title = f"{judgement.scenario.rover.name} on {context.ground}: {word}"
+        report = describe_judgement(judgement, context, _write_short(link))
+        content = write_page(server, client.camera, report, title)
+        name = f"{judgement.scenario.rover.name}_{word.replace(' ', '_')}.html"
+        client.send_file_download(name, content, save_immediately=True)
+
+    def show_link(self, client: Any) -> None:
+        """Show the link, and put it into a visitor's address bar and clipboard.
+
+        Raises:
+            PlanningError: It would be too long.
+        """
+        self._share_tab.show_link("")
+        query = write_link(self.make_link())
+        self._share_tab.show_link(query)
+        run_for(
+            client,
+            f"history.replaceState(null, '', {f'?{query}'!r});"
+            "navigator.clipboard?.writeText(location.href).catch(() => {});",
+        )
+
+    def make_link(self) -> Link:
+        """Return the link to what is shown."""
+        session, now = self._session, self._session.finished.scenario
+        return Link(
+            rover=now.loaded.name,
+            ground=self._identify(now.terrain),
+            start=now.start,
+            goal=now.goal,
+            policy=now.options.policy,
+            soil=now.options.soil or "",
+            path=session.shown.index + 1,
+            time=round(self._playback.time, 3),
+            layer=self._ground_tab.layer,
+            heading=self._ground_tab.heading,
+            values=list_changed_values(now.loaded, now.rover),
+            joints=dict(now.arm_angles),
+            along=self._ground_tab.is_along_path,
+            rover_file="" if _is_preset(now.loaded) else write_rover(now.loaded),
+        )
+
+    def open(self, link: Link) -> None:
+        """Judge what a link holds; `go_on` then shows its path and time.
+
+        Raises:
+            RoverError, PlanningError: It is about another map or rover, or a value is invalid.
+        """
+        wanted = self._session.wanted
+        if link.ground != self._identify(wanted.terrain):
+            raise PlanningError("the link is about another map than this page shows")
+        if link.layer not in self._ground_tab.layers:
+            raise PlanningError(f"the link names the layer {link.layer!r}, which there is not")
+        self._session.take_scenario(self._read(link, wanted))
+        self._ground_tab.choose_layer(link.layer, link.heading, along=link.along)
+        self._opening = link
+
+    def _read(self, link: Link, wanted: Scenario) -> Scenario:
+        loaded = _read_loaded(link)
+        if loaded == wanted.loaded:
+            loaded = wanted.loaded
+        same = (link.start, link.goal) == (wanted.start, wanted.goal)
+        return dataclasses.replace(
+            wanted,
+            loaded=loaded,
+            rover=change_values(loaded, link.values),
+            start=link.start,
+            goal=link.goal,
+            options=dataclasses.replace(
+                wanted.options, policy=link.policy, soil=link.soil or None
+            ),
+            arm_angles=dict(link.joints),
+            recorded=wanted.recorded if same else None,
+        )
+
+    def go_on(self) -> None:
+        """Show path and time of the link that was opened, as soon as they are judged."""
+        link, session = self._opening, self._session
+        if link is None or session.is_outdated:
+            return
+        if session.shown.index == link.path - 1:
+            self._opening = None
+            self._playback.go_to(link.time)
+        elif link.path <= len(session.answer.candidates):
+            session.show_candidate(link.path - 1)
+        elif session.progress is None:  # no way around was found this time
+            self._opening = None
+
+    def _identify(self, terrain: Terrain) -> str:
+        """Return the fingerprint of a map, which is computed once."""
+        if self._fingerprint[0] is not terrain:
+            self._fingerprint = terrain, fingerprint(terrain)
+        return self._fingerprint[1]
+
+
+def _write_short(link: Link) -> str:
+    """Return a link for a report, which has the rover file itself; empty if it is too long."""
+    try:
+        return write_link(link)
+    except PlanningError:
+        return ""
+
+
+def _is_preset(rover: Rover) -> bool:
+    return rover.name in preset_names() and load_rover(rover.name) == rover
+
+
+def _read_loaded(link: Link) -> Rover:
+    """Return the rover that was loaded when a link was made."""
+    if link.rover_file:
+        return read_rover(link.rover_file, "the rover file in the link")
+    if link.rover not in preset_names():
+        raise PlanningError(
+            f"the link is about the rover {link.rover}, which is no preset; it has no file"
+        )
+    return load_rover(link.rover)

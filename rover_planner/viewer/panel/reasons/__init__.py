@@ -1,0 +1,1 @@
+"""What the panels say of reasons: lanes of limits, the failure, candidates, before and after."""

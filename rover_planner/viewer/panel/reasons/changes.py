@@ -1,0 +1,107 @@
+"""What has changed of the rover and of its drive: a table, and buttons to undo and to reset."""
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rover_planner.viewer.state.colours import NOTICE, to_css
+from rover_planner.viewer.state.reasons.before_after import Difference
+from rover_planner.viewer.state.visitor_requests import Action
+
+SAME = "0"
+"""Change of a number that stays the same."""
+
+
+class Changes:
+    """Hidden while nothing has changed."""
+
+    def __init__(self, gui: Any, undo: Action, reset: Action):
+        """Add buttons and an empty table to the container that is open.
+
+        Args:
+            gui: The GUI of viser.
+            undo: Takes the last rover again.
+            reset: Takes the rover as it was loaded.
+        """
+        actions = {"Undo": undo, "Reset": reset}
+        self._table = gui.add_html("", visible=False)
+        self._buttons = gui.add_button_group("Rover", tuple(actions), visible=False)
+        self._buttons.on_click(lambda event: actions[event.target.value]())
+
+    def show(
+        self, changed: Mapping[str, tuple[float, float]], differences: Sequence[Difference]
+    ) -> None:
+        """Show changed numbers of the rover by label, and differences of the drive."""
+        is_shown = bool(changed or differences)
+        self._table.visible = self._buttons.visible = is_shown
+        if is_shown:
+            self._table.content = draw_changes(changed, differences)
+
+
+def draw_changes(
+    changed: Mapping[str, tuple[float, float]], differences: Sequence[Difference]
+) -> str:
+    """Return tables, HTML: numbers of the rover as loaded and now, of the drive before and now.
+
+    Numbers of the drive that are the same are left out, so that the sliders below stay in sight.
+    """
+    parts = []
+    if changed:
+        rows = [
+            (_name(label), f"{was:g}", f"{now:g}", f"{now - was:+.4g}")
+            for label, (was, now) in changed.items()
+        ]
+        parts.append(_table(("rover", "loaded", "now", "change"), rows))
+    if differences:
+        rows = [
+            (
+                f"{one.name} [{one.unit}]" if one.unit else one.name,
+                _number(one.before, one.digits),
+                _number(one.after, one.digits),
+                _change(one),
+            )
+            for one in differences
+            if _change(one) != SAME
+        ]
+        if rows:
+            parts.append(_table(("drive", "before", "now", "change"), rows))
+        else:
+            parts.append('<div style="padding:0 4px">the drive is the same as before</div>')
+    return (
+        f'<div id="changes" style="border-left:5px solid {to_css(NOTICE)};margin:0 8px;'
+        f'padding-left:.5em;font-size:12px">{"".join(parts)}</div>'
+    )
+
+
+def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    def line(cells: tuple[str, ...], tag: str) -> str:
+        return "".join(
+            f'<{tag} style="text-align:{"right" if k else "left"};padding:0 4px">'
+            f"{html.escape(cell)}</{tag}>"
+            for k, cell in enumerate(cells)
+        )
+
+    body = "".join(f"<tr>{line(row, 'td')}</tr>" for row in rows)
+    return (
+        '<table style="width:100%;border-collapse:collapse;margin-bottom:4px">'
+        f"<tr>{line(heads, 'th')}</tr>{body}</table>"
+    )
+
+
+def _name(label: str) -> str:
+    """Return the label of a slider, such as "wheels z [m]", as the name of a row."""
+    return label.replace(" [-]", "").replace(" [", ", ").removesuffix("]")
+
+
+def _number(value: float, digits: int) -> str:
+    if math.isnan(value):
+        return "?"
+    return f"{value:.{digits}f}" if abs(value) < 1e5 else "infinite"
+
+
+def _change(one: Difference) -> str:
+    change = one.change
+    if not math.isfinite(change) or abs(change) > 1e5:
+        return ""
+    return f"{change:+.{one.digits}f}" if abs(change) >= 0.5 * 10**-one.digits else SAME

@@ -1,0 +1,49 @@
+"""The legend of a survey's layer: its classes or its scale, what it is about, and what differs."""
+
+import html
+from collections.abc import Sequence
+
+from rover_planner.viewer.state.colours import NOTICE, ColourScale, to_css
+from rover_planner.viewer.state.survey_layers import ColouredGround, Key
+
+
+def draw_survey_legend(
+    name: str, told: str, meaning: ColouredGround, differences: Sequence[str]
+) -> str:
+    """Return the legend of a survey's layer as HTML.
+
+    Args:
+        name: Name of the layer.
+        told: What it is about.
+        meaning: What its colours mean.
+        differences: In what the survey differs from what the page shows.
+    """
+    body = _draw_keys(meaning.keys) if meaning.scale is None else _draw_scale(meaning.scale)
+    notice = ""
+    if differences:
+        notice = (
+            f'<div id="survey-differs" style="border-left:5px solid {to_css(NOTICE)};'
+            f'padding-left:.5em">not as on the page: {html.escape("; ".join(differences))}</div>'
+        )
+    return (
+        '<div id="scale" style="font-size:12px;padding:4px 8px">'
+        f"<div>{html.escape(name)}</div>{body}"
+        f'<div style="opacity:.7">{html.escape(told)}</div>{notice}</div>'
+    )
+
+
+def _draw_keys(keys: Sequence[Key]) -> str:
+    return "".join(
+        f'<div><span style="background:{to_css(colour)};padding:0 .6em">&nbsp;</span> '
+        f"{html.escape(text)}</div>"
+        for colour, text in keys
+    )
+
+
+def _draw_scale(scale: ColourScale) -> str:
+    return (
+        '<div style="height:10px;background:linear-gradient(90deg,#00224e,#434e6c,#7d7c78,'
+        '#bcae6c,#fee838)"></div><div style="display:flex;justify-content:space-between">'
+        f"<span>{scale.low:g} {scale.unit}</span><span>{scale.high:.4g} {scale.unit}</span></div>"
+        '<div style="opacity:.7">grey: unknown, or the rover cannot stand or go</div>'
+    )

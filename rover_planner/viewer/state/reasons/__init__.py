@@ -1,0 +1,1 @@
+"""Why a path is refused and where: limits along it, its failure, candidates, before and after."""

@@ -1,0 +1,100 @@
+"""Candidate paths as rows of a table, and places for their numbers that do not overlap."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rover_physics.numerics.arrays import Floats
+from rover_planner.planning.path_query import Candidate
+
+SHARES = np.linspace(0.2, 0.8, 13)
+"""Shares of a path at which its number may stand."""
+MAX_TRIED = 3
+"""Rounds in which the places are improved."""
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """One candidate path in numbers; those of a refused one are up to its first failure."""
+
+    number: int
+    """Number of the path, from 1."""
+    traversable: bool
+    """Whether the rover can drive it."""
+    reason: str
+    """Why not; empty if it can."""
+    length: float
+    """Length of the whole path [m]."""
+    driven: float
+    """Length up to the first failure [m]."""
+    energy: float
+    """Energy up to there [J]."""
+    utilisation: float
+    """Largest friction utilisation."""
+    margin: float
+    """Smallest stability margin."""
+    is_best: bool
+    """Whether it is the one to drive, or that gets furthest."""
+    is_old: bool
+    """Whether it was judged for other values than those that are wanted."""
+
+
+def list_candidates(
+    candidates: Sequence[Candidate], best: int, old: Sequence[bool]
+) -> tuple[CandidateRow, ...]:
+    """Return the rows of candidates.
+
+    Args:
+        candidates: The candidates.
+        best: Index of the one to drive, or that gets furthest.
+        old: For each whether its verdict is old.
+    """
+    rows = []
+    for k, candidate in enumerate(candidates):
+        verdict, prediction = candidate.verdict, candidate.prediction
+        last = min(verdict.first_failure, len(prediction.poses) - 1)
+        rows.append(
+            CandidateRow(
+                number=k + 1,
+                traversable=verdict.traversable,
+                reason=verdict.reason,
+                length=candidate.length,
+                driven=float(prediction.distance[last]),
+                energy=float(prediction.energy[last]),
+                utilisation=verdict.max_friction_utilisation,
+                margin=verdict.min_tip_over_ratio,
+                is_best=k == best,
+                is_old=old[k],
+            )
+        )
+    return tuple(rows)
+
+
+def place_numbers(paths: Sequence[Floats], taken: Floats) -> Floats:
+    """Return a place (k, 2) [m] for the number of each path, far from each other.
+
+    Each number stands on its path, where the nearest of the other numbers and of the taken places
+    is furthest.
+
+    Args:
+        paths: Points (n, 2) of each path [m].
+        taken: Other places (j, 2) that are taken [m].
+    """
+    choices = [_points_at(path, SHARES) for path in paths]
+    places = np.array([points[len(points) // 2] for points in choices]).reshape(-1, 2)
+    for _ in range(MAX_TRIED):
+        for k, points in enumerate(choices):
+            others = np.concatenate([taken.reshape(-1, 2), np.delete(places, k, axis=0)])
+            if len(others):
+                away = np.linalg.norm(points[:, None] - others[None], axis=2).min(axis=1)
+                places[k] = points[int(np.argmax(away))]
+    return places
+
+
+def _points_at(path: Floats, shares: Floats) -> Floats:
+    """Return the points (k, 2) of a path (n, 2) at shares of its length."""
+    steps = np.hypot(*np.diff(path, axis=0).T) if len(path) > 1 else np.zeros(0)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    at = shares * along[-1]
+    return np.column_stack([np.interp(at, along, path[:, axis]) for axis in (0, 1)])

@@ -1,0 +1,316 @@
+"""A survey whose layers colour the ground: opened, compared with what is shown, and read."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.files.validation import show_file
+from rover_physics.names import OPTIMAL
+from rover_physics.numerics.arrays import Floats
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.fingerprint import fingerprint
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.classification import IMPASSABLE
+from rover_planner.errors import PlanningError
+from rover_planner.shell.extras import need
+from rover_planner.survey.chunk_survey import open_map
+from rover_planner.survey.geotiff import GeoTiffMap
+from rover_planner.survey.layers import (
+    CLASS_NUMBERS,
+    LIMIT_NUMBERS,
+    NOT_SURVEYED,
+    QUANTITIES,
+    unpack_bits,
+)
+from rover_planner.survey.palette import CLASS_COLOURS, CLASS_LABELS, SOME_HEADINGS, UNKNOWN_LABEL
+from rover_planner.survey.reach.kept_area import open_area
+from rover_planner.survey.store import SurveyStore
+from rover_planner.viewer.state.colours import (
+    UNKNOWN,
+    Colour,
+    ColourScale,
+    from_css,
+    map_colours,
+)
+
+MAX_READ = 1200
+"""Most cells along a side that are read of a layer; of more, every second, third, ..."""
+CLASS, WORST_CLASS, BEST_CLASS = "survey: class", "survey: worst class", "survey: best class"
+LIMIT, HEADINGS = "survey: first limit", "survey: passable headings"
+REACHABLE = "survey: reachable"
+OPTION_NAMES = {"policy": "torque policy", "max_torque": "largest torque"}
+"""Names of options that are not those of the fields."""
+
+Key = tuple[Colour, str]
+"""Entry of a legend: a colour and what it means."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A layer whose colours are a scale."""
+
+    layer: str
+    """Name in the store."""
+    unit: str
+    """Unit that is shown."""
+    factor: float
+    """Factor from the unit of the store."""
+    high: float | None
+    """Value of the last colour; None: the largest value. That of the first is 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class ColouredGround:
+    """The colours of a layer, and what they mean."""
+
+    colours: NDArray[np.uint8]
+    """(ny, nx, 3), grey where nothing is known."""
+    keys: tuple[Key, ...] = ()
+    """The legend of classes; empty where the colours are a scale."""
+    scale: ColourScale | None = None
+    """The scale."""
+
+
+class ShownSurvey:
+    """The layers of a survey on the page."""
+
+    def __init__(self, store: SurveyStore):
+        """Show a survey; `open_survey` also compares it with rover and map."""
+        self._store, self._area = store, open_area(store)
+        rover = store.notes.description["rover"]
+        self._numbers = _number_layers(rover)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the layers to choose from."""
+        reach = (REACHABLE,) if self._area is not None else ()
+        return (CLASS, *reach, WORST_CLASS, BEST_CLASS, LIMIT, HEADINGS, *self._numbers)
+
+    def colour(self, name: str, x: Floats, y: Floats) -> ColouredGround:
+        """Return the colours of a layer at x (nx,) and y (ny,) [m], map frame.
+
+        Each is that of the nearest surveyed cell that is read.
+        """
+        if name in (CLASS, WORST_CLASS, BEST_CLASS):
+            numbers, labels = self._read_classes(name), CLASS_LABELS
+            found = _colour_classes(numbers, labels, list_class_colours())
+        elif name == LIMIT:
+            found = self._colour_limits()
+        else:
+            found = self._colour_numbers(name)
+        return ColouredGround(self._place(found.colours, x, y), found.keys, found.scale)
+
+    def find_differences(self, rover: Rover, options: SweepOptions) -> tuple[str, ...]:
+        """Return in what the survey differs from a rover and options that are shown."""
+        told = self._store.notes.description
+        found = []
+        if told["rover"] != _as_json(asdict(rover)):
+            found.append("the rover was changed since")
+        shown = _as_json(asdict(options))
+        policies = told["options"]["policy"], options.policy
+        for key, value in told["options"].items():
+            other = shown.get(key)
+            if key == "control_margin" and OPTIMAL not in policies:
+                continue
+            if (value or None) != (other or None):  # no joint angles are () or None
+                name = OPTION_NAMES.get(key, key.replace("_", " "))
+                found.append(f"{name} {_say(value)} in the survey, {_say(other)} here")
+        return tuple(found)
+
+    def describe(self, name: str) -> str:
+        """Return in words what a layer is about."""
+        notes = self._store.notes
+        rover, headings = notes.description["rover"]["name"], notes.headings
+        if name == REACHABLE and self._area is not None:
+            x, y = self._area.from_place
+            return (
+                f"{rover}, length of the way from ({x:g}, {y:g}), where it can go and return: "
+                f"{self._area.area:.1f} m2"
+            )
+        margin = notes.description["options"]["control_margin"]
+        told = f"{rover}, {headings} headings, a cell every {notes.cell:g} m"
+        is_class = name in (CLASS, WORST_CLASS, BEST_CLASS)
+        return told + (f", control margin {margin:g}" if is_class else "")
+
+    def _read(self, layer: Any) -> NDArray:
+        """Read every so many cells of a layer."""
+        every = self._every
+        return np.asarray(layer[::every, ::every])
+
+    @property
+    def _every(self) -> int:
+        return max(1, -(-max(self._store.notes.layout.shape) // MAX_READ))
+
+    def _read_classes(self, name: str) -> NDArray:
+        """Return the numbers of classes; NOT_SURVEYED where the ground is unknown, too."""
+        worst, best, limits = (
+            self._read(self._store.layer(layer))
+            for layer in ("worst_class", "best_class", "first_limit")
+        )
+        impassable = CLASS_NUMBERS[IMPASSABLE]
+        shown = (best if name == BEST_CLASS else worst).copy()
+        if name == CLASS:
+            shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
+        off_ground = [LIMIT_NUMBERS[code] for code in ("off_map", "unknown_ground")]
+        shown[(best == impassable) & np.isin(limits, off_ground)] = NOT_SURVEYED
+        return shown
+
+    def _colour_limits(self) -> ColouredGround:
+        """Return the colours of the first limits that fail."""
+        limits = self._read(self._store.layer("first_limit"))
+        names = {number: code.replace("_", " ") for code, number in LIMIT_NUMBERS.items()}
+        labels = tuple(names[k] or "none: all headings pass" for k in sorted(names))
+        return _colour_classes(limits, labels, list_limit_colours())
+
+    def _colour_numbers(self, name: str) -> ColouredGround:
+        """Return the colours of a layer on a scale."""
+        if name == REACHABLE and self._area is not None:
+            values = self._read(self._area.distance).astype(float)
+            longest = max(self._area.longest or 0.0, self._area.cell)
+            return _colour_scale(values, ColourScale(0.0, longest, "m"))
+        if name == HEADINGS:
+            bits = self._read(self._store.layer("passable_headings"))
+            values = unpack_bits(bits, self._store.notes.headings).sum(axis=-1).astype(float)
+            values[self._read(self._store.layer("best_class")) == NOT_SURVEYED] = np.nan
+            return _colour_scale(values, ColourScale(0.0, self._store.notes.headings, ""))
+        wanted = self._numbers[name]
+        values = wanted.factor * self._read(self._store.layer(wanted.layer)).astype(float)
+        known = values[np.isfinite(values)]
+        high = wanted.high if wanted.high is not None else known.max(initial=1e-9)
+        values[values == np.inf] = high
+        return _colour_scale(values, ColourScale(0.0, float(high), wanted.unit))
+
+    def _place(self, colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
+        """Return the colours of cells at x and y, grey off the survey."""
+        notes, cell = self._store.notes, self._store.notes.cell * self._every
+        left, low = notes.frame.origin
+        columns, rows = (
+            np.rint((at - start) / cell).astype(int) for at, start in ((x, left), (y, low))
+        )
+        ny, nx = colours.shape[:2]
+        inside = ((rows >= 0) & (rows < ny))[:, None] & ((columns >= 0) & (columns < nx))
+        placed = colours[rows.clip(0, ny - 1)][:, columns.clip(0, nx - 1)]
+        return np.where(inside[..., None], placed, np.array(UNKNOWN, np.uint8))
+
+
+def open_survey(path: Path, rover: Rover, terrain: Terrain | None) -> ShownSurvey:
+    """Open a survey to show it with a rover on a map.
+
+    Args:
+        path: Folder of the store.
+        rover: The rover that is shown.
+        terrain: The map that is shown; None if it is the survey's own.
+
+    Raises:
+        PlanningError: It is no survey, or one of another rover or map.
+    """
+    store = SurveyStore(path)
+    told = store.notes.description
+    if told["rover"] != _as_json(asdict(rover)):
+        other = told["rover"]["name"]
+        what = "another " + rover.name if other == rover.name else f"{other}, not {rover.name}"
+        raise PlanningError(
+            f"{show_file(path)} is a survey of {what}; name the rover that was surveyed"
+        )
+    if terrain is not None and told["map"] != fingerprint(terrain):
+        raise PlanningError(
+            f"{show_file(path)} is a survey of another map, or of one with other gaps; give the "
+            "map and the --max-gap that were surveyed (default 0), or leave TERRAIN out"
+        )
+    return ShownSurvey(store)
+
+
+def load_map(path: Path, max_cells: int) -> Terrain:
+    """Return the map of a survey.
+
+    Args:
+        path: Folder of the store.
+        max_cells: Largest number of cells.
+
+    Raises:
+        PlanningError: It is no survey, its map is larger, or has changed since.
+    """
+    notes = SurveyStore(path).notes
+    if notes.map_file:
+        need("rasterio", "a GeoTIFF")
+    source, (rows, columns) = open_map(path, notes.map_file), notes.layout.map_shape
+    if rows * columns > max_cells:
+        raise PlanningError(
+            f"the map of {show_file(path)} has {rows} x {columns} cells; --max-cells is "
+            f"{max_cells}"
+        )
+    if isinstance(source, GeoTiffMap) and source.hash_content() != notes.description["map"]:
+        raise PlanningError(
+            f"{show_file(notes.map_file)} has changed since {show_file(path)} was made"
+        )
+    grids: Any = source.read((slice(0, rows), slice(0, columns)))
+    frame = source.frame
+    return Terrain(
+        **grids, resolution=frame.resolution, origin=frame.origin, soil_names=source.soil_names
+    )
+
+
+def _number_layers(rover: Mapping[str, Any]) -> dict[str, Numbers]:
+    """Return the layers of quantities by name; their scales end at the rover's limits."""
+    limits = rover["limits"]
+    ends = {
+        "tilt": ("deg", 180.0 / np.pi, float(np.degrees(limits["tilt"]))),
+        "belly_clearance": ("cm", 100.0, None),
+    }
+    layers = {}
+    for quantity in QUANTITIES:
+        unit, factor, high = ends.get(quantity.name, ("", 1.0, 1.0))
+        for which in ("worst", "best"):
+            name = f"survey: {quantity.name.replace('_', ' ')}, {which}"
+            layers[name] = Numbers(f"{which}_{quantity.name}", unit, factor, high)
+    return layers
+
+
+def list_class_colours() -> tuple[Colour, ...]:
+    """Return the colours of the classes by number."""
+    return tuple(map(from_css, CLASS_COLOURS))
+
+
+def list_limit_colours() -> tuple[Colour, ...]:
+    """Return the colours of the limits by number, the first of which is no limit."""
+    from matplotlib import colormaps
+
+    palette = np.round(255.0 * colormaps["tab20"](np.arange(20))[:, :3]).astype(int).tolist()
+    colours = [from_css(CLASS_COLOURS[0])]
+    for k in range(len(LIMIT_NUMBERS) - 1):
+        red, green, blue = palette[k % len(palette)]
+        colours.append((red, green, blue))
+    return tuple(colours)
+
+
+def _colour_scale(values: Floats, scale: ColourScale) -> ColouredGround:
+    return ColouredGround(map_colours(values, scale.low, scale.high), (), scale)
+
+
+def _colour_classes(
+    numbers: NDArray, labels: tuple[str, ...], colours: tuple[Colour, ...]
+) -> ColouredGround:
+    """Return the colours of numbers of classes, and the keys of those that there are."""
+    table = np.full((256, 3), UNKNOWN, np.uint8)
+    table[: len(colours)] = colours
+    found = np.unique(numbers)
+    keys = [(colours[k], labels[k]) for k in found if k < len(labels)]
+    if (found >= len(labels)).any():
+        keys.append((UNKNOWN, UNKNOWN_LABEL))
+    return ColouredGround(table[numbers], tuple(keys))
+
+
+def _as_json(value: Any) -> Any:
+    return json.loads(json.dumps(value))
+
+
+def _say(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    return "as default" if value is None else f"{value!s:.40}"

@@ -1,0 +1,134 @@
+"""Writes the pictures of docs/viewer.md: `python -m support.viewer.pictures docs`."""
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.grounds import real_maps
+from rover_physics.names import WHEELS
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.state.reasons.explanation import explain
+from rover_planner.viewer.state.scenario import Pose
+from rover_planner.viewer.state.session import ViewSession
+from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, sync_api, wait_until
+
+SETTLE = 3.0
+"""Time for the browser to draw before a picture is taken [s]."""
+MAX_GAP = 0.2
+"""Gaps in maps up to this width are filled, as `rover_planner view` does [m]."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A picture of the page."""
+
+    file: str
+    """Name of the picture."""
+    ground: str
+    """What the page calls the ground."""
+    make: Callable[[], Terrain]
+    """Makes or loads the ground."""
+    ends: tuple[Pose, Pose] | None = None
+    """Start and goal; None: those that `rover_planner view` chooses."""
+    refused: bool = True
+    """Whether it shows a refused path, at its failure; else the page as it opens, under way."""
+
+
+MADE = f"made, seed {SEED}"
+CASES = (
+    Case("viewer.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05), refused=False),
+    Case("viewer_made.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)),
+    Case(
+        "viewer_spirit.png",
+        "spirit",
+        lambda: load_terrain("spirit").fill_gaps(MAX_GAP),
+        ((-47.2, -21.0, 1.2), (-45.7, -17.1, 1.2)),
+    ),
+    Case(
+        "viewer_otira.png",
+        "otira_tls_boulders_3cm",
+        lambda: real_maps()["otira_tls_boulders_3cm"].fill_gaps(MAX_GAP),
+        ((20.3, 17.4, 0.0), (23.4, 17.4, 0.0)),
+    ),
+)
+
+
+def write_pictures(folder: Path, names: list[str]) -> Iterator[str]:
+    """Write the pictures and yield their names with what they show; no names: all of them."""
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+        for case in CASES:
+            if not names or case.file in names:
+                yield f"{case.file}: {_write(browser, case, folder / case.file)}"
+        browser.close()
+
+
+def _write(browser: Any, case: Case, file: Path) -> str:
+    """Write one picture; return what it shows."""
+    rover, ground = load_rover("lsr1"), case.make()
+    session = ViewSession(rover, ground, *(case.ends or choose_ends(rover, ground)))
+    session.ground_name = case.ground
+    page = Page(session, port=0)
+    try:
+        wait_until(lambda: not page.is_busy, "the verdicts")
+        visitor = Visitor(browser, page.url, scale=1.0)
+        _close_notice(visitor)
+        visitor.press("Got it")
+        shows = _show_failure(page, visitor) if case.refused else _show_drive(page)
+        time.sleep(SETTLE)  # what changes while a page opens may be drawn once more
+        page.requests.add(lambda: setattr(page.drive_tab, "outdated", True))
+        time.sleep(SETTLE)
+        file.write_bytes(visitor.tab.screenshot())
+        visitor.tab.close()
+    finally:
+        page.close()
+    return shows
+
+
+def _close_notice(visitor: Visitor) -> None:
+    """Close the browser's notice that it draws without a graphics card."""
+    notice = visitor.tab.get_by_text("Software WebGL rendering detected")
+    notice.wait_for()
+    notice.locator("xpath=ancestor::*[.//button][1]").get_by_role("button").first.click()
+    notice.wait_for(state="detached")
+
+
+def _show_failure(page: Page, visitor: Visitor) -> str:
+    """Show the first candidate that a wheel refuses, at its failure; return what fails."""
+    session = page.session
+    for index in range(len(session.candidates)):
+        if session.candidates[index].verdict.traversable:
+            continue
+        page.requests.add(lambda index=index: session.show_candidate(index))
+        wait_until(lambda index=index: session.shown.index == index, "the path")
+        wait_until(lambda: not page.is_busy, "its verdicts")
+        failure = explain(session.finished).failure
+        if failure is not None and failure.link in WHEELS:
+            visitor.press("Go to the failure")
+            at = min(failure.time, page.playback.duration)
+            wait_until(lambda at=at: abs(page.playback.time - at) < 1e-6, "the failure")
+            return failure.headline
+    raise AssertionError("no candidate is refused because of a wheel")
+
+
+def _show_drive(page: Page) -> str:
+    """Show the rover after a third of its drive."""
+    page.requests.add(lambda: page.playback.seek(page.playback.duration / 3.0))
+    page.requests.add(lambda: setattr(page.drive_tab, "outdated", True))
+    return page.session.shown.summary
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="folder of the pictures")
+    parser.add_argument("names", nargs="*", help="pictures to write (default: all)")
+    arguments = parser.parse_args()
+    for line in write_pictures(arguments.folder, arguments.names):
+        print(line, flush=True)

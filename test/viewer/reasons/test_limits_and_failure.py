@@ -1,0 +1,278 @@
+"""Why and where a path is refused: limits along it, the failure, candidates, before and after."""
+
+import numpy as np
+import pytest
+
+from rover_physics.names import OPTIMAL, SERVO, WHEELS
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.status import PoseStatus
+from rover_physics.traversability.judge_path import judge_path
+from rover_planner.viewer.state.reasons.before_after import (
+    ChangeHistory,
+    compare_drives,
+    list_changes,
+)
+from rover_planner.viewer.state.reasons.candidate_rows import list_candidates, place_numbers
+from rover_planner.viewer.state.reasons.explanation import explain
+from rover_planner.viewer.state.reasons.failure import Failure, find_failure, place_wheels
+from rover_planner.viewer.state.reasons.path_limits import (
+    PathLimits,
+    Use,
+    along_rows,
+    find_path_limits,
+)
+from rover_planner.viewer.state.reasons.worst import find_worst
+from support.grounds import gap, make_terrain, wall_at, waves
+from support.viewer.sessions import LSR1, ramp, session_on, straight
+
+
+def stepped(x, y):
+    """Return waves with a low step up, which wheels climb between waypoints."""
+    return waves(x, y) + 0.05 * (x > 0.3)
+
+
+def judged_on(height, rover=LSR1, poses=None, **options):
+    """Return the prediction and the verdict on a straight path over a ground."""
+    terrain = make_terrain(height)
+    poses = straight() if poses is None else poses
+    return judge_path(rover, terrain, poses, SweepOptions(**options))
+
+
+def limits_on(height, **options) -> PathLimits:
+    return find_path_limits(LSR1, *judged_on(height, **options))
+
+
+def failure_on(height, poses=None, **options) -> Failure | None:
+    prediction, verdict = judged_on(height, poses=poses, **options)
+    limits = find_path_limits(LSR1, prediction, verdict)
+    return find_failure(LSR1, make_terrain(height), prediction, verdict, limits)
+
+
+# Limits along a path.
+
+
+def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
+    prediction, verdict = judged_on(waves)
+    limits = find_path_limits(LSR1, prediction, verdict)
+    at = ~limits.rows.is_between
+    np.testing.assert_array_equal(
+        limits.lane("friction").values[at], prediction.friction_utilisation.max(axis=1)
+    )
+    np.testing.assert_allclose(limits.lane("belly").values[at], 100.0 * prediction.belly_clearance)
+    wheels = limits.lane("torque").wheel[at]
+    np.testing.assert_array_equal(wheels, prediction.torque_saturation.argmax(axis=1))
+
+
+def test_rows_are_in_the_order_of_the_path_with_the_poses_between_in_their_places():
+    prediction, verdict = judged_on(stepped)
+    rows = find_path_limits(LSR1, prediction, verdict).rows
+    assert rows.is_between.any()
+    assert (np.diff(rows.distance) >= 0.0).all() and (np.diff(rows.time) >= 0.0).all()
+    between = prediction.between
+    for k in np.flatnonzero(rows.is_between):
+        start = prediction.poses[0, :2]
+        driven = np.linalg.norm(between.poses[rows.row[k], :2] - start)
+        assert rows.distance[k] == pytest.approx(driven, abs=1e-3)
+
+
+@pytest.mark.parametrize("policy", ["equal", OPTIMAL, SERVO])
+@pytest.mark.parametrize("height", [waves, ramp, stepped, wall_at(0.5), gap])
+def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(height, policy):
+    prediction, verdict = judged_on(height, policy=policy, friction=0.5)
+    limits = find_path_limits(LSR1, prediction, verdict)
+    broken = np.any([lane.use == Use.BROKEN for lane in limits.lanes], axis=0)
+    refused = set(np.unique(limits.rows.waypoint[broken]).tolist())
+    first = verdict.first_failure
+    assert refused == ({first} if first >= 0 else set())
+
+
+def test_a_limit_is_used_by_its_share_and_fully_where_it_is_broken():
+    limits = limits_on(wall_at(0.5))
+    for lane in limits.lanes:
+        used = lane.used[(lane.use == Use.KEPT) & ~np.isnan(lane.used)]
+        assert (used <= 1.0 + 1e-6).all(), lane.limit.title
+    friction = limits.lane("friction")
+    known = ~np.isnan(friction.values)
+    np.testing.assert_allclose(friction.used[known], friction.values[known] / friction.limit.bound)
+
+
+def test_the_worst_so_far_grows_and_ends_with_the_extremes_of_the_verdict():
+    prediction, verdict = judged_on(waves)
+    limits = find_path_limits(LSR1, prediction, verdict)
+    times = np.linspace(0.0, prediction.time[-1], 7)
+    used = np.array([[one.used for one in find_worst(limits, time)] for time in times])
+    assert (np.diff(used, axis=0) >= 0.0).all()
+    last = {one.title: one for one in find_worst(limits, prediction.time[-1])}
+    assert last["friction"].value == f"{verdict.max_friction_utilisation:.2f}"
+    assert last["margin"].value == f"{verdict.min_tip_over_ratio:.2f}"
+    assert last["tilt"].value == f"{np.degrees(verdict.max_tilt):.1f}"
+
+
+# The failure.
+
+
+def test_a_path_that_can_be_driven_has_no_failure():
+    assert failure_on(waves) is None
+
+
+def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
+    failure = failure_on(ramp, friction=0.3)
+    prediction, verdict = judged_on(ramp, friction=0.3)
+    assert failure is not None and failure.code == verdict.code == "friction"
+    assert failure.link in WHEELS and failure.link in verdict.reason
+    assert f"{failure.value:.2f}, limit 1.00" in verdict.reason
+    assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
+    row = verdict.first_failure
+    assert failure.distance == pytest.approx(prediction.distance[row], abs=0.021)
+
+
+def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():
+    prediction, verdict = judged_on(wall_at(0.5))
+    failure = failure_on(wall_at(0.5))
+    assert failure is not None
+    assert verdict.reason.startswith("on the way here") == failure.is_between
+    if failure.is_between:
+        first = verdict.first_failure
+        before, after = prediction.distance[first - 1 : first + 1]
+        assert before < failure.distance < after
+        rows = prediction.between.waypoint == first
+        assert any(
+            np.allclose(failure.state.position, place)
+            for place in prediction.between.position[rows]
+        )
+
+
+def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
+    failure = failure_on(gap)
+    assert failure is not None and failure.code == "unknown_ground"
+    assert not failure.is_settled and failure.link.startswith("front")
+    assert failure.headline.startswith("unknown ground, front")
+    np.testing.assert_allclose(failure.state.attitude[:2], 0.0)
+
+
+def test_wheels_on_flat_ground_are_where_the_prediction_has_them():
+    prediction, _ = judged_on(lambda x, y: 0.0 * x)
+    offsets = prediction.wheel_centres[0] - prediction.position[0]
+    np.testing.assert_allclose(place_wheels(LSR1), offsets, atol=1e-6)
+
+
+@pytest.mark.parametrize("policy", ["equal", OPTIMAL, SERVO])
+def test_every_refused_path_has_a_failure_with_words(policy):
+    for height in (ramp, wall_at(0.5), gap, lambda x, y: 0.9 * x, lambda x, y: 0.6 * y):
+        prediction, verdict = judged_on(height, policy=policy, friction=0.4)
+        failure = failure_on(height, policy=policy, friction=0.4)
+        assert (failure is None) == verdict.traversable
+        if failure is not None:
+            assert failure.headline and np.isfinite(failure.state.position).all()
+            assert failure.is_settled == (
+                prediction.status[verdict.first_failure] == PoseStatus.SETTLED
+            )
+
+
+# Candidates.
+
+
+def test_a_row_of_a_candidate_has_the_numbers_of_its_verdict():
+    session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
+    rows = list_candidates(session.candidates, session.answer.nearest, [False] * 5)
+    for row, candidate in zip(rows, session.candidates, strict=True):
+        verdict = candidate.verdict
+        assert row.traversable == verdict.traversable and row.reason == verdict.reason
+        assert row.length == candidate.length
+        assert row.driven < row.length or row.traversable
+        assert row.utilisation == verdict.max_friction_utilisation
+        assert row.margin == verdict.min_tip_over_ratio
+    assert [row.number for row in rows if row.is_best] == [session.answer.nearest + 1]
+
+
+def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():
+    session = session_on(waves)
+    paths = [candidate.poses[:, :2] for candidate in session.candidates]
+    taken = np.array([session.start[:2], session.goal[:2]])
+    places = place_numbers(paths, taken)
+    for path, place in zip(paths, places, strict=True):
+        assert np.linalg.norm(path - place, axis=1).min() < 0.03
+    both = np.concatenate([places, taken])
+    away = np.linalg.norm(both[:, None] - both[None], axis=2)
+    assert away[~np.eye(len(both), dtype=bool)].min() > 0.4
+
+
+# Before and after.
+
+
+def changed(session, friction: float) -> None:
+    session.change_rover([("friction",)], friction)
+
+
+def test_the_rover_before_is_the_last_one_for_which_all_paths_were_judged():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    first = session.finished
+    for friction in (0.7, 0.65, 0.6):  # a slider that is dragged
+        changed(session, friction)
+        history.take(session.finished)
+        assert history.reference_for(session.finished) is first
+    session.plan_again()
+    history.take(session.finished)
+    assert history.reference_for(session.finished).scenario.rover.friction == 0.8
+    changed(session, 0.5)
+    history.take(session.finished)
+    assert history.reference_for(session.finished).scenario.rover.friction == 0.6
+
+
+def test_undo_goes_back_rover_by_rover():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    for friction in (0.7, 0.6):
+        changed(session, friction)
+        session.plan_again()
+        history.take(session.finished)
+    assert history.undo().scenario.rover.friction == 0.7
+    assert history.undo().scenario.rover.friction == 0.8
+    assert history.undo() is None
+
+
+def test_another_goal_begins_the_history_anew():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    changed(session, 0.7)
+    session.plan_again()
+    history.take(session.finished)
+    session.plan_to(np.array([0.5, 0.5]))
+    history.take(session.finished)
+    assert history.before is None and history.reference_for(session.finished) is None
+
+
+def test_changed_numbers_and_differences_of_the_drive_are_those_of_the_rovers():
+    session = session_on(ramp)
+    before = session.shown.trajectory
+    changed(session, 0.4)
+    assert list_changes(session.wanted.loaded, session.rover) == {"friction [-]": (0.8, 0.4)}
+    found = {one.name: one for one in compare_drives(before, session.shown.trajectory)}
+    friction = found["friction, largest"]
+    assert friction.before == before.verdict.max_friction_utilisation
+    assert friction.after == session.shown.verdict.max_friction_utilisation
+    assert found["driven"].change < 0.0
+
+
+def test_the_explanation_of_a_judgement_has_limits_and_failure_of_its_shown_path():
+    session = session_on(ramp)
+    assert explain(session.finished).failure is None
+    changed(session, 0.4)
+    why = explain(session.finished)
+    assert why.failure is not None and why.failure.code == session.shown.verdict.code
+    assert why.failure_at == why.failure.distance <= why.limits.path_length
+    assert why.limits.end >= why.failure.distance
+
+
+def test_values_along_the_rows_have_the_peak_between_waypoints_for_which_a_path_is_refused():
+    prediction, verdict = judged_on(wall_at(0.5))
+    rows = find_path_limits(LSR1, prediction, verdict).rows
+    values = along_rows(rows, prediction, "friction_utilisation")
+    at, between = ~rows.is_between, rows.is_between
+    np.testing.assert_array_equal(
+        values[at], prediction.friction_utilisation[: verdict.first_failure + 1]
+    )
+    np.testing.assert_array_equal(
+        values[between], prediction.between.friction_utilisation[rows.row[between]]
+    )

@@ -1,0 +1,298 @@
+"""What the panels and the scene show of reasons: lanes, table, changes, board, scale, halos."""
+
+import dataclasses
+import itertools
+import re
+
+import numpy as np
+import pytest
+
+from rover_physics.names import WHEELS
+from rover_planner.figures.wheel_colours import WHEEL_COLOURS
+from rover_planner.viewer.panel.board import FONT, BoardNotes, draw_board
+from rover_planner.viewer.panel.plots import (
+    MAX_POINTS,
+    Curves,
+    _resample,
+    add_cursor,
+    add_mark,
+    choose_rows,
+)
+from rover_planner.viewer.panel.reasons.candidate_table import draw_candidates
+from rover_planner.viewer.panel.reasons.changes import draw_changes
+from rover_planner.viewer.panel.reasons.colour_scale import draw_scale
+from rover_planner.viewer.panel.reasons.lanes import BROKEN, COLOURS, WIDTH, classify, draw_lanes
+from rover_planner.viewer.state import colours
+from rover_planner.viewer.state.colours import (
+    CASING,
+    MIN_CONTRAST,
+    ColourScale,
+    blend,
+    choose_halo,
+    find_contrast,
+    map_colours,
+)
+from rover_planner.viewer.state.layers import LAYERS, predict_layer
+from rover_planner.viewer.state.reasons.before_after import Difference
+from rover_planner.viewer.state.reasons.candidate_rows import list_candidates
+from rover_planner.viewer.state.reasons.explanation import explain
+from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.survey_layers import list_class_colours, list_limit_colours
+from support.grounds import make_terrain, wall_at, waves
+from support.viewer.sessions import LSR1, ramp, session_on
+
+pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
+
+from rover_planner.viewer.scene.ground_mesh import (
+    HATCH_SHADE,
+    LINE_SHADE,
+    build_ground_mesh,
+)
+from rover_planner.viewer.scene.link_outline import outline_link
+from rover_planner.viewer.scene.overlays import FADE, WHITE
+
+
+@pytest.fixture(scope="module")
+def refused():
+    """A session whose shown path is refused by a wheel that slips."""
+    session = session_on(ramp)
+    session.change_rover([("friction",)], 0.4)
+    return session
+
+
+# Lanes.
+
+
+def test_lanes_have_a_strip_for_each_limit_that_is_broken_where_the_path_fails(refused):
+    why = explain(refused.finished)
+    drawing = draw_lanes(why.limits)
+    for k, lane in enumerate(why.limits.lanes):
+        assert f'y="{14 * k + 1}"' in drawing, lane.limit.title
+    strips = re.findall(
+        rf'x="([\d.]+)"[^>]*width="([\d.]+)"[^>]*fill="{COLOURS[BROKEN]}"', drawing
+    )
+    assert strips
+    left, width = map(float, strips[-1])
+    assert left <= WIDTH * why.failure.distance / why.limits.end <= left + width + 0.5
+    assert why.failure.headline.split(",")[0] in drawing
+
+
+def test_the_classes_of_a_lane_follow_the_used_share(refused):
+    lane = explain(refused.finished).limits.lane("friction")
+    kinds = classify(lane)
+    assert kinds[-1] == BROKEN
+    kept = kinds < BROKEN
+    assert (np.digitize(lane.used[kept], [0.5, 0.8], right=True) == kinds[kept]).all()
+
+
+def test_the_mark_of_a_failure_leaves_the_curves_as_they_are():
+    x, values = np.linspace(0.0, 4.0, 9), np.column_stack([np.arange(9.0)])
+    columns = add_mark(add_cursor(x, values, 1.25, None, 0.0), 3.1, 0.0)
+    at, curve, mark, cursor = columns
+    assert all(np.isfinite(column).all() for column in columns)
+    assert (np.diff(at) >= 0.0).all()
+    np.testing.assert_allclose(curve, 2.0 * at)
+    assert at[np.argmax(mark)] == 3.1 and at[np.argmax(cursor)] == 1.25
+    *_, none, _ = add_mark(add_cursor(x, values, 1.25, None, 0.0), None, 0.0)
+    assert none.max() == 0.0
+
+
+def test_curves_before_are_at_their_distances_and_end_hidden_behind_those_of_now():
+    before = Curves(np.array([0.0, 1.0]), {"wheel_loads": np.tile([[10.0], [20.0]], 6)})
+    x, now = np.array([0.0, 0.5, 1.0, 2.0]), np.full((4, 6), 7.0)
+    old = _resample(before, "wheel_loads", x, now)
+    np.testing.assert_allclose(old[:, 0], [10.0, 15.0, 20.0, 7.0])
+
+
+# Tables.
+
+
+def test_the_table_has_a_row_for_each_candidate_with_its_numbers_and_marks_the_shown_one():
+    session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
+    rows = list_candidates(session.candidates, session.answer.nearest, [False] * 5)
+    text = draw_candidates(rows, 1)
+    assert [int(n) for n in re.findall(r'<tr data-path="(\d)"', text)] == [1, 2, 3, 4, 5]
+    for row in rows:
+        assert f"{row.driven:.2f} / {row.length:.2f}" in text and f"{row.energy:.1f}" in text
+    assert text.count("background:rgba") == 1
+    marked = text[text.index("background:rgba") - 40 : text.index("background:rgba")]
+    assert 'tbody data-path="2"' in marked and text.count('aria-selected="true"') == 1
+
+
+def test_changes_are_listed_with_their_differences():
+    text = draw_changes({"friction [-]": (0.8, 0.4)}, [Difference("energy", "J", 10.0, 12.5, 1)])
+    for word in ("friction", "0.8", "0.4", "-0.4", "energy [J]", "10.0", "12.5", "+2.5"):
+        assert f">{word}<" in text
+
+
+def test_what_a_change_leaves_the_same_takes_no_place():
+    same, other = Difference("time", "s", 10.0, 10.0, 1), Difference("tilt", "deg", 3.0, 4.0, 1)
+    text = draw_changes({"friction [-]": (0.8, 0.4)}, [same, other])
+    assert "tilt [deg]" in text and "time" not in text
+    assert "the drive is the same as before" in draw_changes({}, [same])
+
+
+# The board.
+
+
+def test_the_board_shows_the_papers_traction_ratio_on_firm_ground_and_slip_on_soil(refused):
+    state = refused.shown.trajectory.state_at(20.0)
+    ratio = np.abs(state.tangential) / (state.friction * state.wheel_loads)
+    firm = draw_board(LSR1, state, BoardNotes(has_slip=False))
+    for value in ratio:
+        assert f"<title>T/(&mu;N) {value:.2f}</title>" in firm
+    assert "slip" not in firm
+    assert "T/(&mu;N)" not in draw_board(LSR1, state, BoardNotes(has_slip=True))
+    assert not refused.shown.trajectory.has_slip
+    soft = session_on(waves)
+    soft.change_options(soil="dry_sand")
+    assert soft.shown.trajectory.has_slip
+
+
+def test_nothing_on_the_board_is_written_smaller_than_12_px(refused):
+    why = explain(refused.finished)
+    state = refused.shown.trajectory.state_at(20.0)
+    worst = find_worst(why.limits, 20.0)
+    board = draw_board(LSR1, state, BoardNotes(False, worst, why.failing_link))
+    sizes = [float(size) for size in re.findall(r'font-size="([\d.]+)"', board)]
+    assert sizes and min(sizes) >= FONT == 12
+
+
+def test_the_board_outlines_the_link_that_fails(refused):
+    state = refused.shown.trajectory.state_at(20.0)
+    for link in (*WHEELS, "body", "rocker_left", "bogie_right"):
+        assert draw_board(LSR1, state, BoardNotes(failing=link)).count('data-failing="true"') == 1
+    assert 'data-failing="true"' not in draw_board(LSR1, state, BoardNotes())
+
+
+def test_the_board_lists_limits_and_the_worst_so_far(refused):
+    why = explain(refused.finished)
+    trajectory = refused.shown.trajectory
+    state = trajectory.state_at(trajectory.duration)
+    worst = find_worst(why.limits, trajectory.duration)
+    board = draw_board(LSR1, state, BoardNotes(False, worst))
+    text = re.sub(r"<[^>]*>", "", board)
+    assert f"{why.failure.value:.2f}max 1.00" in text
+
+
+# The scene.
+
+
+def test_every_link_has_an_outline_at_its_place(refused):
+    state = refused.shown.trajectory.state_at(20.0)
+    for k, wheel in enumerate(WHEELS):
+        outline = outline_link(LSR1, state, wheel)
+        np.testing.assert_allclose(
+            outline[:64].reshape(-1, 3).mean(axis=0), state.wheel_centres[k], atol=0.01
+        )
+    for link in ("body", "rocker_left", "bogie_right"):
+        outline = outline_link(LSR1, state, link)
+        away = np.linalg.norm(outline.reshape(-1, 3) - state.position, axis=1)
+        assert len(outline) and away.max() < 1.0
+    assert len(outline_link(LSR1, state, "")) == 0
+
+
+def ground_colours() -> set[tuple[int, int, int]]:
+    """Return the colours that the ground can have on any layer, in all its shades.
+
+    Also those of the layers of a survey, whose numbers have the same scale.
+    """
+    scale = {tuple(c) for c in map_colours(np.linspace(0.0, 1.0, 65), 0.0, 1.0).tolist()}
+    names = ("GOOD", "BEYOND", "UNKNOWN", "PASSABLE", "REFUSED", "SEARCHED")
+    scale |= {getattr(colours, name) for name in names}
+    scale |= {*list_class_colours(), *list_limit_colours()}
+    shades = np.linspace(0.3 * LINE_SHADE * HATCH_SHADE, 1.25, 12)
+    return {
+        tuple(np.minimum(np.multiply(colour, shade), 255).astype(int).tolist())
+        for colour in scale
+        for shade in shades
+    }
+
+
+def test_lines_stand_out_from_the_ground_on_every_layer():
+    lines = (
+        colours.PASSABLE,
+        colours.REFUSED,
+        colours.UNKNOWN,
+        blend(colours.REFUSED, WHITE, FADE),
+    )
+    for line in lines:
+        rings = [*choose_halo(line), line]
+        for outer, inner in itertools.pairwise(rings):
+            assert find_contrast(outer, inner) >= MIN_CONTRAST
+        for ground in ground_colours():
+            best = max(find_contrast(ground, ring) for ring in rings)
+            assert best >= MIN_CONTRAST, (line, ground)
+
+
+def test_the_contrast_of_black_and_white_is_21():
+    assert find_contrast((0, 0, 0), (255, 255, 255)) == pytest.approx(21.0)
+    assert find_contrast(CASING, CASING) == 1.0
+
+
+# Layers.
+
+
+def test_layers_with_limits_have_them_on_their_scales():
+    ground = make_terrain(waves, half=2.0)
+    for name, layer in LAYERS.items():
+        scale = build_ground_mesh(LSR1, ground, name).scale
+        assert (scale.limit is not None) == (layer.limit is not None)
+        if scale.limit is not None:
+            assert scale.low <= scale.limit <= scale.high
+            text = draw_scale(name, scale)
+            assert 'id="limit"' in text and f"limit {scale.limit:.2f}" in text
+
+
+def test_ground_beyond_a_limit_is_vermillion_and_hatched():
+    def picture(friction: float) -> np.ndarray:
+        rover = dataclasses.replace(LSR1, friction=friction)
+        mesh = build_ground_mesh(rover, make_terrain(lambda x, y: 0.35 * x, half=2.0),
+                                 "friction utilisation")  # fmt: skip
+        texture = np.asarray(mesh.mesh.visual.material.baseColorTexture).astype(float)
+        return texture.reshape(-1, 3)
+
+    slips, holds = picture(0.2), picture(2.0)
+    is_red = (slips[:, 0] > 1.8 * slips[:, 1]) & (slips[:, 2] < 0.2 * slips[:, 0])
+    assert is_red.mean() > 0.3
+    assert not ((holds[:, 0] > 1.8 * holds[:, 1]) & (holds[:, 2] < 0.2 * holds[:, 0])).any()
+    assert slips[is_red, 0].min() < 0.7 * slips[is_red, 0].max()
+
+
+def test_classes_have_a_legend_instead_of_numbers():
+    scale = build_ground_mesh(LSR1, make_terrain(waves, half=2.0), "passable or not").scale
+    text = draw_scale("passable or not", scale)
+    for words in ("keeps all limits", "breaks a limit", "cannot stand"):
+        assert words in text
+    assert "gradient(90deg" not in text and "1.00" not in text
+
+
+def test_a_layer_along_a_path_has_the_heading_of_its_nearest_waypoint():
+    ground = make_terrain(lambda x, y: 0.2 * x + 0.1 * y, half=2.0)
+    path = np.array([[-1.0, 0.0, 0.4], [1.0, 0.0, -1.1]])
+    at = np.array([-0.6, 0.7]), np.array([0.2])
+    tilt = LAYERS["torque saturation"]
+    options = session_on(waves).sweep_options()
+    along = predict_layer(tilt, LSR1, ground, path, at, options)
+    for column, yaw in enumerate((0.4, -1.1)):
+        fixed = predict_layer(tilt, LSR1, ground, yaw, at, options)
+        assert along[0, column] == fixed[0, column]
+
+
+def test_a_scale_without_a_limit_has_no_mark():
+    assert 'id="limit"' not in draw_scale("height", ColourScale(0.0, 1.0, "m"))
+
+
+def test_wheels_have_one_colour_in_every_picture():
+    from rover_planner.figures import plots
+    from rover_planner.viewer.panel import plots as page_plots
+
+    assert plots.WHEEL_COLOURS is page_plots.WHEEL_COLOURS is WHEEL_COLOURS
+
+
+def test_a_plot_keeps_first_and_last_point_and_every_peak():
+    values = np.sin(np.linspace(0.0, 3.0, 1000))[:, None] * np.ones(6)
+    values[437, 2], values[811, 4] = 9.0, -7.0
+    rows = choose_rows(values)
+    assert {0, 437, 811, 999} <= set(rows.tolist()) and len(rows) <= MAX_POINTS
+    np.testing.assert_array_equal(choose_rows(values[:50]), np.arange(50))
