@@ -14,7 +14,7 @@ PACKAGES := rover_physics msg_adapters rover_planner
 MAP ?=
 # One more than there are cores: many tests wait for a rover that drives.
 WORKERS ?= $(shell echo $$(( $$(nproc) + 1 )))
-BROWSER_TESTS := $(addprefix test/viewer/test_,page.py page_background.py page_ways.py live_page.py)
+BROWSER_TESTS := $(shell grep -rl needs_browser test --include="test_*.py")
 # Tests, demo and nodes talk to this machine only.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -34,7 +34,8 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 .PHONY: test
 test: lint kernels ## lint, type check and all tests
 	@echo "== tests"
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(addprefix --ignore=,$(BROWSER_TESTS)) test
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder \
+	  $(addprefix --ignore=,$(BROWSER_TESTS)) test
 	echo "== tests of the page, alone: a browser without a graphics card needs all cores"
 	$(BIN)/python -m pytest $(BROWSER_TESTS)
 

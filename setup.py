@@ -13,7 +13,8 @@ HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link t
 # it, its pydantic is version 1, and its typer is 0.9, which knows no `float | None`. 0.18 is the
 # first typer that works with every click it allows. constraints-lowest.txt holds the lowest
 # versions; a test installs them.
-# Upper bounds: the next version that may break. constraints.txt holds the versions tested.
+# Upper bounds: the next version that may break; of viser also parts that are not public are used
+# (viewer/browser/channel.py). constraints.txt holds the versions tested.
 REQUIRES = [
     "numpy>=1.26,<3",
     "scipy>=1.11,<2",
@@ -32,7 +33,7 @@ EXTRAS = {
         "ros-jazzy-rmw-fastrtps-cpp>=8.4,<9",
     ],
     "plots": ["matplotlib>=3.6,<4"],
-    "view": ["viser>=1.1,<2", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
+    "view": ["viser>=1.1.1,<1.2", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
     "bags": ["rosbags>=0.11,<1"],
     "survey": [
         "dask>=2024.8,<2027",
@@ -43,7 +44,7 @@ EXTRAS = {
     ],
     "test": [
         "pytest>=7.4,<10",
-        "pytest-xdist>=3.4,<4",
+        "pytest-xdist>=3.7,<4",
         "hypothesis>=6.98,<7",
         "playwright>=1.48,<2",
         "mujoco>=3.2,<5",
@@ -69,10 +70,10 @@ def read_version() -> str:
 
 
 def list_data_files() -> list[tuple[str, list[str]]]:
-    """List what goes to share/: package manifest, ament marker, configuration, launch files."""
+    """List what goes to share/: manifest, ament marker, configuration, examples, launch files."""
     share = f"share/{NAME}"
     folders = {share: ["package.xml"]}
-    for top in ("config", "launch"):
+    for top in ("config", "examples", "launch"):
         for path in sorted((HERE / top).rglob("*")):
             if path.is_file():
                 relative = path.relative_to(HERE)

@@ -10,6 +10,25 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 settings.register_profile("untimed", deadline=None)  # no test fails because a machine is busy
 settings.load_profile("untimed")
 
+LONGEST = (
+    "test_docs_blocks",
+    "test_drive_around",
+    "test_warm_up",
+    "test_lowest_versions",
+    "test_survey_command",
+    "test_benchmarks",
+    "test_workspace",
+    "test_reliability",
+)
+"""Files that take minutes. They begin first, so that none is left alone on one core at the end."""
+
+
+def pytest_collection_modifyitems(items):
+    """Put the files that take longest in front; the others keep their order."""
+    last = len(LONGEST)
+    rank = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.stem, last))
+
 
 @pytest.fixture(scope="session")
 def real_map():

@@ -120,6 +120,7 @@ def _ask(
     """Search the way, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
     from rover_planner.nodes.warm_up import search_ways
+    from rover_planner.planning.assumptions import assume
     from rover_planner.planning.ways.way_report import report_way
     from rover_planner.planning.ways.way_search import find_way
     from rover_planner.shell.progress import show_progress
@@ -131,7 +132,15 @@ def _ask(
         answer = find_way(question, settings)
     if answer.path is not None:
         on_soil = question.options.soil is not None or bool(question.terrain.soil_names)
-        write_prediction(out, answer.path.prediction, answer.path.verdict, on_soil=on_soil)
+        options = question.options.sweep_options(question.joint_angles)
+        assumed = assume(question.rover, options, question.options.map_sigmas)
+        write_prediction(
+            out,
+            answer.path.prediction,
+            answer.path.verdict,
+            on_soil=on_soil,
+            assumptions=assumed,
+        )
     if picture is not None:
         from rover_planner.figures.way_picture import draw_way
 

@@ -96,6 +96,7 @@ def predict(
         write_prediction,
         writing_parts,
     )
+    from rover_planner.planning.assumptions import assume
     from rover_planner.shell.progress import show_progress
 
     model = load_rover(rover)
@@ -114,6 +115,7 @@ def predict(
         tool_moment=tool_moment,
     )
     on_soil = soil is not None or bool(ground.soil_names)
+    assumed = assume(model, options, sigmas)
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
 
@@ -124,7 +126,7 @@ def predict(
             return find_torque_ranges(model, ground, path, options, curvature)
 
         if len(path) > MAX_IN_MEMORY and not classes:
-            with writing_parts(out, len(path), on_soil) as file:
+            with writing_parts(out, len(path), on_soil, assumed) as file:
                 if curvature is None:
                     verdict = judge_long_path(
                         model, ground, path, options, sigmas=sigmas, take=file.take
@@ -154,7 +156,13 @@ def predict(
                     curvature=curvature,
                 )
             write_prediction(
-                out, prediction, verdict, on_soil=on_soil, classes=found, ranges=find_ranges()
+                out,
+                prediction,
+                verdict,
+                on_soil=on_soil,
+                classes=found,
+                ranges=find_ranges(),
+                assumptions=assumed,
             )
     typer.echo(f"wrote {out}: {_summarise(len(path), verdict)}")
 

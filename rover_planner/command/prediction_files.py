@@ -19,6 +19,11 @@ from rover_physics.traversability.classification import ClassifiedWaypoint
 from rover_physics.traversability.torque_ranges import TorqueRanges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
+from rover_planner.planning.assumptions import (
+    Assumptions,
+    read_assumptions,
+    write_assumptions,
+)
 
 Shape = tuple[int, ...]
 
@@ -82,6 +87,10 @@ BLOCK = 10_000
 """Number of reasons that are written at a time."""
 MAX_REASONS = 200_000_000
 """Largest size of the reasons in a file [bytes]."""
+ASSUMPTIONS = "assumptions"
+"""Array () of a text: what the prediction was made for."""
+MAX_ASSUMPTIONS = 100_000
+"""Its largest size [bytes]."""
 
 
 def read_poses(path: Path) -> NDArray[np.float64]:
@@ -156,6 +165,25 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
     return PathPrediction(**arrays, waypoint=np.arange(len(reasons)), **rest), reasons
 
 
+def read_recorded_assumptions(path: Path) -> Assumptions | None:
+    """Read what the prediction in a file was made for; None if the file does not tell.
+
+    Raises:
+        PlanningError: The file is missing, or the assumptions are invalid.
+    """
+    with _errors_of(path), open_npz(path) as archive:
+        if ASSUMPTIONS not in archive.names:
+            return None
+        header = archive.read_header(ASSUMPTIONS)
+        if header.dtype.kind != "U" or header.shape != ():
+            raise RoverFileError("assumptions must be one text")
+        text = str(archive.read(ASSUMPTIONS, most=MAX_ASSUMPTIONS))
+    try:
+        return read_assumptions(text)
+    except PlanningError as error:
+        raise PlanningError(f"{show_file(path)}: {error}") from None
+
+
 @contextmanager
 def _errors_of(path: Path) -> Iterator[None]:
     """Turn the errors of files into a PlanningError that names the file."""
@@ -212,6 +240,7 @@ def write_prediction(
     on_soil: bool = False,
     classes: Sequence[ClassifiedWaypoint] | None = None,
     ranges: TorqueRanges | None = None,
+    assumptions: Assumptions | None = None,
 ) -> None:
     """Write a prediction and its verdict to an .npz file; the file name is not extended.
 
@@ -227,39 +256,50 @@ def write_prediction(
         classes: Class of each waypoint, written as `traversability_class`, `class_constraint` and
             `class_wheel` (n,) text and `class_margin` (n,).
         ranges: Torque ranges, written as `torque_range` (n, 6, 2), minimum and maximum [N m].
+        assumptions: What the prediction was made for, written as `assumptions` () text, JSON.
 
     Raises:
         PlanningError: The file cannot be written.
     """
     arrays = _rows_of(prediction, on_soil)
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
+    arrays |= _text_of(assumptions) | _summary_of(verdict, prediction, classes, ranges)
     with _errors_of(path):
-        write_npz(
-            path, arrays | _summary_of(verdict, prediction, classes, ranges), compressed=False
-        )
+        write_npz(path, arrays, compressed=False)
+
+
+def _text_of(assumptions: Assumptions | None) -> dict[str, Any]:
+    """Return the array of the assumptions, if there are any."""
+    return {} if assumptions is None else {ASSUMPTIONS: np.array(write_assumptions(assumptions))}
 
 
 @contextmanager
-def writing_parts(path: Path, count: int, on_soil: bool) -> Iterator["PartsFile"]:
+def writing_parts(
+    path: Path, count: int, on_soil: bool, assumptions: Assumptions | None = None
+) -> Iterator["PartsFile"]:
     """Write a file as `write_prediction`, for a path that is too long to be kept in memory.
 
     Args:
         path: The file; an existing one is overwritten. Temporary files are made beside it.
         count: Number of waypoints.
         on_soil: As for `write_prediction`.
+        assumptions: As for `write_prediction`.
 
     Raises:
         PlanningError: A file cannot be written.
     """
     with _errors_of(path), NpzParts(path.absolute().parent, count) as parts:
-        yield PartsFile(path, parts, on_soil)
+        yield PartsFile(path, parts, on_soil, assumptions)
 
 
 class PartsFile:
     """A file of a prediction whose waypoints come part by part."""
 
-    def __init__(self, path: Path, parts: NpzParts, on_soil: bool):
+    def __init__(
+        self, path: Path, parts: NpzParts, on_soil: bool, assumptions: Assumptions | None
+    ):
         self._path, self._parts, self._on_soil = path, parts, on_soil
+        self._assumptions = assumptions
         self._last: PathPrediction | None = None
 
     def take(self, prediction: PathPrediction) -> None:
@@ -278,9 +318,8 @@ class PartsFile:
             block = np.array(verdict.reasons[first : first + BLOCK], f"<U{longest}")
             self._parts.add({"reason": block})
         summary = _summary_of(verdict, self._last, None, ranges)
-        self._parts.write(
-            self._path, {name: summary[name] for name in summary if not name.endswith("_bounds")}
-        )
+        rest = {name: summary[name] for name in summary if not name.endswith("_bounds")}
+        self._parts.write(self._path, _text_of(self._assumptions) | rest)
 
 
 def _rows_of(prediction: PathPrediction, on_soil: bool) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 
 if TYPE_CHECKING:
-    from rover_planner.survey.reachable import ReachableArea
+    from rover_planner.survey.reach.kept_area import ReachableArea
     from rover_planner.survey.store import SurveyStore
 
 
@@ -39,13 +39,13 @@ def reachable(
         need("matplotlib", "the picture of a survey")
     x, y = _read_place(start)
     from rover_planner.shell.progress import show_progress
-    from rover_planner.survey.reachable import find_reachable
+    from rover_planner.survey.reach.reachable import find_reachable
     from rover_planner.survey.store import SurveyStore
 
     opened = SurveyStore(store)
     with show_progress() as progress:
-        progress("search what can be reached")
-        area = find_reachable(opened, x, y)
+        progress("load the survey")
+        area = find_reachable(opened, x, y, report=progress)
     if geotiff is not None:
         from rover_planner.survey.geotiff import write_cog
 
@@ -61,16 +61,15 @@ def _report(store: "SurveyStore", area: "ReachableArea") -> dict[str, Any]:
     """Return what is printed."""
     notes = store.notes
     farthest = area.farthest
-    place, longest = None, None
+    place = None
     if farthest is not None:
         left, low = notes.frame.origin
         place = [left + farthest[1] * notes.cell, low + farthest[0] * notes.cell]
-        longest = round(float(area.distance[farthest]), 3)
     return {
         "cells": area.cells,
         "area": round(area.area, 6),
         "cells_without_return": area.reached - area.cells,
-        "longest": longest,
+        "longest": None if area.longest is None else round(area.longest, 3),
         "farthest": place,
         "turns": "judged" if notes.turns else "assumed",
     }

@@ -51,6 +51,9 @@ def replay(
     map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="PointCloud2 or GridMap.")] = "",
     joints_topic: Annotated[str, typer.Option(metavar="TOPIC", help="JointState.")] = "",
     odometry_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Odometry.")] = "",
+    imu_topic: Annotated[
+        str, typer.Option(metavar="TOPIC", help="Imu, for the parameter imu_attitude.")
+    ] = "",
     path_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Path to check.")] = "",
 ) -> None:
     """Answer the questions of a bag again and write the predictions as MCAP and .npz.
@@ -74,6 +77,7 @@ def replay(
         bag_reader.MAP: map_topic,
         bag_reader.JOINTS: joints_topic,
         bag_reader.ODOMETRY: odometry_topic,
+        bag_reader.IMU: imu_topic,
         bag_reader.PATH: path_topic,
     }
     with bag_reader.open_bag(bag, topics) as source:
@@ -141,14 +145,21 @@ class _Results:
         """Write prediction and measurements of an answer; return what is told of them."""
         from rover_physics.files.npz_file import write_npz
         from rover_planner.command.prediction_files import write_prediction
+        from rover_planner.planning.answering.service_settings import load_service_settings
+        from rover_planner.planning.assumptions import assume
 
         candidate = answer.judgement.candidate
         if candidate is None or answer.terrain is None:
             return {}
         on_soil = bool(self._parameters.soil) or bool(answer.terrain.soil_names)
         file = f"{name}.npz"
+        query = load_service_settings(self._parameters).query
         write_prediction(
-            self._folder / file, candidate.prediction, candidate.verdict, on_soil=on_soil
+            self._folder / file,
+            candidate.prediction,
+            candidate.verdict,
+            on_soil=on_soil,
+            assumptions=assume(self._rover, query.sweep_options(), query.map_sigmas),
         )
         told: dict[str, Any] = {"prediction": file, "waypoints": len(candidate.prediction.poses)}
         if answer.measured is not None:
@@ -221,4 +232,7 @@ def _read_parameters(path: Path | None, given: dict[str, Any]) -> "TraverseServe
     unknown = sorted(content.keys() - known - {"use_sim_time"})
     if unknown:
         raise PlanningError(f"{path}: traverse_server has no parameter {unknown[0]}")
-    return TraverseServerParameters(**{k: v for k, v in content.items() if k in known})
+    values: dict[str, Any] = {name: content[name] for name in known & content.keys()}
+    for name, value in values.items():
+        values[name] = tuple(value) if isinstance(value, list) else value
+    return TraverseServerParameters(**values)

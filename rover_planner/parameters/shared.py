@@ -40,6 +40,18 @@ def steering_sign_parameter() -> str:
     )
 
 
+def base_offset_parameter() -> tuple[float, ...]:
+    """Return the field of the parameter base_offset [m, rad]."""
+    return parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        "x, y, z in m and roll, pitch, yaw in rad of the model's body, midway between the rocker "
+        "pivots, in the robot's frame; starts, goals, paths, plans and odometry are of the "
+        "robot's frame.",
+        bounds=(-100.0, 100.0),
+        read_only=True,
+    )
+
+
 def joint_map_parameter() -> tuple[str, ...]:
     """Return the field of the parameter joint_map."""
     return parameter(

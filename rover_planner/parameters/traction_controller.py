@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from rover_physics.names import CONTROL_POLICIES, OPTIMAL, WHEEL_JOINTS
 from rover_planner.parameters.shared import (
+    base_offset_parameter,
     cell_height_parameter,
     imu_frame_parameter,
     imu_mounting_parameter,
@@ -130,12 +131,18 @@ class TractionControllerParameters(ParameterTable):
     steering_sign: str = steering_sign_parameter()
     joint_map: tuple[str, ...] = joint_map_parameter()
     map_frame: str = parameter(
-        "map", "Frame of map and odometry; messages in another frame are refused.", read_only=True
+        "map",
+        "Frame of the map; odometry in another frame needs a transform of /tf.",
+        read_only=True,
     )
     base_frame: str = parameter(
         "base_link",
         "Frame of the body; odometry of another child frame is refused, an empty one is the body.",
         read_only=True,
+    )
+    base_offset: tuple[float, ...] = base_offset_parameter()
+    transform_timeout: float = parameter(
+        0.5, "Age from which a transform of /tf is refused.", unit="s", bounds=(0.01, 60.0)
     )
     imu_frame: str = imu_frame_parameter()
     imu_mounting: tuple[float, ...] = imu_mounting_parameter()

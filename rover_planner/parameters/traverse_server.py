@@ -6,6 +6,7 @@ from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_planner.parameters.shared import (
     CONTROL_MARGIN,
+    base_offset_parameter,
     cell_height_parameter,
     imu_frame_parameter,
     imu_mounting_parameter,
@@ -29,6 +30,8 @@ MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
 """Values of the parameter unknown_cells."""
+NO_MOUNTS = ("base_link:0:0:0:0:0:0",)
+"""Default of the parameter sensor_mounts, which shows its form and adds no sensor."""
 FAN, LATTICE, AUTO = "fan", "lattice", "auto"
 """Values of the parameter planner."""
 
@@ -111,15 +114,19 @@ class TraverseServerParameters(ParameterTable):
     base_frame: str = parameter(
         "base_link", "Frame of the robot on /tf, where tf2_msgs is installed.", read_only=True
     )
-    base_offset: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        "x, y, z in m and roll, pitch, yaw in rad of the model's body, midway between the rocker "
-        "pivots, in the robot's frame; starts, goals, paths and plans are of the robot's frame.",
-        bounds=(-100.0, 100.0),
-        read_only=True,
-    )
+    base_offset: tuple[float, ...] = base_offset_parameter()
     transform_timeout: float = parameter(
-        0.5, "Age from which a transform of /tf is refused.", unit="s", bounds=(0.01, 60.0)
+        0.5,
+        "Age from which a transform of /tf is refused, and odometry for clouds in a sensor's "
+        "frame.",
+        unit="s",
+        bounds=(0.01, 60.0),
+    )
+    sensor_mounts: tuple[str, ...] = parameter(
+        NO_MOUNTS,
+        "Mounts of sensors on the robot, for clouds in their frames: frame:x:y:z:roll:pitch:yaw, "
+        "m and rad in base_frame. Frames without a mount are looked up on /tf.",
+        read_only=True,
     )
     map_resolution: float = map_resolution_parameter()
     cell_height: str = cell_height_parameter()

@@ -83,6 +83,9 @@ def test_bad_input_is_refused_in_one_short_line(files, capfd, words, names):
         (["--host", "192.0.2.1"], "host is '192.0.2.1'"),
         (["--host", "a" * 300], "host is 'aaa"),
         (["--max-gap", "nan"], "max_gap is nan"),
+        (["--port", "70000"], "port is 70000; it must be 0 to 65535"),
+        (["--start", "-300", "0", "0"], "start is (-300, 0) m; it must be on the map"),
+        (["--goal", "1", "2e5", "0"], "goal is (1, 200000) m; it must be on the map"),
     ],
 )
 def test_view_refuses_what_it_cannot_serve_instead_of_waiting(files, capfd, words, names):
@@ -146,7 +149,7 @@ def replay_words(files):
 @pytest.mark.parametrize(
     ("changes", "names"),
     [
-        ({"every": np.float64(1.0)}, "reason must be an array (n,) of texts"),
+        ({"every": np.float64(1.0)}, "assumptions must be one text"),
         ({"roll": np.float64(1.0)}, "roll has shape (); it must be (30,)"),
         ({"poses": np.zeros(30)}, "poses has shape (30,); it must be (30, 3)"),
         ({"wheel_loads": np.zeros((29, 6))}, "wheel_loads has shape (29, 6)"),

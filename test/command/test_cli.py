@@ -87,6 +87,22 @@ def test_predict_takes_negative_numbers(words, name, value):
     assert (list(found) if isinstance(value, list) else found) == value
 
 
+@pytest.mark.parametrize(
+    ("words", "name", "value"),
+    [
+        (["plan", "lsr1", "a", "b", "--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
+         "start", "-3,0,0"),
+        (["plan", "lsr1", "a", "b", "--start", "0,0,0", "--goal", "-.5,-1e-1,0"],
+         "goal", "-.5,-1e-1,0"),
+        (["reachable", "s.zarr", "--from", "-3,-0.5"], "start", "-3,-0.5"),
+        (["replay", "bag", "out", "--goal", "-3,0,0"], "goal", "-3,0,0"),
+        (["replay", "bag", "out", "--start", "-3,0,-1"], "start", "-3,0,-1"),
+    ],
+)  # fmt: skip
+def test_lists_may_begin_with_a_negative_number(words, name, value):
+    assert params_of(*words)[name] == value
+
+
 def test_reach_takes_negative_numbers_as_arguments_and_options():
     words = ("lsr1", "a.npz", "-1", "-.5", "-3e-1", "-2", "0", "-0.2", "--force", "-1", "0", "-10")
     params = params_of("reach", *words)

@@ -65,6 +65,7 @@ REPLAY_SHAPES = {
     "lift_height": (N, 6),
     "deviation": (N, 3),
     "drift": (N, 2),
+    "assumptions": (),
 }
 """What the file holds beside the contract's arrays, for a replay."""
 

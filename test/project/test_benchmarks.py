@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from support.project.long_tests import on_demand
+
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 TOPICS = sorted(path.stem.removeprefix("bench_") for path in BENCHMARKS.glob("bench_*.py"))
 SMALL = {
@@ -23,12 +25,14 @@ SMALL = {
     "maps": {"SIZES": (80,), "LOCAL": 20, "SECONDS": 0.5, "PERIOD": 0.1},
     "mujoco": {"POSES": 2, "MANY": 20},
     "parts": {"POSES": 20, "REPEATS": 2},
-    "paths": {"REPEATS": 2},
+    "paths": {"REPEATS": 1, "MANY": 5_000},
+    "reachable": {"SIDE": 300},
     "rough": {"POSES": 10, "LOOKED_AT": 3, "CELLS": (0.4,)},
     "poses": {"POSES": 20, "FLOOR_POSES": 10, "LINES": 2, "SPACING": 0.2},
     "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2},
     "start": {"STARTS": 1, "COLD_STARTS": 0},
-    "survey": {"CELLS": 96, "REPEATS": 1, "WORKERS": (1, 1), "TURNS": 1, "TASKS": 20},
+    "scheduler": {"SIDES": (600,), "WORKERS": 3, "POSES_PER_SECOND": 1e7},
+    "survey": {"CELLS": 96, "REPEATS": 1, "TURNS": 1, "COUNT": 2},
     "traction": {"ALONE_TIME": 0.5, "TOGETHER_TIME": 1.0},
     "view": {"PATHS": 1, "LENGTH": 2.0, "SLIDERS": {"friction [-]": (0.6,)}},
     "walls": {"POSES": 5, "HEIGHTS": (0.3,)},
@@ -47,16 +51,22 @@ def threads():
     numba.set_num_threads(before)
 
 
+LONGER = ("rough", "scheduler", "service", "start", "survey", "view")
+"""Topics that take more than ten seconds in the small size."""
+
+
 def params_of_topics():
-    slow = pytest.mark.slow
-    return [pytest.param(topic, marks=() if topic in QUICK else slow) for topic in TOPICS]
+    """Return the topics with their marks."""
+    marks = {topic: (pytest.mark.slow,) for topic in TOPICS if topic not in QUICK}
+    marks |= {topic: (pytest.mark.slow, on_demand) for topic in LONGER}
+    return [pytest.param(topic, marks=marks.get(topic, ())) for topic in TOPICS]
 
 
 @pytest.mark.parametrize("topic", params_of_topics())
 def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, capsys, threads):
     if topic == "mujoco":
         pytest.importorskip("mujoco", reason="install the extra bench")
-    if topic == "survey":
+    if topic in ("reachable", "survey", "scheduler"):
         pytest.importorskip("distributed", reason="install the extra survey")
     module = importlib.import_module(f"benchmarks.bench_{topic}")
     for name, value in SMALL[topic].items():

@@ -30,10 +30,14 @@ NOT_RUN = {
     ("rosdep",): "is for a robot that has ROS 2 from apt",
     ("source",): "is for a robot that has ROS 2 from apt",
     ("python3", "-m", "colcon"): "is for a robot that has ROS 2 from apt",
+    (
+        "python",
+        "-m",
+        "support",
+    ): "needs a browser and the real maps; writes pictures",
     ("python", "-m", "benchmarks"): "takes minutes; test_benchmarks runs each topic small",
     ("rover_planner", "replay"): "needs a bag; test_replay records small ones",
     ("rover_planner", "view"): "serves a page until Ctrl-C; the tests in test/viewer serve it",
-    ("rover_planner", "study"): "takes minutes; test_studies runs small ones",
 }
 """How commands begin that are not run here, and why; a block with one of them is not run."""
 SERVERS = ("traverse_server", "traction_controller", "rover_simulator")

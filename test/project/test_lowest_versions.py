@@ -10,6 +10,7 @@ import pytest
 
 from rover_planner.nodes.programs import PROGRAMS
 from support.project.checkout import TOP, copy_checkout, setup_arguments
+from support.project.long_tests import on_demand
 
 LIBRARY = """
 import numpy as np
@@ -91,6 +92,7 @@ def test_the_lowest_versions_are_what_pip_installs(environment, tmp_path):
         assert installed[name] in versions
 
 
+@on_demand
 @pytest.mark.slow
 def test_the_command_line_runs_with_the_lowest_versions(environment, tmp_path):
     for words, told in (

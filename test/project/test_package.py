@@ -123,7 +123,7 @@ def test_every_requirement_is_bounded_on_both_sides_and_locked(setup_arguments):
     names = set(re.findall(r"^([a-z0-9.-]+)==", locked, re.MULTILINE))
     asked_for = [extras[name] for name in ("all", "bench", "dev")]
     for requirement in sum(asked_for, setup_arguments["install_requires"]):
-        match = re.fullmatch(r"([\w.-]+)>=[\d.]+,<\d+", requirement)
+        match = re.fullmatch(r"([\w.-]+)>=[\d.]+,<[\d.]+", requirement)
         assert match, requirement
         assert match[1].lower() in names
 

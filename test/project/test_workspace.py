@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -13,12 +14,15 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from support.processes import ProcessToken
-from support.project.checkout import console_scripts, copy_checkout
+from support.project.checkout import TOP, console_scripts, copy_checkout
+from support.project.doc_blocks import read_blocks
 from support.ros_fixtures import domain_id
 
 pytestmark = pytest.mark.slow
 TOOLS = ("setuptools<80", "colcon-common-extensions")
 """colcon links by `setup.py develop --editable`, which setuptools 80 has dropped; Noble has 68."""
+WAIT_FOR_SERVER = "until ros2 node list | grep -q traverse_server; do sleep 1; done"
+"""The kernels compile first."""
 HOW = {"copied": (), "linked": ("--symlink-install",)}
 
 
@@ -81,7 +85,8 @@ def test_the_ament_index_and_share_have_the_package(workspace, python):
     share = workspace / "install" / "rover_planner" / "share"
     assert (share / "ament_index/resource_index/packages/rover_planner").is_file()
     for name in ("package.xml", "launch/rover.launch.py", "config/parameters/traverse_server.yaml",
-                 "config/views/rover.rviz", "config/rovers/m2020.yaml"):  # fmt: skip
+                 "config/views/rover.rviz", "config/rovers/m2020.yaml",
+                 "examples/tallest_step.yaml"):  # fmt: skip
         assert (share / "rover_planner" / name).is_file()
     told = sourced(
         workspace,
@@ -107,6 +112,23 @@ def test_a_server_of_the_workspace_answers_its_mission_planner(workspace):
     finally:
         token.kill()
     assert "traversable" in told and "not traversable" not in told
+
+
+@pytest.mark.skipif(shutil.which("ros2") is None, reason="no ros2 command, which PyPI lacks")
+@pytest.mark.parametrize("workspace", ["copied"], indirect=True)
+def test_the_ros2_command_does_what_readme_says(workspace):
+    blocks = read_blocks(TOP / "README.md")
+    one, two = (block.text for block in blocks if block.not_run == "needs the ros2 command")
+    script = f"({one}) > server.log 2>&1 & {WAIT_FOR_SERVER}\n{two}\nros2 daemon stop"
+    token = ProcessToken()
+    try:
+        told = sourced(workspace, script, token)
+    finally:
+        token.kill()
+    assert "goal 1: yes" in told and "nav_msgs.srv.GetPlan_Response" in told
+    assert "message: traversable" in told and "label: wheel" in told
+    assert "Coulomb friction" in told and "Set parameter successful" in told
+    assert "/traverse_server/can_traverse: nav_msgs/srv/GetPlan" in told
 
 
 def test_colcon_test_runs_tests_of_the_package_and_keeps_their_results(workspace, python):
