@@ -33,15 +33,19 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 
 .PHONY: test
 test: lint kernels ## lint, type check and all tests
-	@echo "== tests"
+	@failed=0
+	echo "== tests"
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder \
-	  $(addprefix --ignore=,$(BROWSER_TESTS)) test
+	  -m "not timed" $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
+	echo "== tests that bound a time, one after another"
+	$(BIN)/python -m pytest -m timed $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
 	echo "== tests of the page, alone: a browser without a graphics card needs all cores"
-	$(BIN)/python -m pytest $(BROWSER_TESTS)
+	$(BIN)/python -m pytest $(BROWSER_TESTS) || failed=1
+	exit $$failed
 
 .PHONY: quick
 quick: $(READY) ## the tests that are not slow: under a minute once the kernels are compiled
-	@$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow" test
+	@$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow and not timed" test
 
 .PHONY: lint
 lint: $(READY) ## ruff and mypy

@@ -24,6 +24,7 @@ def watchdog(acted):
     dog.close()
 
 
+@pytest.mark.timed
 def test_it_acts_again_and_again_from_the_deadline_on(watchdog, acted):
     now = time.monotonic()
     assert watchdog.send(lambda: None, now, now + 0.05)

@@ -141,6 +141,7 @@ def test_a_slider_that_moves_on_stops_judging_of_all_paths_not_of_the_shown_one(
     assert session.close()
 
 
+@pytest.mark.timed
 def test_cancelled_work_stops_soon_and_is_never_delivered(judge, spirit):
     judge.ask(JudgeRequest(slow_scenario()))
     wait_until(lambda: judge.progress.step == 2, "the second path")
@@ -208,6 +209,7 @@ def test_progress_is_seen_from_outside_while_the_work_runs(judge):
     assert set(expected[:3]) <= set(named)
 
 
+@pytest.mark.timed
 def test_work_that_runs_is_closed_soon():
     work = BackgroundWork(judge_request, lambda: None, "closed while it runs")
     work.ask(JudgeRequest(slow_scenario()))

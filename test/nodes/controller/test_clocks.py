@@ -55,6 +55,7 @@ def drive(rover, start_controller):
     return start
 
 
+@pytest.mark.timed
 def test_a_simulated_clock_that_stops_is_a_fault_in_time_though_inputs_come(rover, drive):
     clock = SimulatedClock(rover)
     drive(use_sim_time=True)
@@ -65,6 +66,7 @@ def test_a_simulated_clock_that_stops_is_a_fault_in_time_though_inputs_come(rove
     wait_until(lambda: rover.state == "driving", "driving again")
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("step", [-3600, 3600])
 def test_a_step_of_the_clock_and_the_stamps_is_a_fault_that_passes(rover, drive, step):
     clock = SimulatedClock(rover)
@@ -77,6 +79,7 @@ def test_a_step_of_the_clock_and_the_stamps_is_a_fault_that_passes(rover, drive,
     wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving again")
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize(
     ("shift", "text"),
     [
@@ -96,6 +99,7 @@ def test_frozen_delayed_and_future_stamps_are_faults_in_time(rover, drive, shift
     wait_until(lambda: rover.state == "driving", "driving again")
 
 
+@pytest.mark.timed
 def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, drive):
     controller = drive()
     began = time.monotonic()
@@ -111,6 +115,7 @@ def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, 
     assert int(values["watchdog_trips"]) >= 1
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("silent", ["joint_states", "imu"])
 def test_a_silent_sensor_is_a_fault_in_time(rover, drive, silent):
     drive()

@@ -92,6 +92,7 @@ def watched(start_server, client, ros):
     return server, rover
 
 
+@pytest.mark.timed
 def test_a_rock_put_across_the_path_stops_the_rover_in_half_a_second(watched, client):
     server, rover = watched
     client.heard["verdict"].clear()
@@ -109,6 +110,7 @@ def test_a_rock_put_across_the_path_stops_the_rover_in_half_a_second(watched, cl
     rover.wait_for_status(DiagnosticStatus.ERROR, verdict["reason"])
 
 
+@pytest.mark.timed
 def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros):
     server, rover = watched
     for name, value in (("waypoint_spacing", 0.005), ("candidate_count", 99)):

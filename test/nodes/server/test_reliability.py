@@ -7,9 +7,9 @@ from benchmarks.server_trials.stage import open_stage, run_together
 from support.project.without_disk import fill_disk
 
 MANY = 12
-BUDGET, LATE = 1.0, 0.5
-"""time_budget [s], and how late an answer may be on a machine that runs other tests [s]; the
-figure of a quiet machine is in docs/reliability.md."""
+BUDGET, LATE = 1.0, 10.0
+"""time_budget [s], and how late an answer may be on a busy machine [s]: one question after another
+would take 50 s. The figure of a quiet machine is in docs/reliability.md."""
 
 
 @pytest.fixture
@@ -34,6 +34,7 @@ def test_two_clients_at_once_never_take_the_others_verdict_for_their_own(stage, 
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_fifty_short_questions_at_once_are_all_answered(stage):
     found = load.burst(stage, 50, 5.0, half_length=1.5, spacing=0.05)
     assert found.codes.keys() <= {"traversable", "busy", "too_long"}
@@ -41,6 +42,7 @@ def test_fifty_short_questions_at_once_are_all_answered(stage):
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_fifty_long_questions_at_once_are_answered_or_refused_within_the_budget(stage):
     found = load.burst(stage, 50, BUDGET, half_length=45.0, spacing=0.001)
     assert sum(found.codes.values()) == 50 and found.codes["busy"] > 40

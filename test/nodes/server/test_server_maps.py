@@ -154,6 +154,7 @@ def test_without_a_loaded_map_a_cloud_replaces_the_last_one(server, client):
     assert server.service.terrain.elevation.shape > (20, 20)
 
 
+@pytest.mark.timed
 def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
     start_server, client, tmp_path, monkeypatch
 ):
