@@ -33,14 +33,19 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 
 .PHONY: test
 test: lint kernels ## lint, type check and all tests
-	@failed=0
-	echo "== tests"
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder \
+	@run() { # what fails beside others on a busy machine is tried once more, alone
+	  echo "== $$1"; shift
+	  $(BIN)/python -m pytest --cache-clear "$$@" && return
+	  echo "== what failed, once more and one after another"
+	  $(BIN)/python -m pytest "$$@" --numprocesses 0 --last-failed --last-failed-no-failures none
+	}
+	failed=0
+	run "tests" --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder \
 	  -m "not timed" $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
-	echo "== tests that bound a time, one after another"
-	$(BIN)/python -m pytest -m timed $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
-	echo "== tests of the page, alone: a browser without a graphics card needs all cores"
-	$(BIN)/python -m pytest $(BROWSER_TESTS) || failed=1
+	run "tests that bound a time by the clock, one after another" \
+	  -m timed $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
+	run "tests of the page, alone: a browser without a graphics card needs all cores" \
+	  $(BROWSER_TESTS) || failed=1
 	exit $$failed
 
 .PHONY: quick
