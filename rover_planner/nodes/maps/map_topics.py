@@ -26,6 +26,7 @@ from rover_planner.ros.qos import map_subscriptions, sensor_qos
 from rover_planner.ros.qos_warnings import warn_of_mismatch
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
+from rover_planner.worlds.maps.moved_map import MapMove
 from rover_planner.worlds.summary import describe_terrain
 
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
@@ -195,29 +196,28 @@ class MapTopics:
         settings = self._settings
         self._topic = CLOUD if isinstance(message, PointCloud2) else GRID_MAP
         stamp = stamp_to_ns(message.header.stamp)
+        source = self._find_source(message.header.frame_id, stamp)
         if self._topic == CLOUD:
+            move = None if source is None else PointMove(*source.matrix)
             terrain = terrain_from_point_cloud(
-                message,
-                settings.resolution,
-                settings.cell_height,
-                self._find_cloud(message.header.frame_id, stamp),
+                message, settings.resolution, settings.cell_height, move
             )
         else:
-            check_frame(message.header.frame_id, settings.frame, self._topic)
             terrain = terrain_from_grid_map(message, settings.layers)
+            if source is not None:
+                terrain = self._keeper.place(terrain, MapMove(*source.matrix))
         since = self._now() if stamp is None else stamp / NANOSECONDS
         kept = self._keeper.take(terrain, self._topic, since, self._service.standing())
         self._take(kept, self._topic, stamp)
         self._is_from_topic = True
 
-    def _find_cloud(self, frame: str, stamp: int | None) -> PointMove | None:
-        """Return what moves the points of a cloud to the map frame; None if they are in it."""
+    def _find_source(self, frame: str, stamp: int | None) -> Rigid | None:
+        """Return where the frame of a map was in the map frame; None if it is that."""
         if frame == self._settings.frame:
             return None
         if not frame:
             check_frame(frame, self._settings.frame, self._topic)
-        sensor = self._find_sensor(frame, stamp)
-        return PointMove(sensor.rotation.as_matrix(), sensor.translation)
+        return self._find_sensor(frame, stamp)
 
     def _fill_under_rover(self) -> None:
         standing = self._service.standing()

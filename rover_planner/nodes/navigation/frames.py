@@ -93,6 +93,11 @@ class Frames:
         self._node.create_subscription(kind, "/tf", around(self.take), TF_DEPTH)
         self._node.create_subscription(kind, "/tf_static", around(self.take_static), static)
 
+    @property
+    def silence(self) -> str:
+        """Why /tf says nothing, to be added to a refusal; empty if it is heard."""
+        return "" if tf_message() is not None else "; /tf is not heard: tf2_msgs is not installed"
+
     def apply_timeout(self, timeout: float) -> None:
         """Take the age from which transforms are refused [s]."""
         self._tree.timeout = timeout

@@ -98,8 +98,9 @@ class SensorPoses:
                 return tree.find(self._map, frame, stamp, now)
             if not tree.connects(self._base, frame):
                 raise TransformError(
-                    f"it is in frame {frame!r}; it must be in {self._map!r}, or in a frame that "
-                    f"/tf or sensor_mounts connects with it; {self._describe(tree)}"
+                    f"the message is in frame {frame!r}; it must be in {self._map!r}, or in a "
+                    "frame of /tf or sensor_mounts; known are "
+                    + ", ".join(sorted({*self._mounts, *tree.frames()}))
                 )
             mount = tree.find(self._base, frame, stamp, now)
         return self._find_robot(stamp, now, tree).then(mount)
