@@ -311,8 +311,15 @@ class TraverseServer(Node):
         response.message = f"{count} open questions cancelled"
         return response
 
+    def _find_clock_fault(self) -> str:
+        """Return that ROS time does not run; empty if it does."""
+        clock = self.get_clock()
+        is_silent = clock.ros_time_is_active and clock.now().nanoseconds == 0
+        return "use_sim_time is true, but nothing was heard on /clock" if is_silent else ""
+
     def _publish_diagnostics(self) -> None:
         self._map_cloud.update()
+        self._maps.retry()
         now = self.get_clock().now()
         situation = self._service.situation(now.nanoseconds)
         missing = situation.refuse_map()
@@ -325,7 +332,7 @@ class TraverseServer(Node):
         }
         health = self.desk.health.describe(
             time.monotonic(),
-            "" if missing is None else missing.reason,
+            self._find_clock_fault() or ("" if missing is None else missing.reason),
             self.guard.recent(MEMORY),
             counts,
         )

@@ -4,7 +4,7 @@ import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import wait_until
 

@@ -1,6 +1,6 @@
 """Conditions are logged when they begin and end, at most one line a second about each."""
 
-from rover_planner.ros.transition_log import TransitionLog
+from rover_planner.ros.logs.transition_log import TransitionLog
 
 
 class Lines(list):

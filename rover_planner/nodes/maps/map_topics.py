@@ -1,5 +1,6 @@
 """The maps of a traverse server: topics, files, and what the rover itself knows."""
 
+import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,8 +20,9 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.planning.navigation.transforms import Rigid, TransformError
 from rover_planner.ros.guard import Guard
+from rover_planner.ros.logs.repeat_log import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions, sensor_qos
 from rover_planner.ros.qos_warnings import warn_of_mismatch
@@ -99,6 +101,8 @@ class MapTopics:
         self._is_from_topic = False
         self._topic, self._looked = CLOUD, -float("inf")
         self._told, self._told_kind = -float("inf"), ("", False)
+        self._refusals = RepeatLog()
+        self._unplaced: tuple[str, int | None] | None = None
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self._keep(self._keeper.load(terrain, self._now(), None), parameters.terrain_file)
@@ -183,6 +187,18 @@ class MapTopics:
             self._looked = now
             self._intake.do(self._fill_under_rover)
 
+    def retry(self) -> None:
+        """Take the last message again if its transform has come meanwhile; call it each second.
+
+        A map that is published once may arrive before the first transform.
+        """
+        if self._unplaced is None:
+            return
+        with contextlib.suppress(TransformError):
+            self._find_sensor(*self._unplaced)
+            self._unplaced = None
+            self._intake.repeat()
+
     def close(self) -> None:
         """End the thread."""
         self._intake.close()
@@ -196,6 +212,7 @@ class MapTopics:
         settings = self._settings
         self._topic = CLOUD if isinstance(message, PointCloud2) else GRID_MAP
         stamp = stamp_to_ns(message.header.stamp)
+        self._unplaced = None
         source = self._find_source(message.header.frame_id, stamp)
         if self._topic == CLOUD:
             move = None if source is None else PointMove(*source.matrix)
@@ -217,7 +234,11 @@ class MapTopics:
             return None
         if not frame:
             check_frame(frame, self._settings.frame, self._topic)
-        return self._find_sensor(frame, stamp)
+        try:
+            return self._find_sensor(frame, stamp)
+        except TransformError:
+            self._unplaced = frame, stamp
+            raise
 
     def _fill_under_rover(self) -> None:
         standing = self._service.standing()
@@ -254,7 +275,9 @@ class MapTopics:
     def _refuse(self, error: str) -> None:
         there = self._service.known_map is not None
         kept = "the last good map stays" if there else "there is no map yet"
-        self._node.get_logger().error(f"{self._topic} refused, {kept}: {error}")
+        line = self._refusals.line(f"{self._topic} refused, {kept}: {error}", time.monotonic())
+        if line:
+            self._node.get_logger().error(line)
         self._tell(error)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from rover_planner.ros.latched_publisher import LatchedPublisher
+from rover_planner.ros.publishing.latched_publisher import LatchedPublisher
 
 
 class LazyPublisher:
