@@ -122,6 +122,23 @@ def test_what_a_plain_installation_brings_is_known_by_its_modules():
     assert {package.lower() for package in PLAIN.values()} == required
 
 
+SIGNAL_AT_IMPORT = """
+import os
+class Signal:
+    def find_spec(self, name, path=None, target=None):
+        if name == "rover_planner.nodes.{name}":
+            os.kill(os.getpid(), {number})
+sys.meta_path.insert(0, Signal())
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_signal_ends_a_program_cleanly_while_it_is_imported(name, how):
+    ended = run_with(SIGNAL_AT_IMPORT.format(name=name, number=int(how)), name)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+
+
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_help_comes_before_anything_is_started(name, capfd):
     assert MAINS[name](["--help"]) == 0
