@@ -36,7 +36,9 @@ CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 LOOK_PERIOD = 0.5
 """Shortest time between two looks for unknown ground under the rover [s]."""
 LOG_PERIOD = 10.0
-"""Shortest time between two log lines about maps that merge [s]."""
+"""Shortest time between two log lines about maps that merge, or come again and again [s]."""
+FIRST_MAPS = 20
+"""Maps that replace each other of which each is told in the log."""
 MERGE_WAIT = 0.005
 """Longest wait of a question for a map that is to be merged into the one that is there [s]. A busy
 machine may take 15 ms more to wake the thread until it is 20 ms."""
@@ -101,7 +103,7 @@ class MapTopics:
         self._is_from_topic = False
         self._topic, self._looked = CLOUD, -float("inf")
         self._told, self._told_kind = -float("inf"), ("", False)
-        self._refusals = RepeatLog()
+        self._map_count, self._refusals = 0, RepeatLog()
         self._unplaced: tuple[str, int | None] | None = None
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
@@ -258,7 +260,9 @@ class MapTopics:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None
             kind = source, self._keeper.merges
-            if not kind[1] or kind != self._told_kind or now - self._told >= LOG_PERIOD:
+            self._map_count += not kind[1]
+            is_due = now - self._told >= LOG_PERIOD or kind != self._told_kind
+            if is_due or (not kind[1] and self._map_count <= FIRST_MAPS):
                 self._told, self._told_kind = now, kind
                 self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
 
