@@ -105,7 +105,7 @@ class MissionPlanner(Node):
         """
         self._wait(
             lambda: self._client.service_is_ready() and self.count_publishers(self._verdicts) > 0,
-            f"the service {self._client.srv_name} and the topic {self._verdicts}",
+            f"the service {self._client.service_name} and the topic {self._verdicts}",
         )
 
     def publish_map(self, terrain: Terrain) -> None:
@@ -149,7 +149,7 @@ class MissionPlanner(Node):
         request.goal = stamped_pose(goal, self._frame)
         future = self._client.call_async(request)
         future.add_done_callback(self._notify)
-        self._wait(future.done, f"the answer of {self._client.srv_name}")
+        self._wait(future.done, f"the answer of {self._client.service_name}")
         plan = future.result().plan
         # The hash tells this question from those of other clients, the stamp from earlier ones.
         about = plan.header.stamp, plan_request_hash(request.start, request.goal, 0.0)
@@ -185,11 +185,13 @@ class MissionPlanner(Node):
             self._check_publisher.publish(path)
             future = self._checker.call_async(Trigger.Request())
             future.add_done_callback(self._notify)
-            self._wait(future.done, f"the answer of {self._checker.srv_name}")
+            self._wait(future.done, f"the answer of {self._checker.service_name}")
             answer = json.loads(future.result().message)
             if answer["path_hash"] == about:  # else it was an earlier one, or another client's
                 return "" if answer["traversable"] else str(answer["reason"])
-        raise NoAnswerError(f"waited {self._timeout:.0f} s in vain for {self._checker.srv_name}")
+        raise NoAnswerError(
+            f"waited {self._timeout:.0f} s in vain for {self._checker.service_name}"
+        )
 
     def wait_for_pose(self, is_wanted: Callable[[np.ndarray], bool], seconds: float) -> np.ndarray:
         """Return the first measured pose (3,) that is wanted, or the last one after some seconds.

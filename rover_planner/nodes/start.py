@@ -35,7 +35,8 @@ def _start(name: str) -> int:
     if not set(HELP_WORDS).isdisjoint(sys.argv[1:]):
         print_help(name)
         return EXIT_OK
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # until the node has its own
+    for number in (signal.SIGINT, signal.SIGTERM):  # until the node has its own handlers
+        signal.signal(number, signal.default_int_handler)
     try:
         need("rclpy", "the node")
         module = importlib.import_module(f"rover_planner.nodes.{name}")

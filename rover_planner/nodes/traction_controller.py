@@ -1,11 +1,9 @@
 """The node /traction_controller: commands wheel torques by a QP at a fixed rate."""
 
 import gc
-import signal
 import sys
 import time
 from collections.abc import Sequence
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -24,6 +22,7 @@ from msg_adapters.commands import joint_order
 from msg_adapters.results.traction_status import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.programs import read_words
+from rover_planner.nodes.stop_signals import StopSignals
 from rover_planner.nodes.traction.inputs import TractionInputs
 from rover_planner.nodes.traction.maps import TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
@@ -285,29 +284,9 @@ class TractionController(Node):
         )  # fmt: skip
 
 
-class _Stop:
-    """Turns signals into a stop request; ROS's own handlers would end the context too early.
-
-    The context must exist until the zero torques are sent. As long as the node starts, no torques
-    were sent, and a signal ends the start, which may have to compile kernels.
-    """
-
-    def __init__(self) -> None:
-        self.wanted = False
-        self.starting = True
-        """Whether a signal raises KeyboardInterrupt."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._ask)
-
-    def _ask(self, number: int, frame: FrameType | None) -> None:
-        self.wanted = True
-        if self.starting:
-            raise KeyboardInterrupt
-
-
 def main(words: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    stop = _Stop()
+    stop = StopSignals()
     node = None
     try:
         if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
@@ -316,11 +295,11 @@ def main(words: Sequence[str] | None = None) -> int:
         rclpy.logging.get_logger(NODE_NAME).info(
             "compiling kernels; the first start takes longest"
         )
+        executor = GuardedExecutor()
         node = TractionController()
-        stop.starting = False
+        stop.defer(executor.wake)
         warn_of_disk(node.get_logger())
         node.take_priority()
-        executor = GuardedExecutor()
         executor.add_guarded(node, node.guard)
         gc.collect()
         gc.freeze()
