@@ -135,7 +135,8 @@ class _Turn:
         step = grid.resolution
         origin = x + step * box.column, y + step * box.row
         sealed = {name: seal_array(layer) for name, layer in laid.items()}
-        return Terrain(resolution=step, origin=origin, **sealed)
+        std, friction = sealed.get("elevation_std"), sealed.get("friction")
+        return Terrain(sealed["elevation"], step, origin, friction, elevation_std=std)
 
     def _list_layers(self) -> dict[str, Floats]:
         names = ("elevation", "elevation_std", "friction")
@@ -165,51 +166,63 @@ class _Turn:
         (cosine, _), (sine, _) = self._turn
         column = (cosine * x + sine * y) / step + 0.5 * (nx - 1)
         row = (cosine * y - sine * x) / step + 0.5 * (ny - 1)
-        return _Around.find(row, column, (ny, nx))
+        return _Around(_Between.find(row, ny), _Between.find(column, nx))
 
 
 @dataclass(frozen=True, eq=False)
-class _Around:
-    """The four cells around some places, and how near each is."""
+class _Between:
+    """Between which two cells of a row or column some places are."""
 
-    first: tuple[NDArray[np.intp], NDArray[np.intp]]
-    """Row and column of the lowest one."""
-    last: tuple[NDArray[np.intp], NDArray[np.intp]]
-    """Row and column of the highest one."""
-    beyond: tuple[Floats, Floats]
-    """How far a place is beyond the first row and column, 0 to 1."""
+    first: NDArray[np.intp]
+    """Index of the lower cell."""
+    last: NDArray[np.intp]
+    """Index of the upper one."""
+    beyond: Floats
+    """How far a place is beyond the lower one, 0 to 1."""
     inside: NDArray[np.bool_]
     """Whether a place is on the map."""
 
     @staticmethod
-    def find(row: Floats, column: Floats, shape: tuple[int, int]) -> "_Around":
-        """Find the cells around fractional rows and columns of a map of a shape."""
-        inside = np.ones(row.shape, bool)
-        first, last, beyond = [], [], []
-        for place, count in zip((row, column), shape, strict=True):
-            whole = np.rint(place)
-            place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
-            inside &= (place >= 0.0) & (place <= count - 1)
-            low = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
-            first.append(low)
-            last.append(np.minimum(low + 1, count - 1))
-            beyond.append(place - low)
-        return _Around(tuple(first), tuple(last), tuple(beyond), inside)
+    def find(place: Floats, count: int) -> "_Between":
+        """Find the cells around fractional indices, of `count` cells."""
+        whole = np.rint(place)
+        place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
+        inside = (place >= 0.0) & (place <= count - 1)
+        first = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
+        return _Between(first, np.minimum(first + 1, count - 1), place - first, inside)
+
+    @property
+    def nearest(self) -> NDArray[np.intp]:
+        """Index of the nearer cell."""
+        return np.where(self.beyond < 0.5, self.first, self.last)
+
+    @property
+    def shares(self) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
+        """Both indices, each with its share of the value."""
+        return (self.first, 1.0 - self.beyond), (self.last, self.beyond)
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """The four cells around some places."""
+
+    rows: _Between
+    columns: _Between
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Whether a place is on the map."""
+        return self.rows.inside & self.columns.inside
 
     def interpolate(self, layer: Floats) -> Floats:
         """Interpolate bilinearly; NaN where a cell that counts is not known."""
-        found = np.zeros(self.inside.shape)
-        up, along = self.beyond
-        for row, down in ((self.first[0], 1.0 - up), (self.last[0], up)):
-            for column, left in ((self.first[1], 1.0 - along), (self.last[1], along)):
-                share = down * left
+        found = np.zeros(self.rows.first.shape)
+        for row, up in self.rows.shares:
+            for column, along in self.columns.shares:
+                share = up * along
                 found += np.where(share == 0.0, 0.0, share * layer[row, column])
         return np.where(self.inside, found, np.nan)
 
     def nearest(self, layer: Floats) -> Floats:
         """Return the values of the nearest cells."""
-        row, column = (
-            np.where(beyond < 0.5, first, last)
-            for first, last, beyond in zip(self.first, self.last, self.beyond, strict=True)
-        )
-        return np.where(self.inside, layer[row, column], np.nan)
+        return np.where(self.inside, layer[self.rows.nearest, self.columns.nearest], np.nan)
