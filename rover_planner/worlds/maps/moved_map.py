@@ -87,7 +87,7 @@ def _find_centres(terrain: Terrain, move: MapMove) -> tuple[Floats, Floats]:
     """Return x, y [m] of the middle of a map, in its own frame and in the other one."""
     x0, x1, y0, y1 = terrain.bounds
     centre = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
-    height = float(np.nanmedian(terrain.elevation))
+    height = 0.0 if move.lean <= NO_LEAN else float(np.nanmedian(terrain.elevation))
     return centre, (move.rotation @ (*centre, height) + move.translation)[:2]
 
 
