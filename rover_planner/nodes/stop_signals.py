@@ -8,9 +8,15 @@ import signal
 from collections.abc import Callable
 from types import FrameType
 
+LOOK_FOR_STOP = 0.5
+"""Longest time between two looks whether a node is to end [s]; a signal wakes it earlier."""
+
 
 class StopSignals:
-    """Turns SIGINT and SIGTERM into KeyboardInterrupt while a node starts, then into a request."""
+    """Turns SIGINT and SIGTERM into KeyboardInterrupt while a node starts, then into a request.
+
+    Only the first signal counts.
+    """
 
     def __init__(self) -> None:
         self.wanted = False
@@ -24,6 +30,8 @@ class StopSignals:
         self._wake = wake
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
+        if self.wanted:
+            return  # launch and the terminal both send one, and the node is ending already
         self.wanted = True
         if self._wake is None:
             raise KeyboardInterrupt

@@ -42,7 +42,7 @@ from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
-from rover_planner.nodes.stop_signals import StopSignals
+from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
 from rover_planner.nodes.warm_up import HAZARDS, WAYS
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
@@ -72,8 +72,6 @@ NODE_NAME = "traverse_server"
 SWITCH_INTERVAL = 1e-3
 """Longest time for which a thread that prepares maps may delay a question whenever it needs
 Python's lock [s]; Python's thread switch interval."""
-LOOK_FOR_STOP = 0.5
-"""Longest time between two looks whether the node is to end [s]; a signal wakes it earlier."""
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 

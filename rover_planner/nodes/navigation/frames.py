@@ -97,7 +97,7 @@ class Frames:
     @property
     def silence(self) -> str:
         """Why /tf says nothing, to be added to a refusal; empty if it is heard."""
-        return "" if tf_message() is not None else "; /tf is not heard: tf2_msgs is not installed"
+        return "" if tf_message() is not None else "; /tf needs tf2_msgs, which is not installed"
 
     def apply_timeout(self, timeout: float) -> None:
         """Take the age from which transforms are refused [s]."""
