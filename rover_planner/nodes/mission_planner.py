@@ -88,9 +88,10 @@ class MissionPlanner(Node):
         self._client = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
         )
-        self.create_subscription(
+        verdicts = self.create_subscription(
             DiagnosticArray, f"{SERVER}/verdict", self._take_verdict, result_qos()
         )
+        self._verdicts = verdicts.topic_name  # as remapped, which count_publishers does not do
         for name in ("wheel_loads", "slip_ratios"):
             self.create_subscription(
                 Float64MultiArray, f"{SERVER}/{name}", self._taker(name), result_qos()
@@ -102,10 +103,9 @@ class MissionPlanner(Node):
         Raises:
             NoAnswerError: The server is not available in time.
         """
-        verdicts = f"{SERVER}/verdict"
         self._wait(
-            lambda: self._client.service_is_ready() and self.count_publishers(verdicts) > 0,
-            f"the service {SERVER}/can_traverse",
+            lambda: self._client.service_is_ready() and self.count_publishers(self._verdicts) > 0,
+            f"the service {self._client.service_name} and the topic {self._verdicts}",
         )
 
     def publish_map(self, terrain: Terrain) -> None:
@@ -149,11 +149,11 @@ class MissionPlanner(Node):
         request.goal = stamped_pose(goal, self._frame)
         future = self._client.call_async(request)
         future.add_done_callback(self._notify)
-        self._wait(future.done, f"the answer of {SERVER}/can_traverse")
+        self._wait(future.done, f"the answer of {self._client.service_name}")
         plan = future.result().plan
         # The hash tells this question from those of other clients, the stamp from earlier ones.
         about = plan.header.stamp, plan_request_hash(request.start, request.goal, 0.0)
-        self._wait(lambda: self._verdict_about == about, f"the verdict on {SERVER}/verdict")
+        self._wait(lambda: self._verdict_about == about, f"the verdict on {self._verdicts}")
         answer = dict(self._verdict)
         positions = [pose.pose.position for pose in plan.poses]
         answer["plan"] = [[p.x, p.y, p.z] for p in positions]
@@ -185,11 +185,13 @@ class MissionPlanner(Node):
             self._check_publisher.publish(path)
             future = self._checker.call_async(Trigger.Request())
             future.add_done_callback(self._notify)
-            self._wait(future.done, f"the answer of {SERVER}/check_path")
+            self._wait(future.done, f"the answer of {self._checker.service_name}")
             answer = json.loads(future.result().message)
             if answer["path_hash"] == about:  # else it was an earlier one, or another client's
                 return "" if answer["traversable"] else str(answer["reason"])
-        raise NoAnswerError(f"waited {self._timeout:.0f} s in vain for {SERVER}/check_path")
+        raise NoAnswerError(
+            f"waited {self._timeout:.0f} s in vain for {self._checker.service_name}"
+        )
 
     def wait_for_pose(self, is_wanted: Callable[[np.ndarray], bool], seconds: float) -> np.ndarray:
         """Return the first measured pose (3,) that is wanted, or the last one after some seconds.

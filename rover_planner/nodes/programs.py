@@ -1,6 +1,7 @@
 """The node programs: their help texts and command-line arguments; needs no ROS."""
 
 import itertools
+import re
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
@@ -19,6 +20,9 @@ from rover_planner.shell.run_app import run_app
 
 HELP_WORDS = ("-h", "--help")
 _EXIT_CODES = "Exit code 0 when it was told to stop; 2 for a wrong parameter or missing library."
+
+PLACE_IN_SOURCE = re.compile(r",? at /\S+:\d+")
+"""Where an error of ROS arose in the sources of ROS, which helps nobody."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,7 @@ def read_words(name: str, words: Sequence[str] | None) -> Any:
     try:
         own = remove_ros_args([name, *given])[1:]
     except RuntimeError as error:  # rclpy raises several classes that it does not export
-        raise PlanningError(str(error)) from error
+        raise PlanningError(PLACE_IN_SOURCE.sub("", str(error))) from error
     return run_app(make_app(name), name, own)
 
 

@@ -30,6 +30,8 @@ from rover_planner.ros.paced_sender import PacedSender
 from rover_planner.ros.qos import topic_qos
 from rover_planner.ros.refusals import refuse_error
 
+LEAVE_TIME = 0.1
+"""Time in which the last answers leave before the node is destroyed [s]."""
 PATROL = 0.05
 """Period of the check for questions that have run out of time [s]."""
 GRACE = 0.1
@@ -139,9 +141,12 @@ class QuestionDesk:
         return self._queue.stop_all(code, reason)
 
     def close(self) -> None:
-        """Refuse all open questions and end the thread."""
+        """Refuse all open questions and end the thread; the refusals have time to leave."""
+        is_asked = self.open_count > 0
         self._queue.close()
         self._sender.send_all()
+        if is_asked:
+            time.sleep(LEAVE_TIME)
 
     def _deliver(self) -> None:
         self._queue.deliver()

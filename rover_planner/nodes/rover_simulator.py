@@ -17,6 +17,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
@@ -28,6 +29,7 @@ from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
 from rover_planner.nodes.programs import read_words
+from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
 from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
@@ -222,7 +224,7 @@ def _make_broadcaster(node: Node) -> Any:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    node = None
+    node, stop = None, StopSignals()
     try:
         options = read_words(NODE_NAME, words)
         if options == EXIT_OK:  # help was printed
@@ -230,22 +232,19 @@ def main(words: Sequence[str] | None = None) -> int:
         rclpy.logging.get_logger(NODE_NAME).info(
             "compiling kernels; the first start takes longest"
         )
-        init_ros(words)
+        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
         overrides = [Parameter(name, value=value) for name, value in options.items()]
         node = RoverSimulator(parameter_overrides=overrides)
-        warn_of_disk(node.get_logger())
         executor = SingleThreadedExecutor()
+        stop.defer(executor.wake)
+        warn_of_disk(node.get_logger())
         executor.add_node(node)
-        executor.spin()
+        while not stop.wanted:
+            executor.spin_once(timeout_sec=LOOK_FOR_STOP)
     except INPUT_ERRORS as error:
         rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
         return EXIT_BAD_INPUT
     except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_OK
-    except Exception:
-        # Whoever is told to stop while publishing fails on a context that has ended.
-        if rclpy.ok():
-            raise
         return EXIT_OK
     finally:
         if node is not None:

@@ -1,6 +1,7 @@
 """Starts the node programs; reports help and missing libraries before ROS is imported."""
 
 import importlib
+import signal
 import sys
 
 from rover_planner.errors import PlanningError
@@ -34,6 +35,8 @@ def _start(name: str) -> int:
     if not set(HELP_WORDS).isdisjoint(sys.argv[1:]):
         print_help(name)
         return EXIT_OK
+    for number in (signal.SIGINT, signal.SIGTERM):  # until the node has its own handlers
+        signal.signal(number, signal.default_int_handler)
     try:
         need("rclpy", "the node")
         module = importlib.import_module(f"rover_planner.nodes.{name}")
@@ -41,4 +44,6 @@ def _start(name: str) -> int:
         return end_with(name, EXIT_BAD_INPUT, str(error))
     except ImportError as error:  # rclpy of another Python, or only a part of ROS
         return end_with(name, EXIT_BAD_INPUT, explain_import(error, "the node"))
+    except KeyboardInterrupt:  # told to stop before it began
+        return EXIT_OK
     return module.main()

@@ -1,11 +1,9 @@
 """The node /traction_controller: commands wheel torques by a QP at a fixed rate."""
 
 import gc
-import signal
 import sys
 import time
 from collections.abc import Sequence
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -17,17 +15,16 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from msg_adapters.commands import joint_order
-from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.frames import check_frame
 from msg_adapters.results.traction_status import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.programs import read_words
+from rover_planner.nodes.stop_signals import StopSignals
 from rover_planner.nodes.traction.inputs import TractionInputs
+from rover_planner.nodes.traction.maps import TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.declare import declare_parameters, follow_changes
@@ -35,15 +32,13 @@ from rover_planner.parameters.traction_controller import TractionControllerParam
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.guard import Guard, GuardedExecutor
-from rover_planner.ros.map_intake import MapIntake
+from rover_planner.ros.logs.transition_log import TransitionLog
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
 from rover_planner.ros.realtime import take_priority
 from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.ros.transition_log import TransitionLog
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clock_watch import ClockWatch
-from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.supervisor import (
@@ -90,7 +85,12 @@ class TractionController(Node):
         self.guard = Guard(self.get_logger())
         """Counts unexpected errors."""
         self._clock_watch = ClockWatch(self._values.clock_timeout)
-        self._maps: MapIntake[PreparedMap] = MapIntake(self._prepare_map, self._refuse_map)
+        self._maps = TractionMaps(
+            self,
+            self._values,
+            lambda: self.service.settings.rover,
+            lambda: self._inputs.frames,
+        )
         self._inputs = TractionInputs(self, self._values, self.service, self._maps, self.guard)
         names = self._inputs.joint_names
         order = joint_order(self._values.joints, names)
@@ -172,12 +172,8 @@ class TractionController(Node):
         self._clock_watch.timeout = parameters.clock_timeout
         self._inputs.stamps.tolerance = parameters.stamp_tolerance
         self._inputs.frames.apply_timeout(parameters.transform_timeout)
-        last, self._values = self._values, parameters
-        if (last.map_resolution, last.cell_height) != (
-            parameters.map_resolution,
-            parameters.cell_height,
-        ):
-            self._maps.repeat()
+        self._values = parameters
+        self._maps.apply(parameters)
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         before = self._supervisor.permission.enabled
@@ -197,17 +193,6 @@ class TractionController(Node):
             "emergency stop" if message.data else "emergency stop released; ~/enable drives again"
         )
         self.update()
-
-    def _prepare_map(self, cloud: PointCloud2) -> PreparedMap:
-        """Prepare a map from a cloud; called in the intake's thread."""
-        check_frame(cloud.header.frame_id, self._values.map_frame, "elevation_cloud")
-        terrain = terrain_from_point_cloud(
-            cloud, self._values.map_resolution, self._values.cell_height
-        )
-        return prepare_map(self.service.settings.rover, terrain)
-
-    def _refuse_map(self, error: str) -> None:
-        self.get_logger().error(f"elevation_cloud refused, the last map stays: {error}")
 
     def update(self) -> None:
         """Estimate, build, solve and publish; called by the timer."""
@@ -281,6 +266,7 @@ class TractionController(Node):
             self._warning = update.warning
 
     def _publish_diagnostics(self) -> None:
+        self._maps.look_for_frame()
         command = self._command
         if command is None:
             return
@@ -298,29 +284,9 @@ class TractionController(Node):
         )  # fmt: skip
 
 
-class _Stop:
-    """Turns signals into a stop request; ROS's own handlers would end the context too early.
-
-    The context must exist until the zero torques are sent. As long as the node starts, no torques
-    were sent, and a signal ends the start, which may have to compile kernels.
-    """
-
-    def __init__(self) -> None:
-        self.wanted = False
-        self.starting = True
-        """Whether a signal raises KeyboardInterrupt."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._ask)
-
-    def _ask(self, number: int, frame: FrameType | None) -> None:
-        self.wanted = True
-        if self.starting:
-            raise KeyboardInterrupt
-
-
 def main(words: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    stop = _Stop()
+    stop = StopSignals()
     node = None
     try:
         if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
@@ -329,11 +295,11 @@ def main(words: Sequence[str] | None = None) -> int:
         rclpy.logging.get_logger(NODE_NAME).info(
             "compiling kernels; the first start takes longest"
         )
+        executor = GuardedExecutor()
         node = TractionController()
-        stop.starting = False
+        stop.defer(executor.wake)
         warn_of_disk(node.get_logger())
         node.take_priority()
-        executor = GuardedExecutor()
         executor.add_guarded(node, node.guard)
         gc.collect()
         gc.freeze()

@@ -1,7 +1,6 @@
 """The node /traverse_server: answers over ROS 2 whether the rover can traverse a path."""
 
 import gc
-import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -17,6 +16,7 @@ from nav_msgs.srv import GetPlan
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -42,6 +42,7 @@ from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
+from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
 from rover_planner.nodes.warm_up import HAZARDS, WAYS
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
@@ -311,8 +312,15 @@ class TraverseServer(Node):
         response.message = f"{count} open questions cancelled"
         return response
 
+    def _find_clock_fault(self) -> str:
+        """Return that ROS time does not run; empty if it does."""
+        clock = self.get_clock()
+        is_silent = clock.ros_time_is_active and clock.now().nanoseconds == 0
+        return "use_sim_time is true, but nothing was heard on /clock" if is_silent else ""
+
     def _publish_diagnostics(self) -> None:
         self._map_cloud.update()
+        self._maps.retry()
         now = self.get_clock().now()
         situation = self._service.situation(now.nanoseconds)
         missing = situation.refuse_map()
@@ -325,7 +333,7 @@ class TraverseServer(Node):
         }
         health = self.desk.health.describe(
             time.monotonic(),
-            "" if missing is None else missing.reason,
+            self._find_clock_fault() or ("" if missing is None else missing.reason),
             self.guard.recent(MEMORY),
             counts,
         )
@@ -342,14 +350,13 @@ class TraverseServer(Node):
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    logger = rclpy.logging.get_logger(NODE_NAME)
+    logger, stop = rclpy.logging.get_logger(NODE_NAME), StopSignals()
     try:
         if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
             return EXIT_OK
         logger.info("compiling kernels; the first start takes longest")
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a compilation too
-        init_ros(words)
-        _run(TraverseServer)
+        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
+        _run(stop)
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_OK
     except INPUT_ERRORS as error:
@@ -360,22 +367,18 @@ def main(words: Sequence[str] | None = None) -> int:
     return EXIT_OK
 
 
-def _run(make_node: Callable[[], TraverseServer]) -> None:
-    """Make a node and spin it until the context ends."""
-    node = None
+def _run(stop: StopSignals) -> None:
+    """Make a node and spin it until it is to end; open questions are refused then."""
+    node, executor = None, GuardedExecutor()
     try:
-        executor = GuardedExecutor()
-        node = make_node()
+        node = TraverseServer()
+        stop.defer(executor.wake)
         executor.add_guarded(node, node.guard)
         gc.collect()
         gc.freeze()  # objects that live as long as the node are excluded from garbage collection
         sys.setswitchinterval(SWITCH_INTERVAL)
-        executor.spin()
-    except Exception as error:
-        # A signal during the start ends the context, and the rest of the start then fails.
-        if rclpy.ok():
-            raise
-        raise ExternalShutdownException from error
+        while not stop.wanted:
+            executor.spin_once(timeout_sec=LOOK_FOR_STOP)
     finally:
         if node is not None:
             node.destroy_node()

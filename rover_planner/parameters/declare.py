@@ -41,6 +41,7 @@ def declare_parameters(node: Node, table: type[Table]) -> Table:
         try:
             node.declare_parameter(spec.name, spec.ros_default, _descriptor(spec))
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+            _explain_override(node, table, spec)
             raise ParameterError(f"parameter {spec.name}: {error}") from error
         found.append(node.get_parameter(spec.name))
     return replace(table(), **_changes(table, found))
@@ -94,6 +95,13 @@ def follow_changes(
 
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(pass_on)
+
+
+def _explain_override(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:
+    """Raise ParameterError in the words of the table if an override breaks its rules."""
+    given = node._parameter_overrides.get(spec.name)
+    if given is not None:
+        replace(table(), **_changes(table, [given]))
 
 
 def _changes(table: type[ParameterTable], parameters: Iterable[Parameter]) -> dict[str, Any]:

@@ -1,13 +1,17 @@
 """Builds a package of messages that PyPI lacks, with the ROS generators that it has and gcc."""
 
+import contextlib
+import importlib
+import importlib.util
 import inspect
 import os
 import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,8 +34,31 @@ GRID_MAP_MSGS = {
     """,
 }
 """Fields of the messages of grid_map_msgs for ROS 2, by name, those without others first."""
+TF2_MSGS = {"TFMessage": "geometry_msgs/TransformStamped[] transforms"}
+"""Fields of the message of /tf."""
+USES = ("std_msgs", "geometry_msgs", "builtin_interfaces")
+"""Packages whose messages occur in these."""
 TYPE_SUPPORTS = ("rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c")
 PREFIX = Path(sys.prefix)
+
+
+@contextlib.contextmanager
+def importable(package: str, messages: dict[str, str], folder: Path) -> Iterator[Any]:
+    """Make the messages of a package importable, built in a folder where it is not installed.
+
+    Yields:
+        The module PACKAGE.msg.
+    """
+    if importlib.util.find_spec(package) is not None:
+        yield importlib.import_module(f"{package}.msg")
+        return
+    build_messages(folder, package, messages, USES)
+    sys.path.insert(0, str(folder))
+    importlib.invalidate_caches()
+    yield importlib.import_module(f"{package}.msg")
+    sys.path.remove(str(folder))
+    for name in [name for name in sys.modules if name.partition(".")[0] == package]:
+        del sys.modules[name]
 
 
 def build_messages(folder: Path, package: str, messages: dict[str, str], uses: Sequence[str]):

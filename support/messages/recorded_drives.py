@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
@@ -110,12 +111,21 @@ def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]
     return answers, total
 
 
-def record_grid_map(folder: Path, message: object) -> Path:
-    """Write a GridMap and an odometry to a new bag, as a robot with grid_map_msgs does."""
+def record_grid_map(
+    folder: Path, message: object, transforms: dict[str, Any] | None = None
+) -> Path:
+    """Write a GridMap and an odometry to a new bag, as a robot with grid_map_msgs does.
+
+    TFMessages by their topics come before them.
+    """
     types = get_typestore(Stores.ROS2_JAZZY)
     for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
         types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for topic, transform in (transforms or {}).items():
+            kind = transform.__msgtype__
+            tf = writer.add_connection(topic, kind, typestore=types)
+            writer.write(tf, BEGIN - 1, types.serialize_cdr(transform, kind))
         odometry = writer.add_connection("/odometry", "nav_msgs/msg/Odometry", typestore=types)
         writer.write(odometry, BEGIN, serialize_message(odometry_at(1.0)))
         grid = writer.add_connection("/elevation_map", GRID_MAP, typestore=types)

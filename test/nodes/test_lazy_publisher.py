@@ -4,7 +4,7 @@ import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import wait_until
 
@@ -35,7 +35,7 @@ def test_nobody_listens_so_nothing_is_made_and_the_latest_is_kept(ros):
     node.destroy_node()
 
 
-def test_listeners_hear_all_in_order_and_late_ones_what_was_published(ros):
+def test_listeners_hear_all_in_order_and_late_ones_the_latest(ros):
     node = Node("speaker", context=ros.context)
     topic = LazyPublisher(node, Int32, "numbers")
     topic.publish(lambda: Int32(data=0))
@@ -45,7 +45,33 @@ def test_listeners_hear_all_in_order_and_late_ones_what_was_published(ros):
         topic.publish(lambda number=number: Int32(data=number))
     wait_until(lambda: heard == [1, 2, 3], "all but what was out of date")
     late = listen(ros, "late_listener")
-    wait_until(lambda: late == [1, 2, 3], "what was published")
+    wait_until(lambda: late == [3], "the latest alone")
+    node.destroy_node()
+
+
+def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(ros):
+    node = Node("speaker", context=ros.context)
+    topic = LazyPublisher(node, Int32, "numbers")
+    visitor, seen = Node("visitor", context=ros.context), []
+    visitor.create_subscription(
+        Int32, "numbers", lambda number: seen.append(number.data), result_qos()
+    )
+    ros.spin(visitor)
+    wait_until(lambda: node.count_subscribers("numbers") == 1, "the visitor")
+    wait_until(lambda: topic._publisher.has_listeners, "its match")
+    topic.publish(lambda: Int32(data=1))
+    wait_until(lambda: seen == [1], "the first")
+    visitor.destroy_node()
+    wait_until(lambda: not topic._publisher.has_listeners, "the leave")
+    topic.publish(lambda: Int32(data=2))
+    heard = listen(ros)
+
+    def catch_up():
+        topic.catch_up()
+        return heard
+
+    wait_until(catch_up, "the latest")
+    assert heard == [2]
     node.destroy_node()
 
 

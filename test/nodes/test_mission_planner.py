@@ -12,8 +12,9 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 from rover_planner.nodes.mission.options import MissionOptions, Pose
 from rover_planner.nodes.mission_planner import main
 from rover_planner.nodes.programs import read_words
+from rover_planner.nodes.traverse_server import TraverseServer
 from support.command_line import REPOSITORY
-from support.grounds import make_terrain, wall_at
+from support.grounds import make_terrain, wall_at, waves
 from support.ros_fixtures import domain_id
 
 START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
@@ -131,4 +132,17 @@ def test_a_rover_that_is_not_there_fails_the_drive(walled):
 def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for():
     code, _, err = run_planner(START, NEAR, "--timeout=1")
     assert code == 4
-    assert err.count("\n") == 1 and "can_traverse" in err
+    assert err.count("\n") == 1
+    assert "in vain for the service /traverse_server/can_traverse and the topic /tra" in err
+
+
+@pytest.mark.slow
+def test_a_server_with_another_name_is_found_by_remapping(ros):
+    judge = ["--ros-args", "-r", "__node:=judge"]
+    server = ros.spin(TraverseServer(context=ros.context, cli_args=judge))
+    server.service.take_terrain(make_terrain(waves))
+    names = ("can_traverse", "verdict", "wheel_loads", "slip_ratios")
+    words = [f"traverse_server/{name}:=judge/{name}" for name in names]
+    remapped = [word for name in words for word in ("-r", name)]
+    code, out, _ = run_planner(START, NEAR, "--timeout=20", "--ros-args", *remapped)
+    assert (code, "goal 1: yes" in out) == (0, True)

@@ -172,6 +172,15 @@ def test_a_bad_override_is_refused_at_the_start(make_node, name, value):
         declare_parameters(make_node(**{name: value}), TraverseServerParameters)
 
 
+def test_a_bad_override_is_refused_in_the_words_of_the_table(make_node):
+    words = "^parameter friction is 1; it must be of type double, such as 0.0$"
+    with pytest.raises(ParameterError, match=words):
+        declare_parameters(make_node(friction=1), TraverseServerParameters)
+    words = r"^parameter friction is -1.0; it must be in 0 to 10$"
+    with pytest.raises(ParameterError, match=words):
+        declare_parameters(make_node(friction=-1.0), TraverseServerParameters)
+
+
 def test_a_bad_change_leaves_the_value_and_says_why(make_node):
     node, seen = make_node(), []
     values = Values(node, seen.append)

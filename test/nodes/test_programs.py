@@ -122,6 +122,23 @@ def test_what_a_plain_installation_brings_is_known_by_its_modules():
     assert {package.lower() for package in PLAIN.values()} == required
 
 
+SIGNAL_AT_IMPORT = """
+import os
+class Signal:
+    def find_spec(self, name, path=None, target=None):
+        if name == "rover_planner.nodes.{name}":
+            os.kill(os.getpid(), {number})
+sys.meta_path.insert(0, Signal())
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_signal_ends_a_program_cleanly_while_it_is_imported(name, how):
+    ended = run_with(SIGNAL_AT_IMPORT.format(name=name, number=int(how)), name)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+
+
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_help_comes_before_anything_is_started(name, capfd):
     assert MAINS[name](["--help"]) == 0
@@ -142,7 +159,7 @@ def test_help_comes_before_anything_is_started(name, capfd):
 def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd):
     assert MAINS[name](words) == 2
     err = capfd.readouterr().err
-    assert said in err and "Traceback" not in err
+    assert said in err and "Traceback" not in err and "/rcl/" not in err
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
@@ -250,6 +267,8 @@ def test_a_simulator_that_is_told_to_end_while_it_publishes_ends_cleanly(how):
     process = start_program("rover_simulator", *words)
     read_until_ready(process)
     time.sleep(1.0)
-    process.send_signal(how)
+    for _ in range(3):  # launch and the terminal both send one
+        process.send_signal(how)
+        time.sleep(0.01)
     _, err = process.communicate(timeout=20)
     assert (process.returncode, "Traceback" in err) == (0, False), err

@@ -7,8 +7,9 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.planning.navigation.transforms import Rigid
+from support.messages.grid_maps import grid_map_of
 from support.messages.recorded_drives import (
     BEGIN,
     cloud,
@@ -17,6 +18,7 @@ from support.messages.recorded_drives import (
     joints_of,
     odometry_at,
     record,
+    record_grid_map,
     record_with_transforms,
     replay,
     transforms_of,
@@ -94,6 +96,28 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     np.testing.assert_allclose(ground.elevation_at(x, y), right.elevation_at(x, y), atol=2e-3)
     poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
     np.testing.assert_allclose(poses[0], [1.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_a_grid_map_in_odom_is_laid_onto_the_loaded_map(tmp_path, capsys):
+    save_terrain(tmp_path / "prior.npz", Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0)))
+    file = tmp_path / "server.yaml"
+    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
+    map_odom = Rigid.from_rpy(2.0, -0.5, 0.02, 0.0, 0.0, 0.7)
+    x, y = np.meshgrid(np.arange(-25, 26) * 0.04, np.arange(-25, 26) * 0.04)
+    message = grid_map_of({"elevation": 0.05 * np.sin(2.0 * x) * np.cos(y)}, 0.04)
+    message.header.frame_id = "odom"
+    transforms = {"/tf_static": transforms_of("map", "odom", map_odom)}
+    bag = record_grid_map(tmp_path / "bag", message, transforms)
+    words = ["--parameters", str(file), "--goal", "3,0.2,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["refused_messages"] == {}
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    assert (ground.origin, ground.elevation.shape) == ((-1.0, -2.0), (100, 250))
+    for own in ((0.0, 0.0), (0.4, -0.3), (-0.5, 0.6)):
+        there = map_odom.rotation.apply((*own, 0.0)) + map_odom.translation
+        height = 0.02 + 0.05 * np.sin(2.0 * own[0]) * np.cos(own[1])
+        assert ground.elevation_at(*there[:2]) == pytest.approx(height, abs=1e-3)
+    assert ground.elevation_at(6.0, 1.0) == 0.0
 
 
 def test_joints_with_the_names_of_the_robot_are_measured(tmp_path, capsys):

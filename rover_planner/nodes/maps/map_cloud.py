@@ -12,7 +12,7 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import NANOSECONDS
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.ros.qos import map_qos
+from rover_planner.ros.publishing.latched_publisher import LatchedPublisher
 
 TOPIC = "~/map"
 
@@ -23,7 +23,7 @@ class MapCloud:
     def __init__(self, node: Node, service: TraverseService, frame: str):
         """Create the publisher; `frame` is that of maps without one."""
         self._node, self._service, self._frame = node, service, frame
-        self._publisher = node.create_publisher(PointCloud2, TOPIC, map_qos())
+        self._publisher = LatchedPublisher(node, PointCloud2, TOPIC)
         self._shown: KnownMap | None = None
         self._pool = ThreadPoolExecutor(1, "map_cloud")
         self._work: Future[None] | None = None
@@ -35,7 +35,11 @@ class MapCloud:
             self._shown, "fingerprint", None
         )
         is_free = self._work is None or self._work.done()
-        if known is not None and is_new and is_free and self._publisher.get_subscription_count():
+        if known is None or not is_new or not is_free:
+            return
+        if not self._publisher.has_listeners:
+            self._publisher.withdraw()
+        else:
             self._shown = known
             self._work = self._pool.submit(self._publish, known)
 

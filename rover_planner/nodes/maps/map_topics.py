@@ -1,5 +1,6 @@
 """The maps of a traverse server: topics, files, and what the rover itself knows."""
 
+import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,13 +20,15 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.planning.navigation.transforms import Rigid, TransformError
 from rover_planner.ros.guard import Guard
+from rover_planner.ros.logs.repeat_log import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions, sensor_qos
 from rover_planner.ros.qos_warnings import warn_of_mismatch
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
+from rover_planner.worlds.maps.moved_map import MapMove
 from rover_planner.worlds.summary import describe_terrain
 
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
@@ -33,7 +36,9 @@ CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 LOOK_PERIOD = 0.5
 """Shortest time between two looks for unknown ground under the rover [s]."""
 LOG_PERIOD = 10.0
-"""Shortest time between two log lines about maps that merge [s]."""
+"""Shortest time between two log lines about maps that merge, or come again and again [s]."""
+FIRST_MAPS = 20
+"""Maps that replace each other of which each is told in the log."""
 MERGE_WAIT = 0.005
 """Longest wait of a question for a map that is to be merged into the one that is there [s]. A busy
 machine may take 15 ms more to wake the thread until it is 20 ms."""
@@ -98,6 +103,8 @@ class MapTopics:
         self._is_from_topic = False
         self._topic, self._looked = CLOUD, -float("inf")
         self._told, self._told_kind = -float("inf"), ("", False)
+        self._map_count, self._refusals = 0, RepeatLog()
+        self._unplaced: tuple[str, int | None] | None = None
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self._keep(self._keeper.load(terrain, self._now(), None), parameters.terrain_file)
@@ -182,6 +189,18 @@ class MapTopics:
             self._looked = now
             self._intake.do(self._fill_under_rover)
 
+    def retry(self) -> None:
+        """Take the last message again if its transform has come meanwhile; call it each second.
+
+        A map that is published once may arrive before the first transform.
+        """
+        if self._unplaced is None:
+            return
+        with contextlib.suppress(TransformError):
+            self._find_sensor(*self._unplaced)
+            self._unplaced = None
+            self._intake.repeat()
+
     def close(self) -> None:
         """End the thread."""
         self._intake.close()
@@ -195,29 +214,33 @@ class MapTopics:
         settings = self._settings
         self._topic = CLOUD if isinstance(message, PointCloud2) else GRID_MAP
         stamp = stamp_to_ns(message.header.stamp)
+        self._unplaced = None
+        source = self._find_source(message.header.frame_id, stamp)
         if self._topic == CLOUD:
+            move = None if source is None else PointMove(*source.matrix)
             terrain = terrain_from_point_cloud(
-                message,
-                settings.resolution,
-                settings.cell_height,
-                self._find_cloud(message.header.frame_id, stamp),
+                message, settings.resolution, settings.cell_height, move
             )
         else:
-            check_frame(message.header.frame_id, settings.frame, self._topic)
             terrain = terrain_from_grid_map(message, settings.layers)
+            if source is not None:
+                terrain = self._keeper.place(terrain, MapMove(*source.matrix))
         since = self._now() if stamp is None else stamp / NANOSECONDS
         kept = self._keeper.take(terrain, self._topic, since, self._service.standing())
         self._take(kept, self._topic, stamp)
         self._is_from_topic = True
 
-    def _find_cloud(self, frame: str, stamp: int | None) -> PointMove | None:
-        """Return what moves the points of a cloud to the map frame; None if they are in it."""
+    def _find_source(self, frame: str, stamp: int | None) -> Rigid | None:
+        """Return where the frame of a map was in the map frame; None if it is that."""
         if frame == self._settings.frame:
             return None
         if not frame:
             check_frame(frame, self._settings.frame, self._topic)
-        sensor = self._find_sensor(frame, stamp)
-        return PointMove(sensor.rotation.as_matrix(), sensor.translation)
+        try:
+            return self._find_sensor(frame, stamp)
+        except TransformError:
+            self._unplaced = frame, stamp
+            raise
 
     def _fill_under_rover(self) -> None:
         standing = self._service.standing()
@@ -237,7 +260,9 @@ class MapTopics:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None
             kind = source, self._keeper.merges
-            if not kind[1] or kind != self._told_kind or now - self._told >= LOG_PERIOD:
+            self._map_count += not kind[1]
+            is_due = now - self._told >= LOG_PERIOD or kind != self._told_kind
+            if is_due or (not kind[1] and self._map_count <= FIRST_MAPS):
                 self._told, self._told_kind = now, kind
                 self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
 
@@ -254,7 +279,9 @@ class MapTopics:
     def _refuse(self, error: str) -> None:
         there = self._service.known_map is not None
         kept = "the last good map stays" if there else "there is no map yet"
-        self._node.get_logger().error(f"{self._topic} refused, {kept}: {error}")
+        line = self._refusals.line(f"{self._topic} refused, {kept}: {error}", time.monotonic())
+        if line:
+            self._node.get_logger().error(line)
         self._tell(error)
 
 

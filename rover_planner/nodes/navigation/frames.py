@@ -18,6 +18,7 @@ from msg_adapters.paths import pose_to_array
 from msg_adapters.stamps import stamp_to_ns
 from rover_planner.planning.navigation.transforms import (
     Rigid,
+    TransformError,
     TransformTree,
     stamped_transform,
 )
@@ -93,6 +94,11 @@ class Frames:
         self._node.create_subscription(kind, "/tf", around(self.take), TF_DEPTH)
         self._node.create_subscription(kind, "/tf_static", around(self.take_static), static)
 
+    @property
+    def silence(self) -> str:
+        """Why /tf says nothing, to be added to a refusal; empty if it is heard."""
+        return "" if tf_message() is not None else "; /tf needs tf2_msgs, which is not installed"
+
     def apply_timeout(self, timeout: float) -> None:
         """Take the age from which transforms are refused [s]."""
         self._tree.timeout = timeout
@@ -104,6 +110,19 @@ class Frames:
     def take_static(self, message: Any) -> None:
         """Take a TFMessage of /tf_static."""
         self._take(message.transforms, is_static=True)
+
+    def find(self, frame: str, stamp: int | None) -> Rigid:
+        """Return where a frame was in the map frame at a time [ns]; None is the newest.
+
+        Any thread may call it.
+
+        Raises:
+            TransformError: As `TransformTree.find`, with what keeps /tf from being heard.
+        """
+        try:
+            return self._tree.find(self._map, frame, stamp, self._now())
+        except TransformError as error:
+            raise TransformError(f"{error}{self.silence}") from None
 
     def find_here(self) -> NDArray[np.float64] | None:
         """Return (3,) x, y [m], yaw [rad] of the body on the map by /tf; None without /tf.

@@ -23,10 +23,10 @@ from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
 from rover_planner.planning.navigation.pose_classes import RoverOnMap
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover
-from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.logs.transition_log import TransitionLog
+from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import latched_qos
 from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.ros.transition_log import TransitionLog
 
 PERIOD = 0.5
 """Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""
@@ -113,6 +113,13 @@ class HazardTopics:
         shown = self._shown
         if shown is not None and self._enabled.is_set():
             response.map = shown.grid("worst")
+            return response
+        missing = "no cell was judged yet"
+        if not self._enabled.is_set():
+            missing = "the parameter hazard_map is false"
+        elif self._service.known_map is None:
+            missing = "there is no map yet"
+        self._node.get_logger().warning(f"get_hazard_map: an empty grid, {missing}")
         return response
 
     def _catch_up(self) -> None:

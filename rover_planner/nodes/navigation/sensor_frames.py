@@ -10,7 +10,7 @@ from msg_adapters.stamps import stamp_to_ns
 from rover_planner.nodes.navigation.frames import Frames, read_pose
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
-from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.planning.navigation.transforms import Rigid, TransformError
 
 
 class SensorFrames(Frames):
@@ -43,7 +43,10 @@ class SensorFrames(Frames):
         Raises:
             TransformError: As `SensorPoses.find`.
         """
-        return self._sensors.find(frame, stamp, self._now(), self._tree)
+        try:
+            return self._sensors.find(frame, stamp, self._now(), self._tree)
+        except TransformError as error:
+            raise TransformError(f"{error}{self.silence}") from None
 
     def take_odometry(self, odometry: Odometry) -> None:
         """Keep the pose of the body that odometry in the map frame tells, for the sensors."""

@@ -20,12 +20,12 @@ from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
 from rover_planner.nodes.navigation.frames import Frames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.guard import Guard
+from rover_planner.ros.logs.transition_log import TransitionLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.publisher_check import ExpectedType, PublisherCheck
 from rover_planner.ros.qos import map_subscriptions, sensor_qos
 from rover_planner.ros.qos_warnings import warn_of_mismatch
 from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.ros.transition_log import TransitionLog
 from rover_planner.traction.stamps import NANOSECONDS, StampCheck, StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,

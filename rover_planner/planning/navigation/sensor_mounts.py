@@ -98,8 +98,9 @@ class SensorPoses:
                 return tree.find(self._map, frame, stamp, now)
             if not tree.connects(self._base, frame):
                 raise TransformError(
-                    f"cloud is in frame {frame!r}; it must be in {self._map!r}, or in a frame of "
-                    f"/tf or sensor_mounts, which has {', '.join(sorted(self._mounts))}"
+                    f"the message is in frame {frame!r}; it must be in {self._map!r}, or in a "
+                    "frame of /tf or sensor_mounts; known are "
+                    + ", ".join(sorted({*self._mounts, *tree.frames()}))
                 )
             mount = tree.find(self._base, frame, stamp, now)
         return self._find_robot(stamp, now, tree).then(mount)

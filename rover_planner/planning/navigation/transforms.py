@@ -52,6 +52,11 @@ class Rigid:
         return Rigid(-back.apply(self.translation), back)
 
     @property
+    def matrix(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(3, 3) rotation matrix and (3,) translation [m]."""
+        return self.rotation.as_matrix(), self.translation
+
+    @property
     def xyyaw(self) -> NDArray[np.float64]:
         """(3,) x, y [m] and yaw [rad] of the child frame's origin and x axis."""
         ahead = self.rotation.apply([1.0, 0.0, 0.0])
@@ -144,9 +149,12 @@ class TransformTree:
 
     def knows(self, frame: str) -> bool:
         """Return whether a frame is the parent or the child of a transform."""
-        return frame in self._edges or any(
-            edge.parent == frame for edge in list(self._edges.values())
-        )
+        return frame in self.frames()
+
+    def frames(self) -> set[str]:
+        """Return the names of all frames."""
+        with self._lock:
+            return {*self._edges, *(edge.parent for edge in self._edges.values())}
 
     def has_parent(self, frame: str) -> bool:
         """Return whether a frame is the child of a transform."""

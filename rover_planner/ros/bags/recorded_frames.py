@@ -4,7 +4,6 @@ from typing import Any
 
 from nav_msgs.msg import Odometry
 
-from msg_adapters.elevation import PointMove
 from msg_adapters.frames import check_frame, read_transform
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.stamps import stamp_to_ns
@@ -63,18 +62,17 @@ class RecordedFrames:
         body = robot if self._offset is None else robot.then(self._offset)
         return *body.translation.tolist(), *body.rotation.as_euler("xyz").tolist()
 
-    def find_move(self, cloud: Any, topic: str, recorded: int) -> PointMove | None:
-        """Return what moves the points of a cloud to the map's frame; None if they are in it.
+    def find_source(self, message: Any, topic: str, recorded: int) -> Rigid | None:
+        """Return where the frame of a map's message was in the map's; None if it is that.
 
         Raises:
-            MessageError: The cloud names no frame.
+            MessageError: The message names no frame.
             TransformError: As `SensorPoses.find`.
         """
-        frame = cloud.header.frame_id
+        frame = message.header.frame_id
         if frame in ("", self._map):
             check_frame(frame, self._map, topic)
             return None
-        stamp = stamp_to_ns(cloud.header.stamp)
+        stamp = stamp_to_ns(message.header.stamp)
         time = recorded if stamp is None else stamp
-        sensor = self._sensors.find(frame, stamp, time, self._tree)
-        return PointMove(sensor.rotation.as_matrix(), sensor.translation)
+        return self._sensors.find(frame, stamp, time, self._tree)

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.elevation import PointMove, terrain_from_point_cloud
 from msg_adapters.errors import MessageError
-from msg_adapters.frames import check_frame
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
@@ -46,6 +45,7 @@ from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
 from rover_planner.ros.bags.recorded_frames import RecordedFrames
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
+from rover_planner.worlds.maps.moved_map import MapMove
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
@@ -143,13 +143,15 @@ class Replay:
     def _take_map(self, recorded: Recorded) -> Iterator[Answer]:
         message, values = recorded.message, self.parameters
         stamp = stamp_to_ns(message.header.stamp)
+        source = self._frames.find_source(message, recorded.topic, recorded.stamp)
         if isinstance(message, PointCloud2):
-            move = self._frames.find_move(message, recorded.topic, recorded.stamp)
             size, height = values.map_resolution, values.cell_height
+            move = None if source is None else PointMove(*source.matrix)
             terrain = terrain_from_point_cloud(message, size, height, move)
         else:
-            check_frame(message.header.frame_id, values.map_frame, recorded.topic)
             terrain = terrain_from_grid_map(message, self._layers)
+            if source is not None:
+                terrain = self._keeper.place(terrain, MapMove(*source.matrix))
         since = (recorded.stamp if stamp is None else stamp) / NANOSECONDS
         standing = self._measured.standing(recorded.stamp / NANOSECONDS)
         kept = self._keeper.take(terrain, recorded.topic, since, standing)

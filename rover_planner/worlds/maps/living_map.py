@@ -218,15 +218,21 @@ class LivingMap:
         has_std = self._loaded is None or self._loaded.elevation_std is not None
         return 0.0 if has_std else self.rules.loaded_std
 
-    def _choose_grid(self, terrain: Terrain) -> None:
-        """Set the cells: those of the first map, or of a first local one that is finer."""
+    def grid_for(self, terrain: Terrain) -> CellGrid | None:
+        """Return the cells onto which a local map merges; None if it sets them.
+
+        The first map sets them, and a first local one that is finer than the loaded one.
+        """
         is_finer = (
             self._grid is not None
             and self._loaded is not None
             and not self._last
             and terrain.resolution < FINER * self._grid.resolution
         )
-        if self._grid is None or is_finer:
+        return None if is_finer else self._grid
+
+    def _choose_grid(self, terrain: Terrain) -> None:
+        if self.grid_for(terrain) is None:
             self._grid, self._window = grid_of(terrain), None
 
     def _room_for(self, box: CellBox, centre: tuple[float, float]) -> Window:

@@ -6,6 +6,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.worlds.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
 from rover_planner.worlds.maps.living_map import LivingMap, MapSnapshot, MergeRules
+from rover_planner.worlds.maps.moved_map import MapMove, move_map
 
 AUTO, MERGE, REPLACE = "auto", "merge", "replace"
 MAP_UPDATES = (AUTO, MERGE, REPLACE)
@@ -60,6 +61,15 @@ class MapKeeper:
         self._start = None
         self._living.load(terrain, time)
         return self._filled(standing, time)
+
+    def place(self, terrain: Terrain, move: MapMove) -> Terrain:
+        """Return a local map of another frame, moved to that of this map and onto its cells.
+
+        Raises:
+            PlanningError: As `move_map`.
+        """
+        grid = self._living.grid_for(terrain) if self.merges else None
+        return move_map(terrain, move, grid, self._settings.rules.max_cells)
 
     def take(
         self, terrain: Terrain, source: str, time: float, standing: Standing | None

@@ -12,7 +12,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.messages.transforms import send_transforms
 from support.ros_fixtures import wait_until
-from support.rough_grounds import plane
+from support.rough_grounds import RESOLUTION, plane
 
 MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 """Where odometry began, on the map."""
@@ -75,3 +75,24 @@ def test_tf_is_heard_only_if_odometry_needs_it(
     drive_in_odom(lambda: needs_none.count_subscribers("/tf") == 1, "the subscription")
     refusal = "odometry not used: odometry is in frame 'odom'; it must be in 'map'"
     wait_until(lambda: rover.count_lines(refusal), "the refusal without a transform")
+
+
+def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(
+    rover, start_controller
+):
+    controller = start_controller(transform_timeout=5.0, map_resolution=RESOLUTION)
+    ground = plane(0.1, 0.0, half=1.0)
+    sender = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    sender.publish(terrain_to_point_cloud(ground, "odom", rover.get_clock().now().to_msg()))
+    refusal = "the last map stays: no transforms connect the frames 'odom' and 'map'"
+    wait_until(lambda: rover.count_lines(refusal), "the refusal")
+    assert controller.service._terrain is None
+    take = controller._inputs.frames.take
+    send_transforms(controller, take, ("map", "odom", MAP_ODOM), age=0.0)
+    wait_until(lambda: controller.service._terrain is not None, "the map, without a new message")
+    found = controller.service._terrain
+    there = MAP_ODOM.rotation.apply((0.5, 0.25, 0.0)) + MAP_ODOM.translation
+    height = ground.elevation_at(0.5, 0.25) + 0.4
+    assert found.elevation_at(*there[:2]) == pytest.approx(height, abs=1e-5)
+    assert found.bounds == pytest.approx((0.0, 2.0, -1.5, 0.5), abs=1e-6)
+    assert rover.count_lines(refusal) == 1

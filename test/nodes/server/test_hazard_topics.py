@@ -86,3 +86,13 @@ def test_without_the_parameter_there_is_no_map(mapped, ros):
     costmap = ros.spin(Costmap(ros, ("worst",)))
     assert len(call(costmap.ask, GetMap.Request()).map.data) == 0
     assert costmap.grids["worst"] == []
+
+
+def test_an_empty_answer_says_in_the_log_what_is_missing(start_server, client):
+    start_server()
+    ask = client.create_client(GetMap, f"{SERVER}/get_hazard_map")
+    assert call(ask, GetMap.Request()).map.info.width == 0
+    client.wait_for_log("get_hazard_map: an empty grid, the parameter hazard_map is false")
+    assert client.set_parameter("hazard_map", True)[0]
+    assert call(ask, GetMap.Request()).map.info.width == 0
+    client.wait_for_log("get_hazard_map: an empty grid, there is no map yet")

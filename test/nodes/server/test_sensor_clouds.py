@@ -124,5 +124,5 @@ def test_a_cloud_whose_pose_is_stale_missing_or_unknown_is_refused_with_the_reas
         refused + "by odometry: the transform from 'base_link' to 'map' is stale: it is 7."
     )
     client.send_cloud(cloud_of(points, "rear_camera", now.to_msg()))
-    client.wait_for_log(refused + "cloud is in frame 'rear_camera'; it must be in 'map', or")
+    client.wait_for_log(refused + "the message is in frame 'rear_camera'; it must be in 'map', or")
     assert camera_server.service.terrain is None

@@ -1,7 +1,5 @@
 """A traverse server merges maps of both kinds, and fills the ground on which the rover stands."""
 
-import importlib
-import sys
 import time
 
 import numpy as np
@@ -9,89 +7,19 @@ import pytest
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState, PointCloud2
-from std_msgs.msg import Float32MultiArray, MultiArrayDimension
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.terrain.grid import Terrain, save_terrain
-from rover_planner.nodes.maps import map_topics
 from rover_planner.ros.qos import map_qos
 from rover_planner.worlds.maps.map_keeper import MapKeeper
 from support.grounds import make_terrain, wall_at, waves
-from support.messages.grid_maps import grid_map_of, move_buffer
-from support.messages.interfaces import GRID_MAP_MSGS, build_messages
 from support.planner_client import GOAL, SERVER, START, ask, verdict_of
 from support.ros_fixtures import wait_until
 
 PRIOR = make_terrain(waves)
-
-
-@pytest.fixture(scope="module")
-def grid_map_msgs(tmp_path_factory):
-    """Return grid_map_msgs.msg, built for this test where it is not installed."""
-    if map_topics.grid_map_type() is not None:
-        yield importlib.import_module("grid_map_msgs.msg")
-        return
-    folder = tmp_path_factory.mktemp("messages")
-    uses = ("std_msgs", "geometry_msgs", "builtin_interfaces")
-    build_messages(folder, "grid_map_msgs", GRID_MAP_MSGS, uses)
-    sys.path.insert(0, str(folder))
-    importlib.invalidate_caches()
-    yield importlib.import_module("grid_map_msgs.msg")
-    sys.path.remove(str(folder))
-    for name in [name for name in sys.modules if name.partition(".")[0] == "grid_map_msgs"]:
-        del sys.modules[name]
-
-
-def to_message(kind, plain, frame="map"):
-    """Return a GridMap of a stand-in with the same fields."""
-    message = kind(layers=plain.layers, basic_layers=plain.basic_layers)
-    message.header.frame_id = frame
-    for name in ("resolution", "length_x", "length_y"):
-        setattr(message.info, name, getattr(plain.info, name))
-    for name in "xy":
-        setattr(message.info.pose.position, name, getattr(plain.info.pose.position, name))
-    for array in plain.data:
-        layer = Float32MultiArray()
-        layer.layout.dim = [
-            MultiArrayDimension(label=dim.label, size=dim.size, stride=dim.stride)
-            for dim in array.layout.dim
-        ]
-        layer.data = np.asarray(array.data, np.float32).tolist()
-        message.data.append(layer)
-    message.outer_start_index = plain.outer_start_index
-    message.inner_start_index = plain.inner_start_index
-    return message
-
-
-def test_a_grid_map_with_a_moved_buffer_is_the_map_over_dds(grid_map_msgs, start_server, client):
-    server = start_server()
-    publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
-    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
-    plain = grid_map_of({"elevation": PRIOR.elevation}, PRIOR.resolution)
-    publisher.publish(to_message(grid_map_msgs.GridMap, move_buffer(plain, 17, 130)))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    np.testing.assert_array_equal(server.service.terrain.elevation, PRIOR.elevation)
-    assert server.service.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
-    known = server.service.known_map
-    assert (known.source, known.frame) == ("elevation_map", "map")
-    _, verdict, _ = ask(client)
-    assert verdict["traversable"] == "true" and verdict["blind_share"] == "0.0"
-    # A map that cannot be used is refused by the name of its topic, and the last one stays.
-    client.logs.clear()
-    turned = to_message(grid_map_msgs.GridMap, plain)
-    turned.info.pose.orientation.z, turned.info.pose.orientation.w = 0.1, 0.995
-    publisher.publish(turned)
-    client.wait_for_log("elevation_map refused, the last good map stays: grid map is turned")
-
-
-def test_without_grid_map_msgs_the_server_has_no_such_topic(start_server, monkeypatch):
-    monkeypatch.setattr(map_topics, "grid_map_type", lambda: None)
-    server = start_server()
-    topics = {name for name, _ in server.get_topic_names_and_types()}
-    assert "/elevation_cloud" in topics and "/elevation_map" not in topics
 
 
 def local_map(column, row, height=0.0, cells=20):
@@ -242,19 +170,3 @@ def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu(start_server,
 
     now = wait_until(is_tilted, "the tilt")
     assert (now.roll, now.pitch, now.yaw) == pytest.approx((0.1, -0.2, 0.3))
-
-
-def test_friction_and_deviation_of_a_grid_map_are_used(grid_map_msgs, start_server, client):
-    server = start_server(elevation_layer="height", variance_layer="none", friction_layer="mu")
-    publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
-    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
-    layers = {
-        "height": PRIOR.elevation,
-        "variance": np.full(PRIOR.elevation.shape, 4.0),
-        "mu": np.full(PRIOR.elevation.shape, 0.01),
-    }
-    publisher.publish(to_message(grid_map_msgs.GridMap, grid_map_of(layers, PRIOR.resolution)))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    assert server.service.terrain.elevation_std is None
-    _, verdict, _ = ask(client)
-    assert verdict["code"] == "friction"

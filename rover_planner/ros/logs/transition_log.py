@@ -19,6 +19,10 @@ class _Condition:
     """Whether it has changed since the last line."""
     told_at: float = -math.inf
     """Time of the last line [s]."""
+    told: bool = False
+    """What the last line said: whether it held."""
+    passed: str = ""
+    """The reason why it held last."""
 
 
 class TransitionLog:
@@ -39,12 +43,16 @@ class TransitionLog:
             now: Monotonic time [s].
         """
         condition = self._conditions.setdefault(name, _Condition())
+        condition.passed = reason or condition.passed
         if bool(reason) != condition.holds:
             condition.holds, condition.changed = bool(reason), True
         if not condition.changed or now - condition.told_at < QUIET_TIME:
             return
         condition.changed, condition.told_at = False, now
+        was_told, condition.told = condition.told, bool(reason)
         if reason:
             self._logger.warning(reason)
-        else:
+        elif was_told:
             self._logger.info(end)
+        else:
+            self._logger.info(f"{end}; it was for less than {QUIET_TIME:g} s: {condition.passed}")

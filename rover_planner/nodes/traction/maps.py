@@ -1,0 +1,89 @@
+"""The map of the traction controller: clouds of the map's frame, or of one that /tf connects."""
+
+import contextlib
+import time
+from collections.abc import Callable
+
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+
+from msg_adapters.elevation import PointMove, terrain_from_point_cloud
+from msg_adapters.frames import check_frame
+from msg_adapters.stamps import stamp_to_ns
+from rover_physics.rover.model import Rover
+from rover_planner.nodes.navigation.frames import Frames
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.planning.navigation.transforms import TransformError
+from rover_planner.ros.logs.repeat_log import RepeatLog
+from rover_planner.ros.map_intake import MapIntake
+from rover_planner.traction.prepared_map import PreparedMap, prepare_map
+
+CLOUD = "elevation_cloud"
+
+
+class TractionMaps(MapIntake[PreparedMap]):
+    """Prepares clouds for the controller in a thread of their own."""
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: TractionControllerParameters,
+        rover: Callable[[], Rover],
+        frames: Callable[[], Frames],
+    ):
+        """Start the thread.
+
+        Args:
+            node: The node.
+            parameters: Its parameters.
+            rover: Returns the rover for which maps are prepared.
+            frames: Returns what knows where frames are on the map.
+        """
+        self._node, self._rover, self._frames = node, rover, frames
+        self._parameters = parameters
+        self._refusals = RepeatLog()
+        self._unplaced: tuple[str, int | None] | None = None
+        super().__init__(self._make, self._tell)
+
+    def apply(self, parameters: TractionControllerParameters) -> None:
+        """Prepare the last map again if a parameter of it has changed."""
+        before, self._parameters = self._parameters, parameters
+        names = ("map_resolution", "cell_height")
+        if any(getattr(before, name) != getattr(parameters, name) for name in names):
+            self.repeat()
+
+    def look_for_frame(self) -> None:
+        """Listen to /tf if a map needs it, and take it when its frame is known; call it often."""
+        if self._unplaced is None:
+            return
+        frames = self._frames()
+        frames.listen()  # only then: /tf of a whole robot costs the loop time
+        with contextlib.suppress(TransformError):
+            frames.find(*self._unplaced)
+            self._unplaced = None
+            self.repeat()
+
+    def _make(self, cloud: PointCloud2) -> PreparedMap:
+        """Prepare a map from a cloud; called in the thread."""
+        values, move = self._parameters, self._find_move(cloud)
+        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
+        return prepare_map(self._rover(), terrain)
+
+    def _find_move(self, cloud: PointCloud2) -> PointMove | None:
+        """Return what moves the points to the map's frame; None if they are in it."""
+        self._unplaced = None
+        frame, stamp = cloud.header.frame_id, stamp_to_ns(cloud.header.stamp)
+        if frame in ("", self._parameters.map_frame):
+            check_frame(frame, self._parameters.map_frame, CLOUD)
+            return None
+        try:
+            return PointMove(*self._frames().find(frame, stamp).matrix)
+        except TransformError:
+            self._unplaced = frame, stamp
+            raise
+
+    def _tell(self, error: str) -> None:
+        line = f"{CLOUD} refused, the last map stays: {error}"
+        line = self._refusals.line(line, time.monotonic())
+        if line:
+            self._node.get_logger().error(line)

@@ -1,0 +1,1 @@
+"""Log lines about what lasts or repeats."""

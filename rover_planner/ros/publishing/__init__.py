@@ -1,0 +1,1 @@
+"""Publishers that make messages for those who listen."""

@@ -1,0 +1,166 @@
+"""A map of another frame is moved to that of the server, and no ground is made up."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rover_physics import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.worlds.maps.cells import CellGrid, lay_onto
+from rover_planner.worlds.maps.map_keeper import MERGE, KeeperSettings, MapKeeper
+from rover_planner.worlds.maps.moved_map import MAX_LEAN, MapMove, move_map
+from support.grounds import make_terrain, waves
+
+CELL = 0.05
+LSR1 = load_rover("lsr1")
+RNG = np.random.default_rng(5)
+
+
+def move_of(x=0.0, y=0.0, z=0.0, roll=0.0, pitch=0.0, yaw=0.0) -> MapMove:
+    return MapMove(*Rigid.from_rpy(x, y, z, roll, pitch, yaw).matrix)
+
+
+def rough_map(shape=(31, 40), origin=(3.0, -2.0)) -> Terrain:
+    """Return noise with holes, deviations and friction."""
+    z = RNG.normal(0.0, 0.1, shape)
+    z[RNG.uniform(size=shape) < 0.1] = np.nan
+    known = np.isfinite(z)
+    std = np.where(known, RNG.uniform(0.01, 0.05, shape), np.nan)
+    friction = np.where(known, RNG.uniform(0.4, 0.9, shape), np.nan)
+    return Terrain(z, CELL, origin, friction, elevation_std=std)
+
+
+def test_a_shift_by_whole_cells_keeps_the_cells_of_the_grid_to_the_bit():
+    local = rough_map()
+    grid = CellGrid((-7.0, 4.0), CELL)
+    moved = move_map(local, move_of(17 * CELL, -123 * CELL), grid)
+    before, after = lay_onto(local, grid), lay_onto(moved, grid)
+    assert (after.box.row, after.box.column) == (before.box.row - 123, before.box.column + 17)
+    assert before.layers.keys() == {"elevation", "elevation_std", "friction"}
+    for name, layer in before.layers.items():
+        assert after.layers[name].tobytes() == layer.tobytes()
+
+
+def test_a_shift_in_height_is_added_to_the_heights_alone():
+    local = rough_map()
+    moved = move_map(local, move_of(0.0, 0.0, 0.37))
+    assert moved.elevation.tobytes() == (local.elevation + 0.37).tobytes()
+    assert moved.elevation_std.tobytes() == local.elevation_std.tobytes()
+    assert moved.friction.tobytes() == local.friction.tobytes()
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_quarter_turns_only_rearrange_the_cells(quarters):
+    local, yaw = rough_map(), 0.5 * math.pi * quarters
+    x, y, _ = move_of(yaw=yaw).rotation @ (*local.origin, 0.0)
+    off = [round(value / CELL) * CELL - value for value in (x, y)]  # cells meet cells then
+    moved = move_map(local, move_of(*off, yaw=yaw))
+    for name in ("elevation", "elevation_std", "friction"):
+        right = np.rot90(getattr(local, name), -quarters)  # rows of a map run up
+        assert getattr(moved, name).tobytes() == np.ascontiguousarray(right).tobytes()
+
+
+def test_a_turned_plane_is_the_same_plane():
+    local = make_terrain(lambda x, y: 0.2 * x - 0.1 * y + 1.0)
+    here = Rigid.from_rpy(12.3, -4.56, 0.7, 0.0, 0.0, 0.813)
+    moved = move_map(local, MapMove(*here.matrix))
+    rows, columns = np.nonzero(np.isfinite(moved.elevation))
+    x, y = moved.origin[0] + CELL * columns, moved.origin[1] + CELL * rows
+    back = here.inverse().rotation.apply(np.column_stack([x, y, 0.0 * x]))
+    back = back + here.inverse().translation
+    right = 0.2 * back[:, 0] - 0.1 * back[:, 1] + 1.7
+    np.testing.assert_allclose(moved.elevation[rows, columns], right, atol=1e-9)
+    assert moved.origin[0] / CELL == pytest.approx(round(moved.origin[0] / CELL), abs=1e-6)
+    area = np.isfinite(local.elevation).sum()
+    assert 0.95 * area < len(rows) <= area
+
+
+def test_a_cell_is_known_only_if_the_four_around_it_are():
+    local = rough_map()
+    here = Rigid.from_rpy(-1.0, 2.0, 0.0, 0.0, 0.0, -2.4)
+    moved = move_map(local, MapMove(*here.matrix))
+    back = here.inverse()
+    ny, nx = local.elevation.shape
+    known = 0
+    for row, column in np.ndindex(moved.elevation.shape):
+        at = (moved.origin[0] + CELL * column, moved.origin[1] + CELL * row, 0.0)
+        x, y, _ = back.rotation.apply(at) + back.translation
+        i, j = (y - local.origin[1]) / CELL, (x - local.origin[0]) / CELL
+        inside = 0.0 <= i <= ny - 1 and 0.0 <= j <= nx - 1
+        low = int(min(i, ny - 2)), int(min(j, nx - 2))
+        four = local.elevation[low[0] : low[0] + 2, low[1] : low[1] + 2]
+        is_known = inside and bool(np.isfinite(four).all())
+        assert np.isfinite(moved.elevation[row, column]) == is_known
+        if is_known:
+            known += 1
+            assert four.min() - 1e-12 <= moved.elevation[row, column] <= four.max() + 1e-12
+            nearest = round(i), round(j)
+            if max(abs(i - nearest[0]), abs(j - nearest[1])) < 0.49:
+                assert moved.friction[row, column] == local.friction[nearest]
+    assert known > 400
+    np.testing.assert_array_equal(np.isnan(moved.elevation_std), np.isnan(moved.elevation))
+
+
+def test_a_small_lean_tilts_the_ground_and_a_larger_one_is_refused_with_its_size():
+    local = make_terrain(lambda x, y: 0.0 * x)
+    here = Rigid.from_rpy(2.0, 1.0, 0.5, 0.003, -0.002, 0.0)
+    moved = move_map(local, MapMove(*here.matrix))
+    corner = here.rotation.apply((*local.origin, 0.0)) + here.translation
+    assert moved.elevation[0, 0] == pytest.approx(corner[2], abs=1e-12)
+    np.testing.assert_allclose(moved.origin, corner[:2], atol=1e-4)
+    with pytest.raises(PlanningError, match=r"leans by 0\.05 rad \(roll and pitch\); it must be"):
+        move_map(local, move_of(roll=0.03, pitch=0.04, yaw=1.0))
+    assert move_map(local, move_of(pitch=0.99 * MAX_LEAN)).elevation.shape == (161, 161)
+
+
+def test_a_turned_map_that_is_too_large_or_has_no_known_cell_is_refused():
+    local = rough_map()
+    with pytest.raises(PlanningError, match=r"would have \d+ x \d+ cells; at most 1000 are taken"):
+        move_map(local, move_of(yaw=0.7), max_cells=1000)
+    checks = np.where(np.indices((20, 20)).sum(axis=0) % 2 == 0, 0.0, np.nan)
+    with pytest.raises(PlanningError, match="none of them has four known ones around"):
+        move_map(Terrain(checks, CELL), move_of(0.01, 0.02, yaw=0.3))
+
+
+def test_a_turned_map_is_laid_onto_the_cells_of_the_map_that_it_merges_into():
+    prior = make_terrain(lambda x, y: 0.0 * x)
+    keeper = MapKeeper(LSR1, KeeperSettings(updates=MERGE, fill=False))
+    keeper.load(prior, 0.0, None)
+    local = make_terrain(lambda x, y: 0.02 * np.sin(x) + 0.02 * np.cos(y), half=1.0)
+    here = Rigid.from_rpy(0.513, -0.237, 0.1, 0.0, 0.0, 1.234)
+    placed = keeper.place(local, MapMove(*here.matrix))
+    merged = keeper.take(placed, "elevation_map", 1.0, None).terrain
+    assert merged.elevation.shape == prior.elevation.shape and merged.origin == prior.origin
+    patch = lay_onto(placed, CellGrid(prior.origin, prior.resolution))
+    known = np.isfinite(patch.layers["elevation"])
+    rows, columns = patch.box.within(lay_onto(prior, CellGrid(prior.origin, CELL)).box)
+    window = merged.elevation[rows, columns]
+    assert window[known].tobytes() == patch.layers["elevation"][known].tobytes()
+    assert (window[~known] == 0.0).all()
+    back = here.inverse()
+    y, x = np.nonzero(known)
+    at = np.column_stack([
+        merged.origin[0] + CELL * (patch.box.column + x),
+        merged.origin[1] + CELL * (patch.box.row + y),
+        0.0 * x,
+    ])  # fmt: skip
+    own = back.rotation.apply(at) + back.translation
+    right = 0.1 + local.elevation_at(own[:, 0], own[:, 1])
+    np.testing.assert_allclose(window[known], right, atol=1e-12)
+
+
+def test_peaks_of_much_finer_cells_are_kept_where_they_merge():
+    prior = make_terrain(lambda x, y: 0.0 * x, half=2.0)
+    keeper = MapKeeper(LSR1, KeeperSettings(updates=MERGE, fill=False))
+    keeper.load(prior, 0.0, None)
+    keeper.take(make_terrain(waves, half=0.5), "first", 1.0, None)  # sets no cells of its own
+    fine = np.zeros((101, 101))
+    fine[48:53, 48:53] = 0.3
+    local = Terrain(fine, 0.01, (-0.5, -0.5))
+    placed = keeper.place(local, move_of(0.31, 0.17, yaw=0.6))
+    assert placed.resolution == 0.01
+    merged = keeper.take(placed, "elevation_map", 2.0, None).terrain
+    assert np.nanmax(merged.elevation) == pytest.approx(0.3, abs=1e-12)
