@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rover_physics.numerics.interruption import interruptible
+from rover_physics.prediction.map_sweep import sweep_map
 from rover_physics.prediction.sweep import sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
@@ -157,6 +158,28 @@ def test_an_updated_map_equals_a_new_one_and_judges_little(seed, monkeypatch):
     stale = hazards.stale_count
     assert hazards.work(600.0) and sum(counted) == stale
     np.testing.assert_array_equal(hazards.view().classes, judged(after).view().classes)
+
+
+@pytest.mark.parametrize("rover,cell", [("lsr1", 0.05), ("lsr1", 0.12), ("m2020", 0.1)])
+@pytest.mark.parametrize("height", [-0.4, 0.5, np.nan])
+def test_beyond_the_reach_of_a_changed_cell_no_score_changes(rover, cell, height):
+    before = rough(8, (64, 64), cell, 0.3)
+    elevation = before.elevation.copy()
+    elevation[32, 31] = height
+    after = replace(before, elevation=elevation)
+    hazards = HazardMap(8)
+    hazards.take(RoverOnMap(load_rover(rover), before, OPTIONS))
+    hazards._stale[:] = False  # as if they were judged
+    hazards.take(RoverOnMap(load_rover(rover), after, OPTIONS))
+    _, old = next(sweep_map(load_rover(rover), before, 8, OPTIONS))
+    _, new = next(sweep_map(load_rover(rover), after, 8, OPTIONS))
+    fresh = ~np.moveaxis(hazards._stale, 0, -1)[: len(old.status)]
+    np.testing.assert_array_equal(old.status[fresh], new.status[fresh])
+    for name in ("friction_utilisation", "tip_over_ratio", "tilt", "belly_clearance"):
+        one, other = getattr(old, name), getattr(new, name)
+        np.testing.assert_allclose(one[fresh], other[fresh], rtol=1e-6, err_msg=name)
+    changed = np.count_nonzero((old.status != new.status) | (abs(old.tilt - new.tilt) > 0.0))
+    assert changed > 0.02 * hazards.stale_count  # the change counts
 
 
 @pytest.mark.parametrize("rows,columns", [(7, -5), (0, 12), (-60, 0)])

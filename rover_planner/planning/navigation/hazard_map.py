@@ -13,19 +13,23 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.navigation.class_kernels import IMPASSABLE, UNKNOWN
 from rover_planner.planning.navigation.footprint import find_footprint
 from rover_planner.planning.navigation.pose_classes import RoverOnMap, classify_poses
+from rover_planner.worlds.maps.changes import (
+    Shift,
+    Window,
+    find_changes,
+    find_overlap,
+    have_same_layers,
+)
 
 TILE = 32
 """Cells along the side of a tile; tiles are judged one after another."""
 BATCH = 4096
 """Poses for which tiles are judged together; fewer would not use all threads."""
-MARGIN = 2
-"""Cells by which a footprint is widened: heights are interpolated, and cells have an extent."""
+MARGIN = 1
+"""Cells by which a footprint is widened: a height counts for the ground up to one cell away, other
+layers for half a cell."""
 SHIFT_TOLERANCE = 1e-3
 """Share of a cell by which the grids of two maps may differ and still count as the same."""
-Window = tuple[slice, slice]
-"""Rows and columns of a map."""
-LAYERS = ("elevation", "friction", "soil", "elevation_std")
-"""Layers of a map that count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +83,7 @@ class HazardMap:
                 self._on_map = on_map
                 return
             changed = find_changes(before.terrain, on_map.terrain, shift)
-            old, new = _overlap(before.terrain, on_map.terrain, shift)
+            old, new = find_overlap(before.terrain, on_map.terrain, shift)
             classes[:, *new] = self._classes[:, *old]
             stale[:, *new] = self._stale[:, *old]
             stale |= self._within_reach(on_map, changed)
@@ -186,10 +190,6 @@ def _grow(cells: NDArray[np.bool_], reach: tuple[int, int]) -> NDArray[np.bool_]
     return grown
 
 
-Shift = tuple[int, int]
-"""Rows and columns from cell [0, 0] of a map to that of the next one."""
-
-
 def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
     """Return how far the grid has moved; None if nothing of the old map can be used."""
     old, new = before.terrain, now.terrain
@@ -198,8 +198,7 @@ def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
         and before.options == now.options
         and before.sigmas == now.sigmas
         and old.resolution == new.resolution
-        and old.soil_names == new.soil_names
-        and all((getattr(old, name) is None) == (getattr(new, name) is None) for name in LAYERS)
+        and have_same_layers(old, new)
     )
     if not alike:
         return None
@@ -209,42 +208,3 @@ def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
     if old.origin != new.origin and np.abs(moved - cells).max() > SHIFT_TOLERANCE:
         return None
     return int(cells[1]), int(cells[0])
-
-
-def _overlap(old: Terrain, new: Terrain, shift: Shift) -> tuple[Window, Window]:
-    """Return the cells that two maps have in common, as those of the old and of the new map."""
-    windows = [
-        (
-            slice(max(0, by), max(0, by, min(m, n + by))),
-            slice(max(0, -by), max(0, -by, min(n, m - by))),
-        )
-        for m, n, by in zip(old.elevation.shape, new.elevation.shape, shift, strict=True)
-    ]
-    return (windows[0][0], windows[1][0]), (windows[0][1], windows[1][1])
-
-
-def find_changes(old: Terrain, new: Terrain, shift: Shift) -> NDArray[np.bool_]:
-    """Return where a map differs from the one before.
-
-    Args:
-        old: The map before.
-        new: The map, with the same layers.
-        shift: Rows and columns from cell [0, 0] of the old map to that of the new one.
-
-    Returns:
-        (ny + 2, nx + 2) True for cells that are new or differ, with one more cell at each side,
-        which is True if the map's edge has moved.
-    """
-    ny, nx = new.elevation.shape
-    changed = np.ones((ny + 2, nx + 2), bool)
-    if shift == (0, 0) and old.elevation.shape == new.elevation.shape:
-        changed[:] = False
-    before, now = _overlap(old, new, shift)
-    inside = changed[1:-1, 1:-1]
-    inside[now] = False
-    for name in LAYERS:
-        one, other = getattr(old, name), getattr(new, name)
-        if one is not None:
-            a, b = one[before], other[now]
-            inside[now] |= ~((a == b) | ((a != a) & (b != b)))
-    return changed

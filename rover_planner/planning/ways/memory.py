@@ -5,15 +5,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.rover.turning import swing_radius
-from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.lattice.edges import Edges, JudgedEdges
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.lattice.primitives import make_primitives
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.worlds.maps.blind_ground import ALLOW
-
-_LAYERS = ("elevation", "friction", "soil", "elevation_std")
+from rover_planner.worlds.maps.changes import find_changes, have_same_layers
 
 
 class EdgeMemory:
@@ -35,7 +33,7 @@ class EdgeMemory:
             edges = Edges(nodes, make_primitives(question.rover, nodes.cell, spacing))
             known = JudgedEdges(edges)
         elif asked.terrain is not question.terrain or _sees_otherwise(asked, question):
-            changed = find_changes(asked.terrain, question.terrain)
+            changed = find_changes(asked.terrain, question.terrain)[1:-1, 1:-1]
             changed |= _find_newly_seen(asked, question)
             known.forget(_places_within_reach(question, known.edges, changed))
         self._asked, self._known = question, known
@@ -54,8 +52,7 @@ def _is_alike(asked: WayQuestion, question: WayQuestion, known: JudgedEdges, nod
         and old.resolution == new.resolution
         and old.origin == new.origin
         and old.elevation.shape == new.elevation.shape
-        and old.soil_names == new.soil_names
-        and all((getattr(old, name) is None) == (getattr(new, name) is None) for name in _LAYERS)
+        and have_same_layers(old, new)
     )
 
 
@@ -77,16 +74,6 @@ def _find_newly_seen(asked: WayQuestion, question: WayQuestion) -> NDArray[np.bo
     if old is None or new is None or not _sees_otherwise(asked, question):
         return np.zeros(question.terrain.elevation.shape, bool)
     return np.asarray(old.seen.kinds != new.seen.kinds)
-
-
-def find_changes(old: Terrain, new: Terrain) -> NDArray[np.bool_]:
-    """Return (ny, nx) True for the cells of two maps of the same grid that differ."""
-    changed = np.zeros(new.elevation.shape, bool)
-    for name in _LAYERS:
-        before, after = getattr(old, name), getattr(new, name)
-        if before is not None:
-            changed |= ~((before == after) | ((before != before) & (after != after)))
-    return changed
 
 
 def _places_within_reach(

@@ -1,0 +1,59 @@
+"""Where a map differs from the one before."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.terrain.grid import Terrain
+
+LAYERS = ("elevation", "friction", "soil", "elevation_std")
+"""Layers of a map that count."""
+Window = tuple[slice, slice]
+"""Rows and columns of a map."""
+Shift = tuple[int, int]
+"""Rows and columns from cell [0, 0] of a map to that of the next one."""
+
+
+def have_same_layers(old: Terrain, new: Terrain) -> bool:
+    """Return whether two maps have the same layers, and the same soils in them."""
+    return old.soil_names == new.soil_names and all(
+        (getattr(old, name) is None) == (getattr(new, name) is None) for name in LAYERS
+    )
+
+
+def find_overlap(old: Terrain, new: Terrain, shift: Shift) -> tuple[Window, Window]:
+    """Return the cells that two maps have in common, as those of the old and of the new map."""
+    windows = [
+        (
+            slice(max(0, by), max(0, by, min(m, n + by))),
+            slice(max(0, -by), max(0, -by, min(n, m - by))),
+        )
+        for m, n, by in zip(old.elevation.shape, new.elevation.shape, shift, strict=True)
+    ]
+    return (windows[0][0], windows[1][0]), (windows[0][1], windows[1][1])
+
+
+def find_changes(old: Terrain, new: Terrain, shift: Shift = (0, 0)) -> NDArray[np.bool_]:
+    """Return where a map differs from the one before.
+
+    Args:
+        old: The map before.
+        new: The map, with the same layers.
+        shift: Rows and columns from cell [0, 0] of the old map to that of the new one.
+
+    Returns:
+        (ny + 2, nx + 2) True for cells that are new or differ, with one more cell at each side,
+        which is True if the map's edge has moved.
+    """
+    ny, nx = new.elevation.shape
+    changed = np.ones((ny + 2, nx + 2), bool)
+    if shift == (0, 0) and old.elevation.shape == new.elevation.shape:
+        changed[:] = False
+    before, now = find_overlap(old, new, shift)
+    inside = changed[1:-1, 1:-1]
+    inside[now] = False
+    for name in LAYERS:
+        one, other = getattr(old, name), getattr(new, name)
+        if one is not None:
+            a, b = one[before], other[now]
+            inside[now] |= ~((a == b) | ((a != a) & (b != b)))
+    return changed
