@@ -25,9 +25,9 @@ TILE = 32
 """Cells along the side of a tile; tiles are judged one after another."""
 BATCH = 4096
 """Poses for which tiles are judged together; fewer would not use all threads."""
-MARGIN = 1
-"""Cells by which a footprint is widened: a height counts for the ground up to one cell away, other
-layers for half a cell."""
+MARGIN = 2
+"""Cells by which a footprint is widened: a height counts for the ground up to one cell away. The
+other one is for safety."""
 SHIFT_TOLERANCE = 1e-3
 """Share of a cell by which the grids of two maps may differ and still count as the same."""
 
