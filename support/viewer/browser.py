@@ -121,8 +121,8 @@ class Visitor:
         """Return the value in the box beside a slider."""
         return float(self._row(label).locator("input").last.input_value())
 
-    def drag_slider(self, label: str, share: float) -> None:
-        """Drag the thumb of a slider to a share of its range, through many values."""
+    def drag_slider(self, label: str, share: float, moves: int = 25) -> None:
+        """Drag the thumb of a slider to a share of its range, in a number of moves."""
         thumb = self._row(label).get_by_role("slider")
         thumb.scroll_into_view_if_needed()
         track = thumb.locator("xpath=..").bounding_box()
@@ -130,7 +130,7 @@ class Visitor:
         y = at["y"] + at["height"] / 2
         self.tab.mouse.move(at["x"] + at["width"] / 2, y)
         self.tab.mouse.down()
-        self.tab.mouse.move(track["x"] + share * track["width"], y, steps=25)
+        self.tab.mouse.move(track["x"] + share * track["width"], y, steps=moves)
         self.tab.mouse.up()
 
     def choose(self, label: str, option: str) -> None:
