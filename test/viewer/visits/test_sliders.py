@@ -35,7 +35,7 @@ MOVES = 3
 BEYOND = 0.05
 """Distance of the mouse beyond the end at last, as a share of the slider's length."""
 TRIES, PATIENCE = 10, 5.0
-"""How often a slider is dragged until the page hears of it, and how long each drag may take [s]."""
+"""How often a slider is dragged until the page hears of it, and for how long after each [s]."""
 
 
 @dataclass(frozen=True)

@@ -128,6 +128,17 @@ def test_escape_an_empty_box_and_numbers_beyond_the_slider(visitor, page, monkey
     wait_until(lambda: applied, "the value")
     assert applied == [2.0]  # the end of the slider
     wait_until(lambda: visitor.slider_value(FRICTION) == 2.0, "the box to show it")
+    note = visitor.tab.locator("#limited")
+    assert note.inner_text() == "limited to 2, the slider's largest value"
+    at, box = note.bounding_box(), visitor._row(FRICTION).locator("input").last.bounding_box()
+    assert abs(at["y"] - box["y"] - box["height"]) < 20.0  # beside its box
+    type_keys(visitor, FRICTION, "0.5", "Enter")
+    wait_until(lambda: applied[-1] == 0.5, "a value within the range")
+    note.wait_for(state="hidden")
+    type_keys(visitor, FRICTION, "-1", "Enter")
+    wait_until(lambda: applied[-1] == 0.16, "the smallest value")
+    assert note.inner_text() == "limited to 0.16, the slider's smallest value"
+    assert note.count() == 1
 
 
 def test_the_arm_goes_with_its_rover_and_the_box_of_presets_follows_a_file(
