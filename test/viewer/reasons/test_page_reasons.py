@@ -15,6 +15,7 @@ from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.browser import (
     ARGUMENTS,
+    OVERLAPS,
     PROGRAM,
     Visitor,
     needs_browser,
@@ -98,17 +99,6 @@ def test_the_letters_of_board_and_lanes_are_at_least_12_px_high(visitor):
     assert len(sizes) > 30 and min(sizes) >= 11.95
 
 
-OVERLAPS = """() => {
-    const boxes = [...document.querySelectorAll('.label-box')].filter(e => e.offsetParent).map(
-        e => [e.textContent, e.getBoundingClientRect()]);
-    const meet = (p, q) => p.left < q.right && q.left < p.right
-        && p.top < q.bottom && q.top < p.bottom;
-    return [boxes.length, boxes.flatMap(([name, p], k) => boxes.slice(0, k)
-        .filter(([, q]) => meet(p, q)).map(([other]) => [name, other]))];
-}"""
-"""How many labels are seen, and which of them overlap."""
-
-
 @pytest.mark.parametrize(
     "camera",
     [
@@ -137,9 +127,7 @@ def wait_for_highlight(page: Page, visitor: Visitor, index: int | None) -> None:
     ribbons = page.scene.paths.ribbons
     wanted = [BROAD_LINE_WIDTH if k == index else LINE_WIDTH for k in ribbons]
     names = [ribbon._core.name for ribbon in ribbons.values()]
-    wait_until(
-        lambda: visitor.tab.evaluate(LINE_WIDTHS, names) == wanted, f"highlight of {index}"
-    )
+    wait_until(lambda: visitor.tab.evaluate(LINE_WIDTHS, names) == wanted, f"highlight of {index}")
 
 
 LINE_WIDTHS = """names => names.map((name) => {

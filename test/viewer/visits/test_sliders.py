@@ -30,12 +30,12 @@ LENGTH = 3.0
 """Longest distance from start to goal [m]."""
 SMALL = {"width": 1000, "height": 560}
 """Size of the window [px]; a browser draws a small one faster, and scrolls to the sliders."""
-MOVES = 3
+MOVES = 2
 """Moves of the mouse from one end of a slider to the other; each is a value of its own."""
 BEYOND = 0.05
 """Distance of the mouse beyond the end at last, as a share of the slider's length."""
 TRIES, PATIENCE = 10, 5.0
-"""How often a slider is dragged until the page hears of it, and for how long after each [s]."""
+"""How often something is tried until the page hears of it, and for how long after each [s]."""
 
 
 @dataclass(frozen=True)
@@ -129,19 +129,19 @@ def check_page(page: Page, visitor: Visitor) -> None:
     assert not page.errors.messages and visitor.page_errors == []
 
 
-def drag_until(condition: Callable[[], bool], drag: Callable[[], None], what: str) -> None:
-    """Drag until the page has heard of it, for the mouse may miss a slider.
+def repeat_until(condition: Callable[[], bool], act: Callable[[], None], what: str) -> None:
+    """Act with the mouse until the page has heard of it, for the mouse may miss its aim.
 
-    The table of the changes, above the sliders, comes and goes, which moves them.
+    The table of the changes, above the sliders, comes and goes, which moves all below it.
     """
     for _ in range(TRIES):
-        drag()
+        act()
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             if condition():
                 return
             time.sleep(0.01)
-    raise AssertionError(f"dragged {TRIES} times, and the page has not heard of {what}")
+    raise AssertionError(f"tried {TRIES} times, and the page has not heard of {what}")
 
 
 def drag_to_both_ends(page: Page, visitor: Visitor, slider: Slider) -> None:
@@ -154,7 +154,7 @@ def drag_to_both_ends(page: Page, visitor: Visitor, slider: Slider) -> None:
     for share, end in ((1.0 + BEYOND, handle.max), (-BEYOND, handle.min)):
         if handle.value == pytest.approx(end):
             continue
-        drag_until(
+        repeat_until(
             lambda end=end: heard[-1:] == [pytest.approx(end)],
             lambda share=share: visitor.drag_slider(slider.label, share, MOVES),
             f"{slider.label} at {end}",
@@ -166,10 +166,12 @@ def drag_to_both_ends(page: Page, visitor: Visitor, slider: Slider) -> None:
         check_page(page, visitor)
     session = page.session
     if session.wanted.rover != LSR1 or session.wanted.arm_angles:
-        visitor.press("Reset")
-        wait_until(
-            lambda: session.wanted.rover == LSR1 and is_judged(page), f"{slider.label} reset"
+        repeat_until(
+            lambda: session.wanted.rover == LSR1 and not session.wanted.arm_angles,
+            lambda: visitor.press("Reset"),
+            f"the reset of {slider.label}",
         )
+        wait_until(lambda: is_judged(page), f"the verdict after the reset of {slider.label}")
 
 
 @pytest.mark.parametrize("name", ["made", "spirit", "far"])
