@@ -53,16 +53,21 @@ def show_to(client: Any, node: Any, **properties: Any) -> None:
 
 
 def dock_left(client: Any, panel: Any, width: float) -> None:
-    """Dock a panel on the left in the browser of one visitor alone.
+    """Dock a panel on the left in the browser of one visitor alone; it waits for the browser.
 
-    viser places panels for all visitors at once, whose windows differ in width.
+    viser places panels for all visitors at once, whose windows differ in width. A panel keeps the
+    width that it had while it floated if the new one comes together with the new place.
 
     Args:
         client: The visitor's client of viser.
         panel: A panel of the server.
         width: Its width [px].
     """
-    _place(client, panel, {"kind": "edge", "edge": "left"}, width)
+    from viser import _messages
+
+    _arrange(client, panel, _messages.GuiSetPanelPositionMessage, {"kind": "edge", "edge": "left"})
+    ask_browser(client, "null")
+    _arrange(client, panel, _messages.GuiSetPanelWidthMessage, width)
 
 
 def float_below(client: Any, panel: Any, size: tuple[float, float]) -> None:
@@ -73,25 +78,20 @@ def float_below(client: Any, panel: Any, size: tuple[float, float]) -> None:
         panel: A panel of the server.
         size: Its width and height [px].
     """
-    place = {"kind": "float", "x": FLOAT_GAP, "y": -FLOAT_GAP}
-    _place(client, panel, place, *size)
-
-
-def _place(
-    client: Any, panel: Any, place: dict[str, Any], width: float, height: float | None = None
-) -> None:
     from viser import _messages
 
-    gui, uuid = panel._placement_gui_api, panel._placement_uuid
+    place = {"kind": "float", "x": FLOAT_GAP, "y": -FLOAT_GAP}
+    _arrange(client, panel, _messages.GuiSetPanelPositionMessage, place)
+    _arrange(client, panel, _messages.GuiSetPanelWidthMessage, size[0])
+    _arrange(client, panel, _messages.GuiSetPanelHeightMessage, size[1])
 
-    def send(kind: Any, value: Any) -> None:
-        message = kind(uuid, value, gui._next_layout_counter(), gui._layout_run_id)
-        client.gui._websock_interface.queue_message(message)
 
-    send(_messages.GuiSetPanelPositionMessage, place)
-    send(_messages.GuiSetPanelWidthMessage, width)
-    if height is not None:
-        send(_messages.GuiSetPanelHeightMessage, height)
+def _arrange(client: Any, panel: Any, kind: Any, value: Any) -> None:
+    """Send a message about a panel to one visitor."""
+    gui = panel._placement_gui_api
+    client.gui._websock_interface.queue_message(
+        kind(panel._placement_uuid, value, gui._next_layout_counter(), gui._layout_run_id)
+    )
 
 
 def ask_browser(client: Any, expression: str) -> Any:

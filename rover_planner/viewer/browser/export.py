@@ -15,6 +15,8 @@ STYLE = """
 #report #wheels th { white-space: nowrap; }
 #report #wheels td { text-align: right; }
 .label-box[data-path] { pointer-events: none; }
+.mantine-Notifications-root { top: auto !important; left: auto !important; right: 8px;
+  bottom: 8px; }
 @media (max-width: 1000px) { #report { top: auto; right: 0; width: auto; height: 45%; } }
 """
 

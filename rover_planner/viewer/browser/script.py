@@ -73,16 +73,29 @@ SCRIPT = r"""
   note.style.cssText = "display:none;position:fixed;z-index:1000;background:#333;color:#fff;" +
     "font-size:12px;line-height:1.4;padding:.2em .6em;border-radius:.3em;pointer-events:none";
   document.body.append(note);
-  let hiding = 0;
-  const hideNote = () => { note.style.display = "none"; };
-  const sayLimited = (box, value, which) => {
-    const { right, top, bottom } = box.getBoundingClientRect();
-    note.textContent = `limited to ${value}, the slider's ${which} value`;
-    note.style.display = "block";
+  let noted = null, notedUntil = 0;  // the box of the note, and the end of its time [ms]
+  const hideNote = () => {
+    noted = null;
+    note.style.display = "none";
+  };
+  const placeNote = () => {  // tables above the box come and go: the note stays at it
+    if (!noted) return;
+    const { right, top, bottom, width } = noted.getBoundingClientRect();
+    if (width === 0 || performance.now() > notedUntil) {
+      hideNote();
+      return;
+    }
     note.style.right = `${window.innerWidth - right}px`;
     note.style.top = `${bottom + 30 < window.innerHeight ? bottom + 4 : top - 26}px`;
-    clearTimeout(hiding);
-    hiding = setTimeout(hideNote, 6000);
+    requestAnimationFrame(placeNote);
+  };
+  const sayLimited = (box, value, which) => {
+    note.textContent = `limited to ${value}, the slider's ${which} value`;
+    note.style.display = "block";
+    const runs = noted !== null;
+    noted = box;
+    notedUntil = performance.now() + 6000;
+    if (!runs) placeNote();
   };
   const commit = (box, isTyped = true) => {
     if (typing === null || typing.box !== box) return;

@@ -4,13 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 from rover_planner.viewer.browser.channel import FLOAT_GAP, ask_browser, dock_left, float_below
-from rover_planner.viewer.panel.header import FLOATING, NARROW
+from rover_planner.viewer.panel.header import FLOATING, NARROW, SHEET
 
 QUESTION = "[location.search, window.innerWidth]"
 PANEL_WIDTH, PLOTS_WIDTH = 394, 300
 """Widths of the panels on the right and on the left [px]; a laptop's screen shows the scene."""
-SMALLEST = 600
-"""Width of a window below which viser lists all panels in a sheet at the bottom [px]."""
 
 
 class Visitors:
@@ -60,7 +58,7 @@ class Visitors:
 
     def _fit(self, client: Any, width: float) -> None:
         """Place the panel for a window's width [px] unless it is placed for it already."""
-        free = width - PANEL_WIDTH - 2.0 * FLOAT_GAP if SMALLEST <= width < NARROW else 0.0
+        free = width - PANEL_WIDTH - 2.0 * FLOAT_GAP if SHEET < width < NARROW else 0.0
         if free == self._floats.get(client.client_id, 0.0):
             return
         self._floats[client.client_id] = free

@@ -13,6 +13,8 @@ NOTICES = 100
 """Distance of the notices of viser from the lower edge [px]: between the header and the hint."""
 NARROW = 1000
 """Width of a window below which the plots float over the scene [px]."""
+SHEET = 576
+"""Largest width of a window in which viser lists all panels in a sheet at the bottom [px]."""
 FLOATING = 232
 """Height of the floating plots [px]: all lanes with their legend are seen without scrolling."""
 HINT = (
@@ -98,7 +100,8 @@ def _style() -> str:
         f"@media (max-width:{NARROW - 1}px){{.over-scene{{left:8px}}"
         f"#hint{{bottom:{FLOATING + 12}px!important}}"
         f".mantine-Notifications-root{{bottom:{FLOATING + NOTICES}px!important}}}}"
-        "@media (max-width:600px){.over-scene{right:8px}}</style>"
+        f"@media (max-width:{SHEET}px){{.over-scene{{right:8px}}#hint{{display:none!important}}}}"
+        "</style>"
     )
 
 
