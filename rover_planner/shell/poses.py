@@ -79,7 +79,8 @@ class PlacesCommand(TyperCommand):
 
 def join_poses(words: Sequence[str]) -> list[str]:
     """Return words with each option of SIZES and its numbers as one, such as --start=1,0,0."""
-    joined, k = [], 0
+    joined: list[str] = []
+    k = 0
     while k < len(words):
         name, equals, first = words[k].partition("=")
         k += 1
