@@ -17,6 +17,7 @@ from rover_planner.command.terrain import terrain
 from rover_planner.command.urdf import rover, urdf
 from rover_planner.command.view import view
 from rover_planner.command.warm_up import warm_up
+from rover_planner.shell.poses import PlacesCommand, PoseCommand
 from rover_planner.shell.run_app import run_app
 from rover_planner.shell.run_program import run_program
 
@@ -31,15 +32,15 @@ NEGATIVE_ARGUMENTS = {"ignore_unknown_options": True}
 """Makes typer accept negative numbers as arguments; options accept them anyway."""
 
 app.command()(predict)
-app.command()(plan)
+app.command(cls=PoseCommand)(plan)
 app.command()(replay_plan)
-app.command(context_settings=NEGATIVE_ARGUMENTS)(reach)
+app.command(cls=PlacesCommand, context_settings=NEGATIVE_ARGUMENTS)(reach)
 app.command()(survey)
-app.command()(reachable)
+app.command(cls=PoseCommand)(reachable)
 app.command()(study)
-app.command()(view)
+app.command(cls=PoseCommand)(view)
 app.command()(terrain)
-app.command()(replay)
+app.command(cls=PoseCommand)(replay)
 app.command()(urdf)
 app.command()(rover)
 app.command()(demo)

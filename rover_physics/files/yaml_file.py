@@ -15,6 +15,8 @@ MAX_NODES = 100_000
 """Largest number of keys and values, each reference counted as what it refers to."""
 MAX_REASON = 200
 """Largest number of characters of PyYAML's reason in an error text."""
+UNNAMED = '"<unicode string>", '
+"""What PyYAML calls the text; who reads a file puts its name before the error."""
 BAD_SCALAR = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 """Exceptions that PyYAML raises, besides its own, for a value that does not fit its tag."""
 
@@ -75,6 +77,7 @@ def parse_yaml(text: str) -> object:
         return _construct(_StrictLoader(text))
     except (yaml.YAMLError, RecursionError, *BAD_SCALAR) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
+        reason = reason.replace(UNNAMED, "")
         raise RoverFileError(f"not valid YAML: {reason[:MAX_REASON]}") from error
 
 

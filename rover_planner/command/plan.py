@@ -18,7 +18,7 @@ from rover_planner.command.options import (
     SoilName,
     TerrainName,
 )
-from rover_planner.errors import PlanningError
+from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
     from rover_planner.planning.ways.question import WayQuestion
@@ -37,12 +37,8 @@ def plan(
     rover: RoverName,
     terrain: TerrainName,
     out: Out,
-    start: Annotated[
-        str, typer.Option(metavar="X,Y,YAW", help="Start of the body in m and rad, map frame.")
-    ],
-    goal: Annotated[
-        str, typer.Option(metavar="X,Y,YAW", help="Goal of the body in m and rad, map frame.")
-    ],
+    start: Annotated[Pose, START],
+    goal: Annotated[Pose, GOAL],
     policy: Policy = "equal",
     friction: Friction = None,
     max_torque: MaxTorque = None,
@@ -82,8 +78,8 @@ def plan(
     question = WayQuestion(
         load_rover(rover),
         load_terrain(terrain, max_cells),
-        read_pose("start", start),
-        read_pose("goal", goal),
+        start,
+        goal,
         PathQueryOptions(
             policy=policy,
             control_margin=0.0,
@@ -148,18 +144,3 @@ def _ask(
     if answer.warning:
         typer.echo(f"warning: {answer.warning}", err=True)
     typer.echo(json.dumps(report_way(question.rover, answer), allow_nan=False))
-
-
-def read_pose(name: str, text: str) -> tuple[float, float, float]:
-    """Return the pose of an option.
-
-    Raises:
-        PlanningError: It is not three numbers.
-    """
-    try:
-        x, y, yaw = map(float, text.split(","))
-    except ValueError:
-        raise PlanningError(
-            f"--{name} is {text!r}; it must be three numbers with commas: x,y,yaw"
-        ) from None
-    return x, y, yaw

@@ -1,7 +1,6 @@
 """The command `rover_planner reachable`: where a rover can go on a survey and return from."""
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,6 +8,7 @@ import typer
 
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
+from rover_planner.shell.poses import read_numbers
 
 if TYPE_CHECKING:
     from rover_planner.survey.reach.kept_area import ReachableArea
@@ -81,10 +81,8 @@ def _read_place(text: str) -> tuple[float, float]:
     Raises:
         PlanningError: It is not two numbers.
     """
-    try:
-        x, y = map(float, text.split(","))
-    except ValueError:
-        x = y = math.nan
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise PlanningError(f"--from is {text!r}; it must be two numbers with a comma: x,y")
+    place = read_numbers(text, 2)
+    if place is None:
+        raise PlanningError(f"--from is {text!r}; it must be two numbers: X,Y or X Y")
+    x, y = place
     return x, y

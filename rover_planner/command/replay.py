@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_planner.command.plan import read_pose
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
+from rover_planner.shell.poses import Pose, pose_option
 
 if TYPE_CHECKING:
     from rover_planner.parameters.traverse_server import TraverseServerParameters
@@ -40,11 +40,13 @@ def replay(
         float, typer.Option(metavar="M", help="Cell size of the map; sets map_resolution.")
     ] = 0.0,
     goal: Annotated[
-        str, typer.Option(metavar="X,Y,YAW", help="Ask for a way to it after each new map.")
-    ] = "",
+        Pose | None,
+        pose_option("Ask for a way to it after each new map."),
+    ] = None,
     start: Annotated[
-        str, typer.Option(metavar="X,Y,YAW", help="Start of that way; default: the odometry.")
-    ] = "",
+        Pose | None,
+        pose_option("Start of that way; default: the odometry."),
+    ] = None,
     stretch: Annotated[
         float, typer.Option(metavar="M", help="Length in which the drive is judged.", min=0.1)
     ] = 5.0,
@@ -71,7 +73,7 @@ def replay(
     if out.exists():
         raise PlanningError(f"{out} exists already; OUT must be a new folder")
     given = {"rover": rover, "map_frame": map_frame, "map_resolution": resolution}
-    questions = Questions(_read_end("goal", goal), _read_end("start", start), stretch)
+    questions = Questions(goal, start, stretch)
     work = Replay(_read_parameters(parameters, given), questions)
     topics = {
         bag_reader.MAP: map_topic,
@@ -192,10 +194,6 @@ class _Results:
         )
         for topic in RESULT_KINDS:
             self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
-
-
-def _read_end(name: str, text: str) -> tuple[float, float, float] | None:
-    return read_pose(name, text) if text else None
 
 
 def _make_folder(folder: Path) -> None:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.options import MAX_CELLS, MaxCells, MaxGap, RoverName, Vector
+from rover_planner.command.options import MAX_CELLS, MaxCells, MaxGap, RoverName
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
+from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
     from rover_physics.rover.model import Rover
@@ -28,7 +29,8 @@ MAX_DEMO_LENGTH = 10.0
 """Largest distance between start and goal if they are chosen automatically [m]."""
 PLACES_TRIED = 41
 """Grid points along each side of the map that are tried for start and goal."""
-Pose = tuple[float, float, float]
+End = tuple[float, float, float]
+"""x, y [m] and yaw [rad], map frame."""
 
 
 def view(
@@ -40,14 +42,8 @@ def view(
             help="Preset name (spirit) or elevation map, .npz; default: a generated one.",
         ),
     ] = None,
-    start: Annotated[
-        Vector | None,
-        typer.Option(metavar="X Y YAW", help="Start in m and rad, map frame."),
-    ] = None,
-    goal: Annotated[
-        Vector | None,
-        typer.Option(metavar="X Y YAW", help="Goal in m and rad, map frame."),
-    ] = None,
+    start: Annotated[Pose | None, START] = None,
+    goal: Annotated[Pose | None, GOAL] = None,
     max_gap: MaxGap = 0.2,
     max_cells: MaxCells = MAX_CELLS,
     prediction: Annotated[
@@ -129,7 +125,7 @@ def _check_on_map(ground: "Terrain", **ends: Pose | None) -> None:
         PlanningError: One is not.
     """
     for name, pose in ends.items():
-        if pose is None or not all(map(math.isfinite, pose)) or ground.contains(*pose[:2]):
+        if pose is None or ground.contains(*pose[:2]):
             continue
         x_low, x_high, y_low, y_high = ground.bounds
         raise PlanningError(
@@ -212,7 +208,7 @@ def _load_or_make(name: str | None, follow: bool, max_cells: int) -> "Terrain":
     return make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)
 
 
-def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
+def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
     """Return a start and a goal where the rover can stand, with known ground between them.
 
     They are on both sides of the middle of the map if the rover can stand there on known ground.
@@ -228,7 +224,7 @@ def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
     return _ends_on_known_ground(rover, ground) or (low, high)
 
 
-def _ends_on_known_ground(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose] | None:
+def _ends_on_known_ground(rover: "Rover", ground: "Terrain") -> tuple[End, End] | None:
     """Return a start and the farthest goal on plain ground, None if the map has none."""
     from rover_planner.planning.goals import choose_mission
 
@@ -240,7 +236,7 @@ def _ends_on_known_ground(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose
     return (mission.start, max(plain, key=partial(math.dist, mission.start))) if plain else None
 
 
-def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pose]:
+def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
     """Return two poses where the rover can stand, on both sides of the middle of a map.
 
     They are the nearest ones to a quarter and three quarters of the map along x, or closer
@@ -261,7 +257,7 @@ def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[Pose, Pos
     places = np.vstack([wanted, np.column_stack([x.ravel(), y.ravel()])])
     poses = np.column_stack([places, np.zeros(len(places))])
     stands = score_poses(rover, ground, poses).within_limits(rover)
-    ends: list[Pose] = []
+    ends: list[End] = []
     for aim, side in zip(wanted, (-1.0, 1.0), strict=True):
         fit = stands & (side * (places[:, 0] - middle[0]) > 0.0)
         away = np.where(fit, np.linalg.norm(places - aim, axis=1), np.inf)

@@ -16,6 +16,7 @@ from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.table import ParameterSpec, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.shell.poses import PoseCommand
 from rover_planner.shell.run_app import run_app
 
 HELP_WORDS = ("-h", "--help")
@@ -147,6 +148,7 @@ def make_app(name: str) -> typer.Typer:
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     app.command(
         name,
+        cls=PoseCommand,
         help=f"{program.what}\n\n{program.exit_codes}",
         epilog="\n\n".join(_epilog(program)),
         options_metavar="[OPTIONS] [--ros-args -p NAME:=VALUE ...]",

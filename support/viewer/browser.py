@@ -49,6 +49,23 @@ SMALL_SCENE = (
 )
 """Style of a scene of 16 x 16 pixels."""
 
+OVERLAPS = """() => {
+    const boxes = [...document.querySelectorAll('.label-box')].filter(e => e.offsetParent).map(
+        e => [e.textContent, e.getBoundingClientRect()]);
+    const meet = (p, q) => p.left < q.right && q.left < p.right
+        && p.top < q.bottom && q.top < p.bottom;
+    return [boxes.length, boxes.flatMap(([name, p], k) => boxes.slice(0, k)
+        .filter(([, q]) => meet(p, q)).map(([other]) => [name, other]))];
+}"""
+"""How many labels are seen, and which of them overlap."""
+
+FIND_THUMB = """thumb => {
+    thumb.scrollIntoViewIfNeeded();
+    const at = thumb.getBoundingClientRect(), track = thumb.parentElement.getBoundingClientRect();
+    return [at.x + at.width / 2, at.y + at.height / 2, track.x, track.width];
+}"""
+"""Scrolls to the thumb of a slider; returns where it is, and left edge and width of its track."""
+
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
 )
@@ -121,16 +138,13 @@ class Visitor:
         """Return the value in the box beside a slider."""
         return float(self._row(label).locator("input").last.input_value())
 
-    def drag_slider(self, label: str, share: float) -> None:
-        """Drag the thumb of a slider to a share of its range, through many values."""
+    def drag_slider(self, label: str, share: float, moves: int = 25) -> None:
+        """Drag the thumb of a slider to a share of its range, in a number of moves."""
         thumb = self._row(label).get_by_role("slider")
-        thumb.scroll_into_view_if_needed()
-        track = thumb.locator("xpath=..").bounding_box()
-        at = thumb.bounding_box()
-        y = at["y"] + at["height"] / 2
-        self.tab.mouse.move(at["x"] + at["width"] / 2, y)
+        x, y, left, width = thumb.evaluate(FIND_THUMB)
+        self.tab.mouse.move(x, y)
         self.tab.mouse.down()
-        self.tab.mouse.move(track["x"] + share * track["width"], y, steps=25)
+        self.tab.mouse.move(left + share * width, y, steps=moves)
         self.tab.mouse.up()
 
     def choose(self, label: str, option: str) -> None:

@@ -6,6 +6,7 @@ import typer
 
 from rover_physics.terrain.grid import load_terrain
 from rover_planner.cli import app, main
+from rover_planner.shell.poses import join_poses
 from support.command_line import assert_refused
 
 COMMANDS = typer.main.get_command(app).commands
@@ -91,16 +92,57 @@ def test_predict_takes_negative_numbers(words, name, value):
     ("words", "name", "value"),
     [
         (["plan", "lsr1", "a", "b", "--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
-         "start", "-3,0,0"),
+         "start", (-3.0, 0.0, 0.0)),
         (["plan", "lsr1", "a", "b", "--start", "0,0,0", "--goal", "-.5,-1e-1,0"],
-         "goal", "-.5,-1e-1,0"),
+         "goal", (-0.5, -0.1, 0.0)),
         (["reachable", "s.zarr", "--from", "-3,-0.5"], "start", "-3,-0.5"),
-        (["replay", "bag", "out", "--goal", "-3,0,0"], "goal", "-3,0,0"),
-        (["replay", "bag", "out", "--start", "-3,0,-1"], "start", "-3,0,-1"),
+        (["reachable", "s.zarr", "--from", "-3", "-0.5"], "start", "-3,-0.5"),
+        (["replay", "bag", "out", "--goal", "-3,0,0"], "goal", (-3.0, 0.0, 0.0)),
+        (["replay", "bag", "out", "--start", "-3,0,-1"], "start", (-3.0, 0.0, -1.0)),
     ],
 )  # fmt: skip
 def test_lists_may_begin_with_a_negative_number(words, name, value):
     assert params_of(*words)[name] == value
+
+
+FORMS = (
+    ["--start", "-3,-.5,1e-1"],
+    ["--start=-3,-.5,1e-1"],
+    ["--start", "-3", "-.5", "1e-1"],
+    ["--start=-3", "-.5", "1e-1"],
+    ["--start", "-3 -.5 1e-1"],
+    ["--start", "-3,", "-.5,", "1e-1"],
+)
+"""The same pose."""
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["plan", "lsr1", "a", "b", "--goal", "1", "2", "3"],
+        ["view", "lsr1", "spirit", "--goal=1,2,3"],
+        ["replay", "bag", "out", "--goal", "1,2,3"],
+    ],
+)
+def test_each_command_takes_poses_with_commas_and_with_blanks(words, form):
+    params = params_of(*words, *form)
+    assert params["start"] == (-3.0, -0.5, 0.1) and params["goal"] == (1.0, 2.0, 3.0)
+
+
+def test_words_behind_a_pose_are_left_to_the_command():
+    params = params_of("plan", "--goal", "1", "2", "3", "--start", "1,2,3", "lsr1", "5", "6")
+    assert params["terrain"] == "5" and str(params["out"]) == "6"
+    assert join_poses(["--start", "1,2", "x"]) == ["--start=1,2", "x"]
+    assert join_poses(["--", "--start", "1", "2", "3"]) == ["--", "--start", "1", "2", "3"]
+    assert join_poses(["--start"]) == ["--start"]
+
+
+def test_reach_takes_places_with_commas():
+    params = params_of("reach", "lsr1", "a.npz", "-1,-.5,-3e-1", "-2,0,-0.2")
+    assert [params[name] for name in ("x", "y", "yaw", "tx", "ty", "tz")] == [
+        -1.0, -0.5, -0.3, -2.0, 0.0, -0.2,
+    ]  # fmt: skip
 
 
 def test_reach_takes_negative_numbers_as_arguments_and_options():

@@ -62,8 +62,8 @@ def test_without_a_way_no_file_is_written_and_the_reason_is_told(ground, tmp_pat
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--start=1,2", "--goal=2.5,0,0"], "--start is '1,2'; it must be three numbers"),
-        (["--start=-2.5,0,0", "--goal=a,b,c"], "--goal is 'a,b,c'"),
+        (["--start=1,2", "--goal=2.5,0,0"], "'1,2' is no pose; it must be X,Y,YAW or X Y YAW"),
+        (["--start=-2.5,0,0", "--goal=a,b,c"], "'--goal': 'a,b,c' is no pose"),
         (["--start=-25,0,0", "--goal=2.5,0,0"], "start is at (-25, 0), off the map"),
         ([*ENDS, "--budget", "0"], "budget is 0.0; it must be a finite number above 0"),
         ([*ENDS, "--cell", "-1"], "cell is -1.0"),

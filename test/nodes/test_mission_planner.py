@@ -9,10 +9,11 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-from rover_planner.nodes.mission.options import MissionOptions, Pose
+from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.mission_planner import main
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.shell.poses import Pose
 from support.command_line import REPOSITORY
 from support.grounds import make_terrain, wall_at, waves
 from support.ros_fixtures import domain_id
@@ -48,6 +49,7 @@ def test_bad_words_are_exit_code_2_with_one_line(capfd, words, names):
     [
         ["--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
         ["--start=-3,0,0", "--goal=-.5,-1e-1,0"],
+        ["--start", "-3", "0", "0", "--goal=-.5", "-1e-1", "0"],
     ],
 )
 def test_negative_numbers_need_no_equals_sign(words):

@@ -237,7 +237,7 @@ def test_commands_are_split_as_a_shell_does():
     [
         ("rover_planner predict lsr1 a b c --colour red", "--colour"),
         ("rover_planner dance", "dance"),
-        ("rover_planner view lsr1 spirit --start 0 0", "--start"),
+        ("rover_planner view lsr1 spirit --start 0 0", "'0,0' is no pose"),
         ("mission_planner --start 0,0 --goal 1,0,0", "'0,0' is no pose"),
         ("mission_planner --goal 1,0,0", "--start"),
         ("traverse_server --ros-args -p terain_file:=a.npz &", "terain_file"),

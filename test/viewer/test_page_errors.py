@@ -68,7 +68,7 @@ def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(serve
     assert session.shown.verdict.traversable
     assert session.change_rover([("friction",)], 0.4)
     assert not session.shown.verdict.traversable
-    overlay = PathOverlay(server.scene, Labels(server.scene, server.gui))
+    overlay = PathOverlay(server.scene, Labels(server.gui))
     overlay.show(session.rover, session.terrain, session.candidates, session.shown.index)
     driven, beyond, *cross = overlay.ribbons[session.shown.index].strands
     assert driven.colour == REFUSED and driven.width > beyond.width

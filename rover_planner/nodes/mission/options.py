@@ -2,22 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
 from rover_planner.errors import PlanningError
-
-
-class Pose(NamedTuple):
-    """A pose of the body in the map frame."""
-
-    x: float
-    """In [m]."""
-    y: float
-    """In [m]."""
-    yaw: float
-    """In [rad]."""
+from rover_planner.shell.poses import Pose, pose_option
 
 
 @dataclass(frozen=True)
@@ -40,32 +30,9 @@ class MissionOptions:
     """Whether to print JSON."""
 
 
-def read_pose(text: str) -> Pose:
-    """Read a pose from the text X,Y,YAW, in m and rad.
-
-    Raises:
-        typer.BadParameter: Not three finite numbers.
-    """
-    try:
-        pose = Pose(*(float(part) for part in text.split(",")))
-    except (TypeError, ValueError):
-        pose = Pose(math.nan, math.nan, math.nan)
-    if not all(map(math.isfinite, pose)):
-        raise typer.BadParameter(f"{text!r} is no pose; it must be X,Y,YAW in m and rad")
-    return pose
-
-
 def read_mission(
-    start: Annotated[
-        Pose,
-        typer.Option(
-            parser=read_pose, metavar="X,Y,YAW", help="Where the rover stands, in m and rad."
-        ),
-    ],
-    goal: Annotated[
-        list[Pose],
-        typer.Option(parser=read_pose, metavar="X,Y,YAW", help="Goal; may be given repeatedly."),
-    ],
+    start: Annotated[Pose, pose_option("Where the rover stands, in m and rad.")],
+    goal: Annotated[list[Pose], pose_option("Goal; may be given repeatedly.")],
     map_name: Annotated[
         str | None,
         typer.Option(

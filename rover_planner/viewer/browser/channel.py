@@ -12,6 +12,8 @@ STORAGE_PREFIX = "viser-user:"
 """What viser's browser part puts before each key of the local storage."""
 TIMEOUT = 10.0
 """Longest wait for an answer [s]."""
+FLOAT_GAP = 4
+"""Distance of a floating panel from the edges of the scene [px]."""
 
 
 def run_script(server: Any, source: str) -> None:
@@ -34,29 +36,61 @@ def run_for(client: Any, source: str) -> None:
     client.gui._websock_interface.queue_message(_script(source))
 
 
-def place_below(client: Any, panel: Any, below: bool) -> None:
-    """Dock a panel below the main panel, or on the left, in the browser of one visitor alone.
+def show_to(client: Any, node: Any, **properties: Any) -> None:
+    """Change properties of a node of the scene in the browser of one visitor alone.
 
-    viser places panels for all visitors at once, whose windows differ in width.
+    The change lasts until the same property is set for all visitors, or the node is drawn anew.
+
+    Args:
+        client: The visitor's client of viser.
+        node: The node's handle of the server's scene.
+        properties: New values by name.
+    """
+    from viser._messages import SceneNodeUpdateMessage
+
+    message = SceneNodeUpdateMessage(node.name, properties)
+    client.gui._websock_interface.queue_message(message)
+
+
+def dock_left(client: Any, panel: Any, width: float) -> None:
+    """Dock a panel on the left in the browser of one visitor alone; it waits for the browser.
+
+    viser places panels for all visitors at once, whose windows differ in width. A panel keeps the
+    width that it had while it floated if the new one comes together with the new place.
 
     Args:
         client: The visitor's client of viser.
         panel: A panel of the server.
-        below: Whether it goes below the main panel.
+        width: Its width [px].
     """
-    from viser._gui_handles import CONTROL_PANEL_ID
-    from viser._messages import GuiSetPanelPositionMessage
+    from viser import _messages
 
-    edge = {"kind": "edge", "edge": "left"}
-    split = {"kind": "split", "anchor_uuid": CONTROL_PANEL_ID, "side": "below"}
+    _arrange(client, panel, _messages.GuiSetPanelPositionMessage, {"kind": "edge", "edge": "left"})
+    ask_browser(client, "null")
+    _arrange(client, panel, _messages.GuiSetPanelWidthMessage, width)
+
+
+def float_below(client: Any, panel: Any, size: tuple[float, float]) -> None:
+    """Let a panel float over the lower edge of the scene in the browser of one visitor alone.
+
+    Args:
+        client: The visitor's client of viser.
+        panel: A panel of the server.
+        size: Its width and height [px].
+    """
+    from viser import _messages
+
+    place = {"kind": "float", "x": FLOAT_GAP, "y": -FLOAT_GAP}
+    _arrange(client, panel, _messages.GuiSetPanelPositionMessage, place)
+    _arrange(client, panel, _messages.GuiSetPanelWidthMessage, size[0])
+    _arrange(client, panel, _messages.GuiSetPanelHeightMessage, size[1])
+
+
+def _arrange(client: Any, panel: Any, kind: Any, value: Any) -> None:
+    """Send a message about a panel to one visitor."""
     gui = panel._placement_gui_api
     client.gui._websock_interface.queue_message(
-        GuiSetPanelPositionMessage(
-            panel._placement_uuid,
-            split if below else edge,  # type: ignore[arg-type]
-            counter=gui._next_layout_counter(),
-            run_id=gui._layout_run_id,
-        )
+        kind(panel._placement_uuid, value, gui._next_layout_counter(), gui._layout_run_id)
     )
 
 

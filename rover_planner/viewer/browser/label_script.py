@@ -1,8 +1,9 @@
 """The script that draws the labels of the scene, and keeps them apart on the screen.
 
-It follows the camera of viser, picture by picture. In the order of their ranks, each box takes the
-nearest free position about its place on the screen: first the place itself, then the position that
-it had, then positions on rings around it. A line leads from the place to a box that has moved.
+It runs in the page and in files that were saved from it. It follows the camera of viser, picture
+by picture. In the order of their ranks, each box takes the nearest free position about its place
+on the screen: first the place itself, then the position that it had, then positions on rings
+around it. A line leads from the place to a box that has moved.
 """
 
 STYLE = """
@@ -19,7 +20,7 @@ STYLE = """
 
 SCRIPT = r"""
 (() => {
-  if (window.__VISER_EMBED_DATA__ || window.roverPlannerLabels) return;
+  if (window.roverPlannerLabels) return;
   window.roverPlannerLabels = true;
   const style = document.createElement("style");
   style.textContent = `STYLE`;

@@ -66,14 +66,47 @@ SCRIPT = r"""
     }
     return [-Infinity, Infinity];
   };
-  const commit = (box) => {
+  // A number beyond the ends of its slider is limited, and a note at its box says so for a while.
+  const note = document.createElement("div");
+  note.id = "limited";
+  note.setAttribute("role", "status");
+  note.style.cssText = "display:none;position:fixed;z-index:1000;background:#333;color:#fff;" +
+    "font-size:12px;line-height:1.4;padding:.2em .6em;border-radius:.3em;pointer-events:none";
+  document.body.append(note);
+  let noted = null, notedUntil = 0;  // the box of the note, and the end of its time [ms]
+  const hideNote = () => {
+    noted = null;
+    note.style.display = "none";
+  };
+  const placeNote = () => {  // tables above the box come and go: the note stays at it
+    if (!noted) return;
+    const { right, top, bottom, width } = noted.getBoundingClientRect();
+    if (width === 0 || performance.now() > notedUntil) {
+      hideNote();
+      return;
+    }
+    note.style.right = `${window.innerWidth - right}px`;
+    note.style.top = `${bottom + 30 < window.innerHeight ? bottom + 4 : top - 26}px`;
+    requestAnimationFrame(placeNote);
+  };
+  const sayLimited = (box, value, which) => {
+    note.textContent = `limited to ${value}, the slider's ${which} value`;
+    note.style.display = "block";
+    const runs = noted !== null;
+    noted = box;
+    notedUntil = performance.now() + 6000;
+    if (!runs) placeNote();
+  };
+  const commit = (box, isTyped = true) => {
     if (typing === null || typing.box !== box) return;
     const typed = box.value.trim().replace(",", ".");
     const before = end().text;
     let value = typed === "" ? NaN : Number(typed);
     const [low, high] = limits(box);
+    const which = value > high ? "largest" : value < low ? "smallest" : "";
     value = Math.min(Math.max(value, low), high);
     const text = Number.isFinite(value) ? String(parseFloat(value.toFixed(9))) : before;
+    if (which && isTyped) sayLimited(box, text, which);
     if (text === before) {
       box.value = before;
       return;
@@ -92,6 +125,7 @@ SCRIPT = r"""
   window.addEventListener("beforeinput", (event) => {
     const box = event.target;
     if (!isBox(box) || event.inputType === "insertLineBreak") return;
+    hideNote();
     if (typing && typing.box === box) return;
     hold(box);
     typing = { box, text: held.text };
@@ -142,7 +176,7 @@ SCRIPT = r"""
     release();
     typing = { box, text: box.value };
     native.set.call(box, times[Math.round(share * (times.length - 1))]);
-    commit(box);
+    commit(box, false);
   });
 
   // Without the program the page still looks as it did.

@@ -31,9 +31,12 @@ SCRIPT = r"""
 
 
 class Words:
-    """Calls an action for each word that a script sends, with the number behind the word."""
+    """Calls an action for each word that a script sends.
 
-    def __init__(self, gui: Any, actions: Mapping[str, Callable[[int], None]]):
+    It gets the visitor's client of viser and the number behind the word.
+    """
+
+    def __init__(self, gui: Any, actions: Mapping[str, Callable[[Any, int], None]]):
         """Add the box to the container that is open.
 
         Args:
@@ -48,4 +51,4 @@ class Words:
         """Act on what a visitor's script has written; on viser's loop, so that none is lost."""
         _, _, word, number = (*event.target.value.split(), "", "", "", "")[:4]
         if event.client is not None and word in self._actions and number.isdecimal():
-            self._actions[word](int(number))
+            self._actions[word](event.client, int(number))

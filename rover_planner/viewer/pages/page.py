@@ -112,8 +112,11 @@ class Page(PageBase):
         Words(
             self.server.gui,
             {
-                "show": lambda path: add(lambda: self._choose_path(path - 1), "path"),
-                "point": lambda path: add(lambda: self.scene.paths.point_at(path - 1), "point"),
+                "show": lambda _client, path: add(lambda: self._choose_path(path - 1), "path"),
+                "point": lambda client, path: add(
+                    lambda: self.scene.paths.point_at(client, path - 1),
+                    f"point {client.client_id}",
+                ),
             },
         )
 
@@ -145,8 +148,7 @@ class Page(PageBase):
         )
 
     def _save(self, client: Any) -> None:
-        with self.scene.labels.drawn():
-            self.sharing.save(self.server, client)
+        self.sharing.save(self.server, client, self.scene.labels.html)
 
     def _rover_actions(self) -> RoverActions:
         add = self.requests.add

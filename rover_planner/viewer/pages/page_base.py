@@ -14,7 +14,7 @@ from rover_planner.viewer.browser.channel import run_script
 from rover_planner.viewer.browser.link import Link, read_link
 from rover_planner.viewer.browser.script import SCRIPT
 from rover_planner.viewer.pages.drawings import Drawings
-from rover_planner.viewer.pages.visitors import Visitors
+from rover_planner.viewer.pages.visitors import PANEL_WIDTH, PLOTS_WIDTH, Visitors
 from rover_planner.viewer.panel.camera_buttons import CameraButtons
 from rover_planner.viewer.panel.error_notice import ErrorNotice
 from rover_planner.viewer.panel.header import Chip, Header
@@ -30,8 +30,6 @@ PERIOD = 0.04
 """Time between two pictures [s]."""
 RESTART = 1.0
 """Time until a stopped page starts again [s]."""
-PANEL_WIDTH, PLOTS_WIDTH = 394, 300
-"""Widths of the panels on the right and on the left [px]; a laptop's screen shows the scene."""
 
 
 class PageBase(ABC):
@@ -70,7 +68,7 @@ class PageBase(ABC):
             run_script(self.server, script)
         self.server.on_client_connect(self._aim_camera)
         self.server.on_client_connect(self._visitors.greet)
-        self.server.on_client_disconnect(self._visitors.forget)
+        self.server.on_client_disconnect(self._forget)
         self.server.scene.on_click()(lambda event: self._request_click(event, False))
         self.server.scene.on_click(modifier="shift")(
             lambda event: self._request_click(event, True)
@@ -161,6 +159,10 @@ class PageBase(ABC):
     def _aim_camera(self, client: Any) -> None:
         session = self.session
         self.scene.aim_camera(client, session.rover, session.terrain, session.start, session.goal)
+
+    def _forget(self, client: Any) -> None:
+        self._visitors.forget(client)
+        self.requests.add(lambda: self.scene.paths.forget(client))
 
     def open_link(self, link: Link) -> None:
         """Show what a link holds.

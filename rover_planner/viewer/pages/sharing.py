@@ -43,15 +43,15 @@ class Sharing:
         self._opening: Link | None = None
         """The link whose path and time are not shown yet."""
 
-    def save(self, server: Any, client: Any) -> None:
-        """Send a visitor the scene and its report as one HTML file."""
+    def save(self, server: Any, client: Any, labels: str) -> None:
+        """Send a visitor the scene with its labels, HTML, and its report as one HTML file."""
         session, link = self._session, self.make_link()
         judgement = session.finished
         context = describe_scenario(judgement.scenario, session.ground_name)
         word = "traversable" if session.shown.verdict.traversable else "not traversable"
         title = f"{judgement.scenario.rover.name} on {context.ground}: {word}"
         report = describe_judgement(judgement, context, _write_short(link))
-        content = write_page(server, client.camera, report, title)
+        content = write_page(server, client.camera, report, title, labels)
         name = f"{judgement.scenario.rover.name}_{word.replace(' ', '_')}.html"
         client.send_file_download(name, content, save_immediately=True)
 

@@ -34,7 +34,7 @@ BODY = (91.0, 40.0, 56.0, 150.0)
 """Left, top, width and height of the body [px]."""
 LIST_LEFT, LIST_TOP, MAX_PITCH = 252.0, 12.0, 34.0
 """Where the worst uses are listed, and their largest distance [px]."""
-LIST_BAR = 27.0
+LIST_BAR = 22.0
 """Length of the bar of a worst use [px]; its limit is written beside it."""
 MAX_MARGIN = 1.2
 """Stability margin at the end of the gauge."""

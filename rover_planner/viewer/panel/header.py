@@ -12,7 +12,11 @@ LEFT, RIGHT = 310, 410
 NOTICES = 100
 """Distance of the notices of viser from the lower edge [px]: between the header and the hint."""
 NARROW = 1000
-"""Width of a window below which the panels stack on the right [px]."""
+"""Width of a window below which the plots float over the scene [px]."""
+SHEET = 576
+"""Largest width of a window in which viser lists all panels in a sheet at the bottom [px]."""
+FLOATING = 232
+"""Height of the floating plots [px]: all lanes with their legend are seen without scrolling."""
 HINT = (
     "Drag: turn the view. Wheel: nearer. Click on the ground: goal, with Shift: start. "
     "Space: play or pause. Arrows left and right: a waypoint."
@@ -92,9 +96,12 @@ def _style() -> str:
         "font-size:13px;line-height:1.5;padding:.35em .8em;border-radius:.5em;"
         "background:rgba(255,255,255,.88);color:#222;pointer-events:none;"
         "width:fit-content;margin:0 auto}"
-        f"@media (max-width:{NARROW - 1}px){{.over-scene{{left:8px}}}}"
-        "@media (max-width:600px){.over-scene{right:8px}}"
-        f".mantine-Notifications-root{{top:auto!important;bottom:{NOTICES}px!important}}</style>"
+        f".mantine-Notifications-root{{top:auto!important;bottom:{NOTICES}px!important}}"
+        f"@media (max-width:{NARROW - 1}px){{.over-scene{{left:8px}}"
+        f"#hint{{bottom:{FLOATING + 12}px!important}}"
+        f".mantine-Notifications-root{{bottom:{FLOATING + NOTICES}px!important}}}}"
+        f"@media (max-width:{SHEET}px){{.over-scene{{right:8px}}#hint{{display:none!important}}}}"
+        "</style>"
     )
 
 

@@ -2,8 +2,7 @@
 
 import html
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,20 +33,15 @@ class Label:
 class Labels:
     """The labels of a scene, in groups; a hidden part of the page holds them for the script."""
 
-    def __init__(self, scene: Any, gui: Any):
-        """Show none yet; add the hidden part to the container that is open.
-
-        Args:
-            scene: The scene of viser.
-            gui: The GUI of the same server.
-        """
-        self._scene, self._box = scene, gui.add_html("")
+    def __init__(self, gui: Any):
+        """Show none yet; add the hidden part to the container that is open in the GUI of viser."""
+        self._box = gui.add_html("")
         self._groups: dict[str, Mapping[str, Label]] = {}
 
     def show(self, group: str, labels: Mapping[str, Label]) -> None:
         """Show labels by name instead of those that the group had; none removes them."""
         self._groups[group] = labels
-        self._box.content = write_labels(self._all())
+        self._box.content = self.html
 
     def _all(self) -> dict[str, Label]:
         return {
@@ -56,21 +50,10 @@ class Labels:
             for name, label in labels.items()
         }
 
-    @contextmanager
-    def drawn(self) -> Iterator[None]:
-        """Draw the labels into the scene meanwhile, for a file without the rest of the page."""
-        drawn = [
-            self._scene.add_label(
-                name, label.words, position=label.place,
-                anchor="bottom-center" if label.stands else "center-center",
-            )
-            for name, label in self._all().items()
-        ]  # fmt: skip
-        try:
-            yield
-        finally:
-            for node in drawn:
-                node.remove()
+    @property
+    def html(self) -> str:
+        """All labels for the script."""
+        return write_labels(self._all())
 
 
 def write_labels(labels: Mapping[str, Label]) -> str:

@@ -46,8 +46,8 @@ class PathOverlay:
         self._plan = Ribbon(scene, "/paths/plan")
         self._old: set[int] = set()
         """Indices of the paths that are greyed."""
-        self._pointed: int | None = None
-        """Index of the path that a visitor points at."""
+        self._pointed: dict[int, tuple[Any, int]] = {}
+        """The clients of visitors who point at a path, and its index, by the client's number."""
 
     def show(
         self,
@@ -76,7 +76,8 @@ class PathOverlay:
         poses = candidates[shown].poses
         self._draw_numbers(terrain, candidates, radius, shown)
         self._draw_flags(terrain, {"start": poses[0], "goal": poses[-1]}, radius)
-        self._highlight(self._pointed, True)
+        for client, index in self._pointed.values():
+            self._highlight(client, index, True)
 
     def show_plan(self, rover: Rover, terrain: Terrain, plan: Floats | None) -> None:
         """Draw a path (n, 3) without a verdict of ours, or none, instead of what was drawn."""
@@ -90,16 +91,21 @@ class PathOverlay:
             self._labels.show(FLAGS, {})
         self._labels.show(NUMBERS, {})
 
-    def point_at(self, index: int | None) -> None:
-        """Highlight a path, or none, instead of the one before."""
-        if index != self._pointed:
-            self._highlight(self._pointed, False)
-            self._highlight(index, True)
-            self._pointed = index
+    def point_at(self, client: Any, index: int) -> None:
+        """Highlight a path to one visitor instead of the one before; -1: none."""
+        _, before = self._pointed.get(client.client_id, (client, -1))
+        if index != before:
+            self._highlight(client, before, False)
+            self._highlight(client, index, True)
+            self._pointed[client.client_id] = client, index
 
-    def _highlight(self, index: int | None, is_on: bool) -> None:
+    def forget(self, client: Any) -> None:
+        """Forget a visitor who has left."""
+        self._pointed.pop(client.client_id, None)
+
+    def _highlight(self, client: Any, index: int, is_on: bool) -> None:
         if index in self.ribbons:
-            self.ribbons[index].highlight(is_on)
+            self.ribbons[index].highlight(client, is_on)
 
     def clear(self) -> None:
         """Remove all that was drawn but the labels, which are moved to other places."""

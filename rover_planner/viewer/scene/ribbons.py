@@ -9,6 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
+from rover_planner.viewer.browser.channel import show_to
 from rover_planner.viewer.scene.ground_mesh import as_unlit_glb
 from rover_planner.viewer.state.colours import Colour, choose_halo
 
@@ -54,7 +55,6 @@ class Ribbon:
         self.strands: tuple[Strand, ...] = ()
         """What is drawn, in its own colours."""
         self._paint: Colour | None = None
-        self._line_width = LINE_WIDTH
         self._core: Any = None
         self._band: Any = None
 
@@ -76,11 +76,15 @@ class Ribbon:
         else:
             self.remove()
 
-    def highlight(self, is_on: bool) -> None:
-        """Show it broad, or as it was; it sends one number."""
-        self._line_width = BROAD_LINE_WIDTH if is_on else LINE_WIDTH
+    def highlight(self, client: Any, is_on: bool) -> None:
+        """Show it broad to one visitor, or as it was; it sends one number.
+
+        Args:
+            client: The visitor's client of viser.
+            is_on: Whether it is broad.
+        """
         if self._core is not None:
-            self._core.thickness = self._line_width
+            show_to(client, self._core, thickness=BROAD_LINE_WIDTH if is_on else LINE_WIDTH)
 
     def paint(self, colour: Colour | None) -> None:
         """Show all strands in a colour, or each in its own again."""
@@ -105,7 +109,7 @@ class Ribbon:
             f"{self.name}-band", glb, cast_shadow=False, receive_shadow=False
         )
         self._core = self._scene.add_line_segments(
-            self.name, points, colours, thickness=self._line_width, thickness_units="screen"
+            self.name, points, colours, thickness=LINE_WIDTH, thickness_units="screen"
         )
 
 

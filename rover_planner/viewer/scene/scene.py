@@ -38,7 +38,7 @@ class Scene:
         """The frame of the scene; all that is drawn goes through it."""
         self.cameras = Cameras(server, self.frame)
         """The visitors' cameras."""
-        self.labels = Labels(self._scene, server.gui)
+        self.labels = Labels(server.gui)
         self.paths = PathOverlay(self._scene, self.labels, self.frame)
         self.search = SearchOverlay(self._scene, self.frame)
         self.failure = FailureMark(self._scene, self.labels, self.frame)

@@ -383,6 +383,7 @@ def test_broken_yaml_is_refused_in_one_line(tmp_path, text):
     with pytest.raises(RoverFileError, match=r"rover\.yaml: not valid YAML") as raised:
         load_rover(write(tmp_path, text))
     assert "\n" not in str(raised.value)
+    assert "<unicode string>" not in str(raised.value)
 
 
 def test_an_unreadable_file_is_refused(tmp_path):

@@ -15,6 +15,7 @@ from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.browser import (
     ARGUMENTS,
+    OVERLAPS,
     PROGRAM,
     Visitor,
     needs_browser,
@@ -22,6 +23,7 @@ from support.viewer.browser import (
     wait_until,
 )
 from support.viewer.sessions import LSR1
+from support.viewer.visits import wait_for_rest
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -97,17 +99,6 @@ def test_the_letters_of_board_and_lanes_are_at_least_12_px_high(visitor):
     assert len(sizes) > 30 and min(sizes) >= 11.95
 
 
-OVERLAPS = """() => {
-    const boxes = [...document.querySelectorAll('.label-box')].filter(e => e.offsetParent).map(
-        e => [e.textContent, e.getBoundingClientRect()]);
-    const meet = (p, q) => p.left < q.right && q.left < p.right
-        && p.top < q.bottom && q.top < p.bottom;
-    return [boxes.length, boxes.flatMap(([name, p], k) => boxes.slice(0, k)
-        .filter(([, q]) => meet(p, q)).map(([other]) => [name, other]))];
-}"""
-"""How many labels are seen, and which of them overlap."""
-
-
 @pytest.mark.parametrize(
     "camera",
     [
@@ -131,18 +122,45 @@ def test_labels_do_not_overlap_on_the_screen(page, visitor, camera):
     wait_until(lambda: visitor.tab.evaluate(OVERLAPS) == [count, []], "labels that are apart")
 
 
-def wait_for_highlight(page: Page, index: int | None) -> None:
-    """Wait until a path, or none, is drawn broad."""
+def wait_for_highlight(page: Page, visitor: Visitor, index: int | None) -> None:
+    """Wait until the browser of a visitor draws a path, or none, broad."""
     ribbons = page.scene.paths.ribbons
-    wanted = {k: BROAD_LINE_WIDTH if k == index else LINE_WIDTH for k in ribbons}
-    wait_until(
-        lambda: {k: one._core.thickness for k, one in ribbons.items()} == wanted,
-        f"highlight of {index}",
-    )
+    wanted = [BROAD_LINE_WIDTH if k == index else LINE_WIDTH for k in ribbons]
+    names = [ribbon._core.name for ribbon in ribbons.values()]
+    wait_until(lambda: visitor.tab.evaluate(LINE_WIDTHS, names) == wanted, f"highlight of {index}")
+
+
+LINE_WIDTHS = """names => names.map((name) => {
+    const widths = [];
+    window.__viserMutable.nodeRefFromName[name].traverse((part) => {
+        if (part.material && part.material.linewidth > 1) widths.push(part.material.linewidth);
+    });
+    return widths[0];
+})"""
+"""Returns the widths of the lines of nodes of the scene [px]."""
 
 
 def ground_of(visitor: Visitor, selector: str) -> str:
     return visitor.tab.locator(selector).evaluate("e => getComputedStyle(e).backgroundColor")
+
+
+def test_what_one_visitor_points_at_is_highlighted_to_no_other(page, visitor):
+    show(page, page.session.answer.nearest)
+    other = Visitor(visitor.tab.context.browser, page.url)
+    visitor.open_tab("Ground and path")
+    other.open_tab("Ground and path")
+    for one, row in ((visitor, 0), (other, 1)):
+        one.tab.locator("#candidates tr[data-path]").nth(row).hover()
+    wait_for_highlight(page, visitor, 0)
+    wait_for_highlight(page, other, 1)
+    page.requests.add(lambda: page.session.show_candidate(1))  # draws the paths again
+    wait_until(lambda: page.session.shown.index == 1, "the other path")
+    wait_for_rest(page)
+    wait_for_highlight(page, visitor, 0)
+    wait_for_highlight(page, other, 1)
+    other.tab.close()
+    wait_until(lambda: len(page.scene.paths._pointed) == 1, "the visitor to be forgotten")
+    visitor.tab.mouse.move(600, 700)
 
 
 def test_a_row_under_the_mouse_highlights_its_path_and_a_click_selects_it(page, visitor):
@@ -150,17 +168,17 @@ def test_a_row_under_the_mouse_highlights_its_path_and_a_click_selects_it(page, 
     visitor.open_tab("Ground and path")
     rows = visitor.tab.locator("#candidates tr[data-path]")
     assert rows.count() == len(page.session.candidates)
-    wait_for_highlight(page, None)
+    wait_for_highlight(page, visitor, None)
     other = (page.session.answer.nearest + 1) % rows.count()
     drawn = [ribbon._core for ribbon in page.scene.paths.ribbons.values()]
     rows.nth(other).hover()
-    wait_for_highlight(page, other)
+    wait_for_highlight(page, visitor, other)
     now = [ribbon._core for ribbon in page.scene.paths.ribbons.values()]
     assert all(one is other for one, other in zip(drawn, now, strict=True))  # drawn once
     assert "240, 228, 66" in ground_of(visitor, f'#candidates tbody[data-path="{other + 1}"]')
     assert "240, 228, 66" in ground_of(visitor, f'.label-box[data-path="{other + 1}"]')
     visitor.tab.mouse.move(600, 700)
-    wait_for_highlight(page, None)
+    wait_for_highlight(page, visitor, None)
     best = page.session.answer.nearest
     rows.nth(best).click()
     wait_until(lambda: page.session.shown.index == best, "the best path")
@@ -191,9 +209,9 @@ def test_rows_are_reached_and_selected_by_keys(page, visitor):
     visitor.tab.get_by_role("tab", name="Share", exact=True).focus()
     keyboard = visitor.tab.keyboard
     keyboard.press("Tab")
-    wait_for_highlight(page, 0)
+    wait_for_highlight(page, visitor, 0)
     keyboard.press("ArrowDown")
-    wait_for_highlight(page, 1)
+    wait_for_highlight(page, visitor, 1)
     for key, index in (("Enter", 1), ("Space", 2)):
         keyboard.press(key)
         wait_until(lambda index=index: page.session.shown.index == index, key)
@@ -202,13 +220,13 @@ def test_rows_are_reached_and_selected_by_keys(page, visitor):
         )
         wait_until(lambda index=index: focused_row(visitor) == index + 1, "the focus to stay")
         keyboard.press("ArrowDown")
-        wait_for_highlight(page, index + 1)
+        wait_for_highlight(page, visitor, index + 1)
     assert page.playback.rate == 0.0  # space was the row's, not the drive's
     keyboard.press("Escape")
     visitor.tab.locator("#label-layer [data-path='1']").click()
     wait_until(lambda: page.session.shown.index == 0, "the path of the number")
     visitor.tab.mouse.move(600, 700)
-    wait_for_highlight(page, None)
+    wait_for_highlight(page, visitor, None)
 
 
 def test_a_changed_slider_is_marked_with_differences_and_can_be_undone_and_reset(page, visitor):

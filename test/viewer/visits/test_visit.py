@@ -18,7 +18,7 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.scene import find_radius
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain
-from support.viewer.browser import LAPTOP, Visitor, needs_browser, wait_until
+from support.viewer.browser import LAPTOP, OVERLAPS, Visitor, needs_browser, wait_until
 from support.viewer.sessions import LSR1, ramp
 from support.viewer.visits import open_browser, wait_for_rest
 
@@ -128,6 +128,17 @@ def test_escape_an_empty_box_and_numbers_beyond_the_slider(visitor, page, monkey
     wait_until(lambda: applied, "the value")
     assert applied == [2.0]  # the end of the slider
     wait_until(lambda: visitor.slider_value(FRICTION) == 2.0, "the box to show it")
+    note = visitor.tab.locator("#limited")
+    assert note.inner_text() == "limited to 2, the slider's largest value"
+    at, box = note.bounding_box(), visitor._row(FRICTION).locator("input").last.bounding_box()
+    assert abs(at["y"] - box["y"] - box["height"]) < 20.0  # beside its box
+    type_keys(visitor, FRICTION, "0.5", "Enter")
+    wait_until(lambda: applied[-1] == 0.5, "a value within the range")
+    note.wait_for(state="hidden")
+    type_keys(visitor, FRICTION, "-1", "Enter")
+    wait_until(lambda: applied[-1] == 0.16, "the smallest value")
+    assert note.inner_text() == "limited to 0.16, the slider's smallest value"
+    assert note.count() == 1
 
 
 def test_the_arm_goes_with_its_rover_and_the_box_of_presets_follows_a_file(
@@ -284,19 +295,6 @@ def test_the_camera_looks_from_above_from_the_side_and_goes_along(visitor, page)
     )
 
 
-def test_below_1000_px_the_panels_stack_and_the_scene_stays_wide(visitor, page):
-    canvas = visitor.tab.locator("canvas").first
-    wide = canvas.bounding_box()
-    assert wide["x"] >= 250.0
-    visitor.tab.set_viewport_size({"width": 900, "height": 720})
-    wait_until(lambda: canvas.bounding_box()["x"] < 20.0, "the panels to stack")
-    wait_until(lambda: canvas.bounding_box()["width"] > 450.0, "a wide scene")
-    header = visitor.tab.locator("#header").bounding_box()
-    assert header["x"] >= 0.0 and header["x"] + header["width"] <= 900.0
-    visitor.tab.set_viewport_size(LAPTOP)
-    wait_until(lambda: canvas.bounding_box()["x"] >= 250.0, "the panels side by side")
-
-
 def test_the_hint_for_first_visitors_can_be_closed_for_ever(visitor):
     hint = visitor.text("#hint")
     assert "Space" in hint and "goal" in hint
@@ -384,6 +382,9 @@ def test_a_refusal_is_sent_as_one_file_with_scene_pose_numbers_and_versions(
     tab.add_style_tag(content=".mantine-Notifications-root, #report { display: none; }")
     colours = np.asarray(Image.open(BytesIO(tab.locator("canvas").first.screenshot())))
     assert colours[..., :3].reshape(-1, 3).std(axis=0).max() > 20.0  # a scene, not one colour
+    labels = page.scene.labels._all()
+    wait_until(lambda: tab.evaluate(OVERLAPS)[0] > 3, "the labels")
+    assert tab.evaluate(OVERLAPS) == [len(labels), []]
     assert errors == []
     context.close()
 
