@@ -19,9 +19,10 @@ from benchmarks.measure import Figure
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob
+from rover_planner.survey.cluster.client import ClusterSettings, open_client
+from rover_planner.survey.cluster.runner import survey_with
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk
 from rover_planner.survey.request import SurveyRequest
-from rover_planner.survey.runner import ClusterSettings, open_client, survey_with
 
 SIDES = (10_000, 31_623)
 """Sides of the maps whose tasks are handed out [cells]."""

@@ -182,7 +182,13 @@ class SurveyStore:
         """
         import fcntl
 
-        with (self.path / ".lock").open("w") as file:
+        try:
+            lock = (self.path / ".lock").open("w")
+        except OSError as error:
+            raise PlanningError(
+                f"{show_file(self.path)}: cannot be written: {error.strerror}"
+            ) from None
+        with lock as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
@@ -194,6 +200,8 @@ class SurveyStore:
 
 def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None:
     """Create the store of a survey that has not begun, or nothing if that fails.
+
+    Another command that creates it at the same time may be first; then its store stays.
 
     Args:
         path: Folder to create.
@@ -226,11 +234,16 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
         if terrain is not None:
             keep_map(group, terrain)
         group.attrs[NOTES] = notes.to_dict()
-        aside.rename(path)
+        try:
+            aside.rename(path)
+        except OSError as error:
+            if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+                raise
         force_folders(path.parent, path.parent)
     except OSError as error:
-        shutil.rmtree(aside, ignore_errors=True)
         raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+    finally:  # also after Ctrl-C
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def is_refusal(error: OSError) -> bool:
