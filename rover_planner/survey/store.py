@@ -5,6 +5,7 @@ import errno
 import os
 import shutil
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,8 @@ NOTES = "rover_planner_survey"
 SECONDS = "seconds"
 """Array (rows, columns) of chunks: time that a chunk took [s]; NaN while it is not finished,
 FAILED if it failed. Each element is a file, written last."""
+WRITERS = 8
+"""Number of layers that are written at a time."""
 FAILED = -1.0
 """Seconds of a chunk that failed."""
 
@@ -157,8 +160,13 @@ class SurveyStore:
             OSError: The system refuses.
         """
         rows, columns = self.notes.layout.cells_of(chunk)
-        for name, values in layers.items():
-            self._group[name][rows, columns] = values
+
+        def put(name: str) -> None:
+            self._group[name][rows, columns] = layers[name]
+
+        with ThreadPoolExecutor(WRITERS) as writers:  # the disk takes many files at a time
+            for _ in writers.map(put, layers):
+                pass
         self._group[SECONDS][chunk] = max(seconds, 0.0)
 
     def mark_failed(self, chunk: Index) -> None:
