@@ -17,7 +17,8 @@ def check_machine(job: SurveyJob, settings: ClusterSettings) -> None:
     Raises:
         PlanningError: They do not.
     """
-    from distributed.system import CPU_COUNT, MEMORY_LIMIT
+    from dask.system import CPU_COUNT
+    from distributed.system import MEMORY_LIMIT
 
     if settings.scheduler is not None:
         return
