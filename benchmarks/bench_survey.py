@@ -23,10 +23,10 @@ from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.survey import prepare_survey
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-CELLS = 512
+CELLS = 576
 """Side of the made Mars whose chunks are measured [cells]."""
-CHUNK = 128
-"""Side of these chunks [cells]."""
+CHUNK = 192
+"""Side of these chunks [cells], that of a survey at so many headings."""
 HEADINGS = 8
 """Headings of all surveys."""
 REPEATS = 3
