@@ -19,9 +19,10 @@ from benchmarks.measure import Figure
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob
+from rover_planner.survey.cluster.client import ClusterSettings, open_client
+from rover_planner.survey.cluster.runner import survey_with
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk
 from rover_planner.survey.request import SurveyRequest
-from rover_planner.survey.runner import ClusterSettings, open_client, survey_with
 
 SIDES = (10_000, 31_623)
 """Sides of the maps whose tasks are handed out [cells]."""
@@ -32,6 +33,10 @@ POSES_PER_SECOND = 50_000.0
 WORKERS = 100
 """Number of workers; they are threads of one process, whose own work limits how many there can be:
 40 % of a core without tasks, and 7 ms for a task."""
+MANY_WORKERS = 500
+"""Number of workers of one more run, whose start takes from half a minute to several."""
+MANY_TASKS = 3000
+"""Number of its tasks, the first of the largest map."""
 PACE = 2
 """Tasks that sleep do so for a chunk's time over this, so that so few workers ask for tasks as
 often as so many times more."""
@@ -77,7 +82,7 @@ def measure() -> list[Figure]:
             Figure("scheduler", f"{name}: time of a chunk", time_of_chunk(job), "s", repeats=1),
             *measure_rate(job, name),
         ]
-    return figures + measure_sleep(make_job(SIDES[0]))
+    return figures + measure_sleep(make_job(SIDES[0])) + measure_many(make_job(SIDES[-1]))
 
 
 def measure_rate(job: SurveyJob, name: str) -> list[Figure]:
@@ -112,11 +117,27 @@ def measure_sleep(job: SurveyJob) -> list[Figure]:
     ]  # fmt: skip
 
 
-def run(job: SurveyJob, task: Any) -> Load:
-    """Survey all chunks of a job by tasks, on workers of one process."""
-    with open_cluster(WORKERS) as cluster:
+def measure_many(job: SurveyJob) -> list[Figure]:
+    """Hand out tasks that return at once to many workers."""
+    load = run(job, return_at_once, MANY_WORKERS, MANY_TASKS)
+    tasks = min(MANY_TASKS, len(job.layout.all_chunks))
+    told = (
+        ("CPU time of the scheduler, a task", load.scheduler / tasks * 1e3, "ms"),
+        ("CPU time of the client, a task", load.client / tasks * 1e3, "ms"),
+        ("sent, a task", load.sent / tasks / 1e3, "kB"),
+        ("growth of the scheduler", load.memory / 1e6, "MB"),
+    )
+    return [Figure("scheduler", f"{MANY_WORKERS} workers: {what}", value, unit, repeats=1)
+            for what, value, unit in told]  # fmt: skip
+
+
+def run(job: SurveyJob, task: Any, count: int | None = None, tasks: int | None = None) -> Load:
+    """Survey chunks of a job by tasks, on workers of one process; by default all, on WORKERS."""
+    count = WORKERS if count is None else count
+    chunks = job.layout.all_chunks[:tasks]
+    with open_cluster(count) as cluster:
         client, process = cluster.client, cluster.scheduler
-        survey_with(client, job, job.layout.all_chunks[: 2 * WORKERS], task=return_at_once)
+        survey_with(client, job, chunks[: 2 * count], task=return_at_once)
         sent, before = count_bytes(client), process.memory_info().rss
         busy, mine, began = cpu_of(process), time.process_time(), time.perf_counter()
         most = before
@@ -126,7 +147,7 @@ def run(job: SurveyJob, task: Any) -> Load:
             if report.chunk[1] == 0:
                 most = max(most, process.memory_info().rss)
 
-        survey_with(client, job, job.layout.all_chunks, on_chunk=look, task=task)
+        survey_with(client, job, chunks, on_chunk=look, task=task)
         return Load(
             time.perf_counter() - began,
             cpu_of(process) - busy,

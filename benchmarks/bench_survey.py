@@ -16,16 +16,17 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.survey.chunk_survey import SurveyJob, compute_chunk
+from rover_planner.survey.cluster.client import ClusterSettings, open_client
+from rover_planner.survey.cluster.runner import survey_with
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
-from rover_planner.survey.runner import ClusterSettings, open_client, survey_with
 from rover_planner.survey.survey import prepare_survey
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-CELLS = 512
+CELLS = 576
 """Side of the made Mars whose chunks are measured [cells]."""
-CHUNK = 128
-"""Side of these chunks [cells]."""
+CHUNK = 192
+"""Side of these chunks [cells], that of a survey at so many headings."""
 HEADINGS = 8
 """Headings of all surveys."""
 REPEATS = 3

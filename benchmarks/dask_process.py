@@ -12,8 +12,11 @@ import sys
 import threading
 from collections.abc import Iterator
 
+import dask
 from distributed import Scheduler, Worker
 from distributed.comm.tcp import TCP
+
+from rover_planner.survey.cluster.client import SETTINGS
 
 _sent, _counts = 0, False
 
@@ -78,6 +81,7 @@ async def serve_workers(address: str, count: int, ended: threading.Event) -> Non
 def main(words: list[str]) -> None:
     """Serve until the input ends."""
     start_count()
+    dask.config.set(SETTINGS)
     ended = threading.Event()
 
     def wait_for_end() -> None:

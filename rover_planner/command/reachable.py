@@ -38,6 +38,10 @@ def reachable(
     if picture is not None:
         need("matplotlib", "the picture of a survey")
     x, y = _read_place(start)
+    if picture is not None:
+        from rover_planner.figures.pictures import check_picture
+
+        check_picture(picture)
     from rover_planner.shell.progress import show_progress
     from rover_planner.survey.reach.reachable import find_reachable
     from rover_planner.survey.store import SurveyStore
@@ -72,6 +76,7 @@ def _report(store: "SurveyStore", area: "ReachableArea") -> dict[str, Any]:
         "longest": None if area.longest is None else round(area.longest, 3),
         "farthest": place,
         "turns": "judged" if notes.turns else "assumed",
+        "chunks_missing": math.prod(notes.layout.chunks) - len(store.find_finished()),
     }
 
 

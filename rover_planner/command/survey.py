@@ -16,12 +16,13 @@ from rover_planner.command.options import (
     RoverName,
     Sigmas,
 )
+from rover_planner.shell.end_signals import end_as_by_ctrl_c
 from rover_planner.shell.exit_codes import EXIT_FAILED, EXIT_OK
 from rover_planner.shell.extras import need
 from rover_planner.shell.one_line import MAX_LINE, one_line
 
 if TYPE_CHECKING:
-    from rover_planner.survey.runner import SurveyOutcome
+    from rover_planner.survey.cluster.runner import SurveyOutcome
     from rover_planner.survey.survey import PreparedSurvey
 
 
@@ -85,8 +86,9 @@ def survey(
         need("matplotlib", "the picture of a survey")
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
+    from rover_planner.survey.cluster.checks import check_machine
+    from rover_planner.survey.cluster.client import ClusterSettings, check_settings
     from rover_planner.survey.request import SurveyRequest
-    from rover_planner.survey.runner import ClusterSettings, check_settings
     from rover_planner.survey.survey import prepare_survey
 
     settings = ClusterSettings(scheduler, workers, memory_limit)
@@ -99,10 +101,17 @@ def survey(
         turns=turns,
         sigmas=sigmas,
     )
-    prepared = prepare_survey(request, map_name, out, chunk, max_cells, max_gap)
-    began = time.monotonic()
-    with prepared.store.locked():
-        outcome = _run(prepared, settings)
+    _check_places(geotiff, picture)
+    with end_as_by_ctrl_c():
+        prepared = prepare_survey(
+            request, map_name, out, chunk, max_cells, max_gap,
+            check=lambda job: check_machine(job, settings),
+        )  # fmt: skip
+        began = time.monotonic()
+        outcome = None
+        if prepared.chunks:  # what is finished may be read-only
+            with prepared.store.locked():
+                outcome = _run(prepared, settings)
     if geotiff is not None:
         from rover_planner.survey.geotiff import write_layers
 
@@ -118,14 +127,24 @@ def survey(
     return EXIT_FAILED
 
 
-def _run(prepared: "PreparedSurvey", settings: Any) -> "SurveyOutcome | None":
-    """Survey what is not finished; None if all is."""
+def _check_places(geotiff: Path | None, picture: Path | None) -> None:
+    """Check that the results have places, before hours of work."""
+    if geotiff is not None:
+        from rover_planner.survey.geotiff import make_folder
+
+        make_folder(geotiff)
+    if picture is not None:
+        from rover_planner.figures.pictures import check_picture
+
+        check_picture(picture)
+
+
+def _run(prepared: "PreparedSurvey", settings: Any) -> "SurveyOutcome":
+    """Survey what is not finished."""
     from rover_planner.shell.progress import show_progress, show_rate
-    from rover_planner.survey.runner import run_survey
+    from rover_planner.survey.cluster.runner import run_survey
     from rover_planner.survey.warm_up import warm_up_survey
 
-    if not prepared.chunks:
-        return None
     job = prepared.job
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")

@@ -29,14 +29,27 @@ STYLE: dict[str, Any] = {
 """Settings of matplotlib (rcParams)."""
 
 
+def check_picture(path: Path) -> None:
+    """Check that a picture has a format and a folder, before long work.
+
+    Raises:
+        PlanningError: It has not.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise PlanningError(f"picture {show_file(path)} must be a {', '.join(SUFFIXES)} file")
+    if not path.parent.is_dir():
+        raise PlanningError(
+            f"{show_file(path)}: cannot be written: there is no folder {show_file(path.parent)}"
+        )
+
+
 def save_figure(path: Path, figure: Figure) -> None:
     """Write a picture to a file; the suffix sets the format.
 
     Raises:
         PlanningError: The suffix names no format, or the file cannot be written.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise PlanningError(f"picture {show_file(path)} must be a {', '.join(SUFFIXES)} file")
+    check_picture(path)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
     try:

@@ -1,7 +1,9 @@
 """The survey of one chunk: the work of one task, in whatever process it runs."""
 
+import functools
 import time
-from dataclasses import dataclass
+import uuid
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numba
@@ -39,6 +41,8 @@ class SurveyJob:
     """GeoTIFF file of the map, seen by all workers; empty if the map is kept in the store."""
     version: str = rover_physics.__version__
     """Version of the model."""
+    run: str = field(default_factory=lambda: uuid.uuid4().hex)
+    """Name of this run of the command; a worker opens the store once in it."""
 
     def open_map(self) -> MapSource:
         """Open the map."""
@@ -76,17 +80,33 @@ def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
             f"the worker has version {rover_physics.__version__}, the survey {job.version}"
         )
     numba.set_num_threads(1)  # a worker is one core
-    began = time.perf_counter()
-    layers = compute_chunk(job, chunk)
+    began, wrong = time.perf_counter(), ""
+    try:
+        layers = compute_chunk(job, chunk)
+    except PlanningError as error:
+        wrong = str(error)
+    if wrong:  # without its causes, as GDAL's errors cannot be sent to the client
+        raise PlanningError(wrong)
     poses = layers["worst_class"].size * job.request.headings
     seconds = time.perf_counter() - began
     try:
-        SurveyStore(job.store).write(chunk, layers, seconds)
+        open_store(job.store, job.run).write(chunk, layers, seconds)
     except OSError as error:
         if not is_refusal(error):
             raise
         return ChunkReport(chunk, refusal=error.strerror or str(error))
     return ChunkReport(chunk, poses, seconds)
+
+
+@functools.lru_cache(maxsize=1)
+def open_store(store: Path, run: str) -> SurveyStore:
+    """Open a store once for all chunks that a process surveys in a run of the command.
+
+    Args:
+        store: Its folder.
+        run: Name of the run.
+    """
+    return SurveyStore(store)
 
 
 def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:

@@ -2,7 +2,9 @@
 
 import contextlib
 import hashlib
+import importlib.util
 import math
+import os
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,6 +26,12 @@ METRES = ("", "m", "metre", "metres", "meter", "meters")
 """Names of the unit of heights that are read; a file without a unit is taken to be in metres."""
 SQUARE = 1e-6
 """Largest difference of width and height of a cell, as a share."""
+TURNED = 1e-6
+"""Largest displacement of the far corner by a rotation, in cells."""
+CELL_SIZES = (1e-5, 1e6)
+"""Smallest and largest cell [m], as of a Terrain."""
+UNDECLARED = (-9999.0, -32767.0, -32768.0, float(np.finfo(np.float32).min))
+"""Values that programs write where they know no height; refused in a file that does not say so."""
 BAND = 512
 """Rows that are written at a time."""
 
@@ -75,7 +83,10 @@ class GeoTiffMap:
                 rows.stop - rows.start,
             )
             values = file.read(1, window=window, masked=True)
-            heights = np.where(np.ma.getmaskarray(values), np.nan, values.data.astype(np.float64))
+            unknown = np.ma.getmaskarray(values)
+            heights = np.where(unknown, np.nan, values.data.astype(np.float64))
+            if file.nodata is None:
+                self._check_declared(heights)
             heights = heights * file.scales[0] + file.offsets[0]
         return {"elevation": np.ascontiguousarray(heights[::-1][::every, ::every])}
 
@@ -86,13 +97,22 @@ class GeoTiffMap:
 
     @contextlib.contextmanager
     def _open(self) -> Iterator[Any]:
-        import rasterio
-
+        rasterio = _import_rasterio()
         try:
             with rasterio.open(self.path) as file:
                 yield file
         except rasterio.errors.RasterioError as error:
-            raise PlanningError(f"{show_file(self.path)}: cannot be read: {error}") from None
+            why = error.__cause__ or error
+            raise PlanningError(f"{show_file(self.path)}: cannot be read: {why}") from None
+
+    def _check_declared(self, heights: np.ndarray) -> None:
+        """Check that heights of a file without a nodata value are none that stand for it."""
+        for value in UNDECLARED:
+            if (heights == value).any():
+                raise PlanningError(
+                    f"{show_file(self.path)}: holds {value:g} and declares no nodata value; "
+                    f"gdal_edit.py -a_nodata {value:g} declares it"
+                )
 
     def _check(self, file: Any) -> None:
         """Check kind, units and completeness of an open file."""
@@ -114,7 +134,7 @@ def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
         PlanningError: The file cannot be written.
     """
     need("rasterio", "a GeoTIFF")
-    import rasterio
+    rasterio = _import_rasterio()
     from rasterio.shutil import copy
 
     rows, columns = layer.shape
@@ -157,14 +177,35 @@ def write_layers(store: SurveyStore, folder: Path) -> None:
     Raises:
         PlanningError: A file cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise PlanningError(f"{show_file(folder)}: cannot be made: {error.strerror}") from None
+    make_folder(folder)
     for name in store.layer_names():
         write_cog(
             folder / f"{name}.tif", store.layer(name), store.notes.frame, store.notes.layout.step
         )
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for layers, if there is none.
+
+    Raises:
+        PlanningError: It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PlanningError(f"{show_file(folder)}: cannot be made: {error.strerror}") from None
+
+
+def _import_rasterio() -> Any:
+    """Import rasterio so that PROJ finds its database; else it complains on stderr by itself."""
+    found = importlib.util.find_spec("rasterio")
+    if found is not None and found.origin is not None:
+        data = Path(found.origin).parent / "proj_data"
+        if data.is_dir() and "PROJ_LIB" not in os.environ:
+            os.environ.setdefault("PROJ_DATA", str(data))
+    import rasterio
+
+    return rasterio
 
 
 def _find_fault(file: Any) -> str:
@@ -179,8 +220,9 @@ def _find_fault(file: Any) -> str:
     if not crs:
         return "has no coordinate reference system; gdal_edit.py -a_srs sets it"
     if not crs.is_projected:
+        kind = "degrees" if crs.is_geographic else "coordinates of another kind"
         return (
-            "is in degrees; it must be in a map projection in metres (gdalwarp -t_srs makes one)"
+            f"is in {kind}; it must be in a map projection in metres (gdalwarp -t_srs makes one)"
         )
     unit, factor = crs.linear_units_factor
     if abs(factor - 1.0) > 1e-9:
@@ -188,12 +230,24 @@ def _find_fault(file: Any) -> str:
     height = (file.units[0] or "").strip()
     if height.lower() not in METRES:
         return f"has heights in {height!r}; they must be in metres (gdal_calc.py converts them)"
-    if transform.b != 0.0 or transform.d != 0.0 or not (transform.a > 0.0 > transform.e):
+    if transform.is_identity:
+        return "says nowhere where its cells are; gdal_edit.py -a_ullr sets it"
+    turned = max(abs(transform.b), abs(transform.d)) * max(file.width, file.height)
+    if turned > TURNED * abs(transform.a) or not (transform.a > 0.0 > transform.e):
         return "is rotated or mirrored; its rows must run to the south (gdalwarp makes it so)"
+    if not CELL_SIZES[0] <= transform.a <= CELL_SIZES[1]:
+        low, high = CELL_SIZES
+        return f"has cells of {transform.a:g} m; they must be of {low:g} to {high:g} m"
     if abs(transform.a + transform.e) > SQUARE * transform.a:
         return (
             f"has cells of {transform.a:g} x {-transform.e:g} m; they must be square "
             "(gdalwarp -tr makes them so)"
+        )
+    scale, offset = file.scales[0], file.offsets[0]
+    if not (math.isfinite(scale) and scale != 0.0 and math.isfinite(offset)):
+        return (
+            f"has heights with scale {scale:g} and offset {offset:g}; the scale must be finite "
+            "and not 0, the offset finite (gdal_edit.py -scale, -offset set them)"
         )
     if min(file.width, file.height) < 2:
         return f"has {file.height} x {file.width} cells; it must have 2 x 2 or more"

@@ -5,6 +5,7 @@ import errno
 import os
 import shutil
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,8 @@ NOTES = "rover_planner_survey"
 SECONDS = "seconds"
 """Array (rows, columns) of chunks: time that a chunk took [s]; NaN while it is not finished,
 FAILED if it failed. Each element is a file, written last."""
+WRITERS = 8
+"""Number of layers that are written at a time."""
 FAILED = -1.0
 """Seconds of a chunk that failed."""
 
@@ -157,8 +160,13 @@ class SurveyStore:
             OSError: The system refuses.
         """
         rows, columns = self.notes.layout.cells_of(chunk)
-        for name, values in layers.items():
-            self._group[name][rows, columns] = values
+
+        def put(name: str) -> None:
+            self._group[name][rows, columns] = layers[name]
+
+        with ThreadPoolExecutor(WRITERS) as writers:  # the disk takes many files at a time
+            for _ in writers.map(put, layers):
+                pass
         self._group[SECONDS][chunk] = max(seconds, 0.0)
 
     def mark_failed(self, chunk: Index) -> None:
@@ -182,7 +190,13 @@ class SurveyStore:
         """
         import fcntl
 
-        with (self.path / ".lock").open("w") as file:
+        try:
+            lock = (self.path / ".lock").open("w")
+        except OSError as error:
+            raise PlanningError(
+                f"{show_file(self.path)}: cannot be written: {error.strerror}"
+            ) from None
+        with lock as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
@@ -194,6 +208,8 @@ class SurveyStore:
 
 def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None:
     """Create the store of a survey that has not begun, or nothing if that fails.
+
+    Another command that creates it at the same time may be first; then its store stays.
 
     Args:
         path: Folder to create.
@@ -226,11 +242,16 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
         if terrain is not None:
             keep_map(group, terrain)
         group.attrs[NOTES] = notes.to_dict()
-        aside.rename(path)
+        try:
+            aside.rename(path)
+        except OSError as error:
+            if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+                raise
         force_folders(path.parent, path.parent)
     except OSError as error:
-        shutil.rmtree(aside, ignore_errors=True)
         raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+    finally:  # also after Ctrl-C
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def is_refusal(error: OSError) -> bool:

@@ -1,5 +1,6 @@
 """A survey from question to store: opens the map, creates the store or goes on with it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +40,7 @@ def prepare_survey(
     chunk: int | None = None,
     max_cells: int | None = None,
     max_gap: float = 0.0,
+    check: Callable[[SurveyJob], object] = lambda job: None,
 ) -> PreparedSurvey:
     """Open the map and create the store of a survey, or go on with a store of the same survey.
 
@@ -50,6 +52,7 @@ def prepare_survey(
             of work).
         max_cells: Largest terrain file [cells] (default: that of `load_terrain`).
         max_gap: Widest unknown region of a terrain file that is interpolated [m].
+        check: Called with the work before a store is created for it; it may raise.
 
     Raises:
         PlanningError: A map or a store that cannot be used.
@@ -69,6 +72,7 @@ def prepare_survey(
         frame, map_file, content = frame_of(terrain), "", fingerprint(terrain)
     notes = _make_notes(request, frame, map_file, content, chunk)
     if not out.exists():
+        check(SurveyJob(request, notes.layout, out.absolute(), map_file))
         create_store(out, notes, terrain)
     store = SurveyStore(out)
     store.check(notes.description, None if chunk is None else notes.layout.chunk)

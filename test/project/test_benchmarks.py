@@ -31,7 +31,12 @@ SMALL = {
     "poses": {"POSES": 20, "FLOOR_POSES": 10, "LINES": 2, "SPACING": 0.2},
     "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2},
     "start": {"STARTS": 1, "COLD_STARTS": 0},
-    "scheduler": {"SIDES": (600,), "WORKERS": 3, "POSES_PER_SECOND": 1e7},
+    "scheduler": {
+        "SIDES": (600,),
+        "WORKERS": 3,
+        "POSES_PER_SECOND": 1e7,
+        "MANY_WORKERS": 4,
+    },
     "survey": {"CELLS": 96, "REPEATS": 1, "TURNS": 1, "COUNT": 2},
     "traction": {"ALONE_TIME": 0.5, "TOGETHER_TIME": 1.0},
     "view": {"PATHS": 1, "LENGTH": 2.0, "SLIDERS": {"friction [-]": (0.6,)}},

@@ -1,5 +1,6 @@
 """GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -51,11 +52,13 @@ def write_tif(path, heights, **changes):
         "blockxsize": 64,
         "blockysize": 64,
     } | changes
-    unit = profile.pop("unit", None)
+    unit, scale = profile.pop("unit", None), profile.pop("scale", None)
     with rasterio.open(path, "w", **profile) as file:
         file.write(bands)
         if unit:
             file.units = [unit] * len(bands)
+        if scale is not None:
+            file.scales = [scale] * len(bands)
     return path
 
 
@@ -144,6 +147,10 @@ def test_no_cell_passes_whose_footprint_touches_a_nodata_hole(tmp_path):
         ({"crs": "EPSG:4326"}, "is in degrees; it must be in a map projection in metres"),
         ({"crs": "EPSG:2263"}, "has coordinates in US survey foot"),
         ({"crs": None}, "has no coordinate reference system"),
+        ({"crs": 'LOCAL_CS["site",UNIT["metre",1]]'}, "is in coordinates of another kind"),
+        ({"scale": 0.0}, "has heights with scale 0 and offset 0"),
+        ({"scale": math.nan}, "has heights with scale nan"),
+        ({"transform": rasterio.Affine(1e-9, 0, 0, 0, -1e-9, 0)}, "has cells of 1e-09 m"),
         ({"unit": "ft"}, "has heights in 'ft'; they must be in metres"),
         ({"transform": rasterio.Affine.rotation(10) @ rasterio.Affine.scale(0.1, -0.1)},
          "is rotated or mirrored"),
@@ -168,6 +175,40 @@ def test_three_bands_and_complex_numbers_are_refused(tmp_path):
             prepare_survey(
                 make_request(), str(write_tif(tmp_path / name, heights)), tmp_path / "out"
             )
+
+
+@pytest.mark.filterwarnings("ignore:The given matrix is equal to Affine.identity")
+def test_a_tif_that_does_not_say_where_it_is_is_refused(tmp_path):
+    heights = np.zeros((40, 50), np.float32)
+    path = write_tif(tmp_path / "map.tif", heights, transform=rasterio.Affine.identity())
+    with pytest.raises(PlanningError, match="says nowhere where its cells are"):
+        prepare_survey(make_request(), str(path), tmp_path / "out")
+
+
+@pytest.mark.parametrize("value", [-9999.0, -32768.0, float(np.finfo(np.float32).min)])
+def test_heights_that_stand_for_nothing_are_refused_where_no_nodata_is_declared(tmp_path, value):
+    heights = np.zeros((40, 50), np.float32)
+    heights[3, 4] = value
+    box = slice(0, 40), slice(0, 50)
+    declared = write_tif(tmp_path / "a.tif", heights, nodata=value)
+    assert np.isnan(GeoTiffMap(declared).read(box)["elevation"]).sum() == 1
+    path = write_tif(tmp_path / "b.tif", heights)
+    with pytest.raises(PlanningError, match=r"b\.tif: holds -.* and declares no nodata value"):
+        GeoTiffMap(path).read(box)
+
+
+def test_a_turn_by_less_than_a_millionth_of_a_cell_is_none(tmp_path):
+    turned = rasterio.Affine(CELL, 1e-12, LEFT, 1e-12, -CELL, TOP)
+    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50), np.float32), transform=turned)
+    assert GeoTiffMap(path).frame.shape == (40, 50)
+
+
+def test_a_projection_in_kilometres_is_refused_in_one_line(tmp_path):
+    """PROJ itself wrote a second line on stderr."""
+    kilometres = "+proj=stere +lat_0=-90 +R=1737400 +units=km"
+    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50), np.float32), crs=kilometres)
+    _, err = start_command("survey", "lsr1", path, tmp_path / "out").communicate(timeout=60)
+    assert "has coordinates in kilometre" in err and err.count("\n") == 1, err
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.99])

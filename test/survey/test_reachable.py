@@ -215,6 +215,30 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     # At the edge the rover stands along it only, and it drives forwards only.
     assert report["cells_without_return"] == area.reached - area.cells > 0
     assert picture.stat().st_size > 10_000 and tif.stat().st_size > 100
+    assert report["chunks_missing"] == 0
+    store.mark_failed((0, 0))
+    with pytest.raises(PlanningError, match="not surveyed yet"):
+        find_reachable(store, 3.0, 3.0)
+
+
+def test_chunks_that_are_not_surveyed_are_told(tmp_path, capfd):
+    store = survey_here(
+        tmp_path, Terrain(np.zeros((60, 140)), 0.1), make_request(), chunk=64
+    ).store
+    store.mark_failed((0, 2))
+    assert main(["reachable", str(store.path), "--from", "3,3"]) == 0
+    assert json.loads(capfd.readouterr().out)["chunks_missing"] == 1
+
+
+def test_places_in_the_coordinates_of_a_projection_are_told_to_a_millimetre(tmp_path):
+    ground = Terrain(np.zeros((40, 40)), 0.1, (500_000.05, 4_999_993.05))
+    store = survey_here(tmp_path, ground, make_request(step=4)).store
+    with pytest.raises(PlanningError) as refusal:
+        find_reachable(store, 500_000.123, 0.0)
+    assert (
+        "from (500000.123, 0) is off the map; it must be within x 500000.05 to 500003.65, "
+        "y 4999993.05 to 4999996.65" in str(refusal.value)
+    )
 
 
 @pytest.mark.parametrize(

@@ -17,13 +17,10 @@ pytest.importorskip("distributed", reason="install the extra survey")
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.survey import runner
-from rover_planner.survey.runner import (
-    ClusterSettings,
-    check_workers,
-    open_client,
-    run_survey,
-)
+from rover_planner.survey.cluster import client as cluster_client
+from rover_planner.survey.cluster.checks import check_workers
+from rover_planner.survey.cluster.client import ClusterSettings, open_client
+from rover_planner.survey.cluster.runner import run_survey
 from rover_planner.survey.store import SurveyStore
 from rover_planner.survey.survey import prepare_survey
 from support.project.long_tests import on_demand
@@ -258,7 +255,7 @@ def test_failed_chunks_are_exit_code_1(tmp_path, monkeypatch, capfd):
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path, monkeypatch, words, said, capfd):
-    monkeypatch.setattr(runner, "CONNECT_TIME", 0.5)
+    monkeypatch.setattr(cluster_client, "CONNECT_TIME", 0.5)
     save_terrain(tmp_path / "map.npz", make_rough_map(30, 30))
     out = tmp_path / "out"
     assert main(["survey", "lsr1", str(tmp_path / "map.npz"), str(out), *words]) == 2

@@ -136,9 +136,14 @@ def _cell_at(store: SurveyStore, x: float, y: float) -> Index:
     if not (0 <= row < rows and 0 <= column < columns):
         right, high = left + (columns - 1) * notes.cell, low + (rows - 1) * notes.cell
         raise PlanningError(
-            f"from ({x:g}, {y:g}) is off the map; it must be within x {left:g} to {right:g}, "
-            f"y {low:g} to {high:g}"
+            f"from ({_show(x)}, {_show(y)}) is off the map; it must be within "
+            f"x {_show(left)} to {_show(right)}, y {_show(low)} to {_show(high)}"
         )
     if (row // notes.layout.chunk, column // notes.layout.chunk) not in store.find_finished():
-        raise PlanningError(f"from ({x:g}, {y:g}) is not surveyed yet")
+        raise PlanningError(f"from ({_show(x)}, {_show(y)}) is not surveyed yet")
     return row, column
+
+
+def _show(metres: float) -> str:
+    """Return a coordinate to a millimetre; those of map projections have many digits."""
+    return f"{round(metres, 3):.15g}"

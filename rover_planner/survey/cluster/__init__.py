@@ -1,0 +1,1 @@
+"""Dask for a survey: the cluster, its checks, and the run of the chunks."""

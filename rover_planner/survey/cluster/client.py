@@ -1,0 +1,131 @@
+"""The cluster of a survey: a Dask scheduler that runs, or processes of this machine."""
+
+import contextlib
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rover_planner.errors import PlanningError
+
+ATTEMPTS = 3
+"""Number of times that a chunk is tried."""
+CONNECT_TIME = 10.0
+"""Longest time to reach a scheduler [s]."""
+SETTINGS = {
+    "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
+    "distributed.logging.distributed": "critical",
+    "distributed.worker.profile.enabled": False,  # it looks at a worker's stack every 10 ms
+    "distributed.admin.tick.interval": "1s",  # every 20 ms, it takes 2.5 % of a core a worker
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.memory.monitor-interval": "500ms",
+}
+"""Settings of Dask's processes on this machine. What they do at rest counts as much as how they
+treat tasks, as there are few of those."""
+NOISY = ("distributed", "tornado", "asyncio")
+"""Beginnings of the names of the logs that are silenced."""
+
+
+@dataclass(frozen=True)
+class ClusterSettings:
+    """Where the chunks are computed."""
+
+    scheduler: str | None = None
+    """Address of a Dask scheduler, such as tcp://10.0.0.1:8786; None: a cluster of this machine's
+    processes."""
+    workers: int | None = None
+    """Number of worker processes on this machine (default: one a processor)."""
+    memory_limit: str | None = None
+    """Memory of a worker on this machine, such as "1GiB" (default: its share of the machine's)."""
+
+    @property
+    def memory_size(self) -> int:
+        """The memory limit [bytes]; 0 if there is none, or if it is no size."""
+        from dask.utils import parse_bytes
+
+        try:
+            return max(int(parse_bytes(self.memory_limit or 0)), 0)
+        except (ValueError, OverflowError):
+            return 0
+
+
+def check_settings(settings: ClusterSettings) -> None:
+    """Check the settings of a cluster, and that its scheduler is there, before anything is done.
+
+    Raises:
+        PlanningError: A setting is invalid, or there is no such scheduler.
+    """
+    if settings.memory_limit is not None and settings.memory_size <= 0:
+        raise PlanningError(
+            f"memory limit is {settings.memory_limit!r}; it must be a size such as 1GiB"
+        )
+    if settings.scheduler is not None:
+        for name, value in (
+            ("workers", settings.workers),
+            ("memory-limit", settings.memory_limit),
+        ):
+            if value is not None:
+                raise PlanningError(
+                    f"--{name} is {value}; leave it out, as workers of --scheduler are its own"
+                )
+    if settings.scheduler is not None and "://" not in settings.scheduler:
+        raise PlanningError(
+            f"scheduler is {settings.scheduler!r}; it must be an address such as "
+            "tcp://10.0.0.1:8786"
+        )
+    if settings.scheduler is not None:
+        with open_client(settings):
+            pass
+
+
+@contextlib.contextmanager
+def open_client(settings: ClusterSettings) -> Iterator[Any]:
+    """Connect to a cluster, or start one of this machine's processes.
+
+    Raises:
+        PlanningError: There is no such scheduler, or a setting is invalid.
+    """
+    import dask
+    from distributed import Client, LocalCluster
+
+    asked = SETTINGS | {"distributed.comm.timeouts.connect": CONNECT_TIME}
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(dask.config.set(asked))
+        stack.enter_context(_silent_logs())
+        if settings.scheduler is not None:
+            try:
+                client = Client(settings.scheduler, timeout=CONNECT_TIME)
+            except (OSError, ValueError, TimeoutError) as error:
+                raise PlanningError(
+                    f"no scheduler at {settings.scheduler}: {error}; --scheduler must be the "
+                    "address of one that runs, such as tcp://10.0.0.1:8786"
+                ) from None
+            yield stack.enter_context(client)
+            return
+        cluster = LocalCluster(
+            n_workers=settings.workers,
+            threads_per_worker=1,
+            memory_limit=settings.memory_limit or "auto",
+            dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": ":0"},  # any port, so that several can run
+            silence_logs=logging.CRITICAL,
+        )
+        stack.enter_context(cluster)
+        yield stack.enter_context(Client(cluster))
+
+
+@contextlib.contextmanager
+def _silent_logs() -> Iterator[None]:
+    """Keep Dask from telling on stderr what the command tells in one line.
+
+    Its settings of logs count only when it is imported.
+    """
+    known = [name for name in logging.root.manager.loggerDict if name.startswith(NOISY)]
+    levels = {name: logging.getLogger(name).level for name in known}
+    for name in known:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
