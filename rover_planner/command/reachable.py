@@ -1,6 +1,7 @@
 """The command `rover_planner reachable`: where a rover can go on a survey and return from."""
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 

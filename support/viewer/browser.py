@@ -134,6 +134,10 @@ class Visitor:
         box.press_sequentially(value)
         box.press("Enter")
 
+    def place_of(self, label: str) -> float:
+        """Return the height of a slider below the upper edge of the window [px]."""
+        return float(self._row(label).bounding_box()["y"])
+
     def slider_value(self, label: str) -> float:
         """Return the value in the box beside a slider."""
         return float(self._row(label).locator("input").last.input_value())

@@ -232,6 +232,7 @@ def test_rows_are_reached_and_selected_by_keys(page, visitor):
 def test_a_changed_slider_is_marked_with_differences_and_can_be_undone_and_reset(page, visitor):
     show(page, page.session.answer.nearest)
     visitor.open_tab("Rover")
+    place = visitor.place_of("speed [m/s]")
     for friction in ("0.7", "0.6"):
         visitor.set_slider("friction [-]", friction)
         wait_until(lambda f=friction: page.session.rover.friction == float(f), "the friction")
@@ -241,6 +242,7 @@ def test_a_changed_slider_is_marked_with_differences_and_can_be_undone_and_reset
         lambda: re.search(r"friction\s+0.8\s+0.6\s+-0.2", visitor.text("#changes")), "its change"
     )
     assert "friction, largest" in visitor.text("#changes")
+    assert visitor.place_of("speed [m/s]") == place  # a slider never moves under the mouse
     before = page.plots.curves["friction_utilisation"][1]
     assert (before[:, :6] != before[:, 6:]).any()
     visitor.press("Undo")

@@ -34,7 +34,7 @@ MOVES = 2
 """Moves of the mouse from one end of a slider to the other; each is a value of its own."""
 BEYOND = 0.05
 """Distance of the mouse beyond the end at last, as a share of the slider's length."""
-TRIES, PATIENCE = 10, 5.0
+TRIES, PATIENCE = 3, 20.0
 """How often something is tried until the page hears of it, and for how long after each [s]."""
 
 
@@ -130,10 +130,7 @@ def check_page(page: Page, visitor: Visitor) -> None:
 
 
 def repeat_until(condition: Callable[[], bool], act: Callable[[], None], what: str) -> None:
-    """Act with the mouse until the page has heard of it, for the mouse may miss its aim.
-
-    The table of the changes, above the sliders, comes and goes, which moves all below it.
-    """
+    """Act with the mouse until the page has heard of it, for the mouse may miss its aim."""
     for _ in range(TRIES):
         act()
         end = time.monotonic() + PATIENCE

@@ -11,10 +11,14 @@ from rover_planner.viewer.state.visitor_requests import Action
 
 SAME = "0"
 """Change of a number that stays the same."""
+HEIGHT = 92
+"""Height of the table [px], whatever is in it, so that no slider moves under the mouse. A longer
+table scrolls."""
+NOTHING = '<div style="padding:0 4px;opacity:0.7">nothing is changed</div>'
 
 
 class Changes:
-    """Hidden while nothing has changed."""
+    """The buttons stand above the table, and both keep their places."""
 
     def __init__(self, gui: Any, undo: Action, reset: Action):
         """Add buttons and an empty table to the container that is open.
@@ -25,18 +29,15 @@ class Changes:
             reset: Takes the rover as it was loaded.
         """
         actions = {"Undo": undo, "Reset": reset}
-        self._table = gui.add_html("", visible=False)
-        self._buttons = gui.add_button_group("Rover", tuple(actions), visible=False)
-        self._buttons.on_click(lambda event: actions[event.target.value]())
+        buttons = gui.add_button_group("Rover", tuple(actions))
+        buttons.on_click(lambda event: actions[event.target.value]())
+        self._table = gui.add_html(draw_changes({}, ()))
 
     def show(
         self, changed: Mapping[str, tuple[float, float]], differences: Sequence[Difference]
     ) -> None:
         """Show changed numbers of the rover by label, and differences of the drive."""
-        is_shown = bool(changed or differences)
-        self._table.visible = self._buttons.visible = is_shown
-        if is_shown:
-            self._table.content = draw_changes(changed, differences)
+        self._table.content = draw_changes(changed, differences)
 
 
 def draw_changes(
@@ -44,7 +45,7 @@ def draw_changes(
 ) -> str:
     """Return tables, HTML: numbers of the rover as loaded and now, of the drive before and now.
 
-    Numbers of the drive that are the same are left out, so that the sliders below stay in sight.
+    Numbers of the drive that are the same are left out.
     """
     parts = []
     if changed:
@@ -68,9 +69,10 @@ def draw_changes(
             parts.append(_table(("drive", "before", "now", "change"), rows))
         else:
             parts.append('<div style="padding:0 4px">the drive is the same as before</div>')
+    colour = to_css(NOTICE) if parts else "transparent"
     return (
-        f'<div id="changes" style="border-left:5px solid {to_css(NOTICE)};margin:0 8px;'
-        f'padding-left:.5em;font-size:12px">{"".join(parts)}</div>'
+        f'<div id="changes" style="border-left:5px solid {colour};margin:0 8px;padding-left:.5em;'
+        f'font-size:12px;height:{HEIGHT}px;overflow-y:auto">{"".join(parts) or NOTHING}</div>'
     )
 
 
