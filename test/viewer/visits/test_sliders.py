@@ -34,7 +34,7 @@ MOVES = 2
 """Moves of the mouse from one end of a slider to the other; each is a value of its own."""
 BEYOND = 0.05
 """Distance of the mouse beyond the end at last, as a share of the slider's length."""
-TRIES, PATIENCE = 3, 20.0
+TRIES, PATIENCE = 5, 5.0
 """How often something is tried until the page hears of it, and for how long after each [s]."""
 
 

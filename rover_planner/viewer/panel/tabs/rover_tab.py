@@ -16,6 +16,8 @@ from rover_planner.viewer.state.visitor_requests import Action
 
 FULL_TURN = 3.15
 """Largest angle, both ways, of the slider of an arm's joint without limits [rad]."""
+VERDICT_HEIGHT = 104
+"""Height of the verdict [px], so that no slider moves under the mouse. A longer one scrolls."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,8 @@ class RoverTab:
 
     def show_verdict(self, text: str) -> None:
         """Show a verdict, HTML."""
-        self._verdict.content = text
+        style = f"height:{VERDICT_HEIGHT}px;overflow-y:auto"
+        self._verdict.content = f'<div style="{style}">{text}</div>'
 
     def show_changes(
         self, changed: Mapping[str, tuple[float, float]], differences: Sequence[Difference]
