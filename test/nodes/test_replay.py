@@ -197,7 +197,7 @@ def test_a_parameter_file_of_the_server_sets_rover_and_policy(tmp_path, capsys):
         ([("/odometry", odometry_at(0.0))], (), "has no map: PointCloud2 or GridMap"),
         ([("/a", cloud(waves())), ("/b", cloud(waves()))], (), "choose one by --map-topic"),
         ([("/a", cloud(waves()))], ("--map-topic", "/c"), "no topic /c of type .* it has /a"),
-        ([("/a", cloud(waves()))], ("--goal", "1,2"), "--goal is '1,2'"),
+        ([("/a", cloud(waves()))], ("--goal", "1,2"), "'--goal': '1,2' is no pose"),
         ([("/a", cloud(waves()))], ("--rover", "lsr9"), "no rover 'lsr9'"),
         ([("/a", cloud(waves()))], ("--parameters", "none.yaml"), "none.yaml"),
     ],

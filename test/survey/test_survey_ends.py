@@ -213,14 +213,17 @@ def test_a_damaged_block_of_a_tif_is_named(tmp_path, capfd):
 def test_signals_that_are_ignored_stay_so():
     from rover_planner.shell.end_signals import end_as_by_ctrl_c
 
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    before = {one: signal.getsignal(one) for one in (signal.SIGHUP, signal.SIGTERM)}
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     try:
         with end_as_by_ctrl_c():
             assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
             assert callable(signal.getsignal(signal.SIGTERM))
         assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
     finally:
-        signal.signal(signal.SIGHUP, before)
+        for one, handler in before.items():
+            signal.signal(one, handler)
 
 
 def test_another_thread_may_run_a_survey():

@@ -1,4 +1,4 @@
-"""The rooms of the viewer import one way: state, then scene, panel, live, browser, then pages."""
+"""The rooms of the viewer import one way: state, browser, then scene, panel, live, then pages."""
 
 import ast
 from pathlib import Path
@@ -10,10 +10,10 @@ import rover_planner.viewer
 FOLDER = Path(rover_planner.viewer.__file__).parent
 ALLOWED = {
     "state": {"state"},
-    "scene": {"state", "scene"},
+    "browser": {"state", "browser"},
+    "scene": {"state", "browser", "scene"},
     "panel": {"state", "panel"},
     "live": {"state", "live"},
-    "browser": {"state", "browser"},
     "pages": {"state", "scene", "panel", "live", "browser", "pages"},
 }
 """The rooms that the files of each room may import."""
