@@ -23,7 +23,7 @@ SERVER = {
     "control_margin": 0.0,
     "map_updates": "merge",
     "search_frontier": True,
-    "search_budget": 4.0,
+    "search_budget": 8.0,
     "time_budget": 60.0,
 }
 SPEED = 0.1
@@ -36,13 +36,13 @@ def ros():
     run.close()
 
 
-def boulder_field() -> tuple[Terrain, tuple, tuple]:
-    """Return a boulder field with start and goal: Otira's if it is there, else a made one."""
+def boulder_field() -> tuple[Terrain, tuple, tuple, float]:
+    """Return a boulder field with start, goal and range of the sensor: Otira's or a made one."""
     for name, terrain in real_maps().items():
         if name.startswith("otira"):
-            return without_gaps(terrain), (25.402, 15.524, 0.297), (23.869, 14.883, -2.296)
+            return without_gaps(terrain), (25.402, 15.524, 0.297), (23.869, 14.883, -2.296), 2.0
     made = make_mars_terrain(4, 8.0, rock_cover=0.25, crater_density=0.0)
-    return made, (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02)
+    return made, (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02), 4.0
 
 
 def without_gaps(terrain: Terrain) -> Terrain:
@@ -55,7 +55,7 @@ def without_gaps(terrain: Terrain) -> Terrain:
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["quasi_static", pytest.param("mujoco", marks=on_demand)])
 def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
-    terrain, start, goal = boulder_field()
+    terrain, start, goal, sensor_range = boulder_field()
     save_terrain(tmp_path / "ground.npz", terrain)
     options = PathQueryOptions(policy="optimal", control_margin=0.0)
     fan = answer_path_query(load_rover("lsr1"), terrain, start, goal, options)
@@ -67,7 +67,7 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
         "start_y": start[1],
         "start_yaw": start[2],
         "engine": engine,
-        "sensor_range": 2.0,
+        "sensor_range": sensor_range,
         "sensor_occlusion": False,
         "map_rate": 1.0,
         "follow_commands": True,
