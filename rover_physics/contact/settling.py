@@ -12,7 +12,7 @@ from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
 from rover_physics.contact.recovery import close_gaps
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_six
+from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.rover.linkage import place
 from rover_physics.status import ContactStatus, PoseStatus
 
@@ -218,4 +218,4 @@ def _find_step(linkage, work, ground_is):
     write_gap_rates(linkage, work.placement, work.contacts, ground_is, work.J)
     for i in range(6):
         work.step[i, 0] = work.contacts.gap[i]
-    return solve_six(work.J, work.step)
+    return solve_in_place(work.J, work.step, 6, 1)

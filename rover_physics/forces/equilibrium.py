@@ -14,7 +14,7 @@ system are of order 1 for any rover.
 
 from rover_physics.forces.shares import FREE_LATERAL_WHEELS, SHARES, write_shares
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_in_place, solve_nine
+from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
 
 UNKNOWNS = 9
@@ -62,12 +62,7 @@ def balance_forces(linkage, placement, contacts, columns, balance):
 def solve_equations(columns, balance):
     """Solve the equations of `write_equations`; return False if they are singular."""
     B, common = balance.B, balance.shares.common
-    solved = (
-        solve_nine(balance.A, B)
-        if columns == 1
-        else solve_in_place(balance.A, B, UNKNOWNS, columns)
-    )
-    if not solved:
+    if not solve_in_place(balance.A, B, UNKNOWNS, columns):
         return False
     for k in range(columns):
         for i in range(6):

@@ -1,7 +1,5 @@
 """Solver for small dense linear systems inside kernels."""
 
-from typing import Any
-
 from rover_physics.numerics.kernels import kernel
 
 
@@ -40,47 +38,3 @@ def solve_in_place(A, B, n, m):
                 total -= A[i, k] * B[k, j]
             B[i, j] = total / A[i, i]
     return True
-
-
-def _solver_of(n: int) -> Any:
-    """Return a kernel that solves A x = b as `solve_in_place` does, for one size only.
-
-    With a size that the compiler knows, it takes less time.
-    """
-
-    @kernel
-    def solve(A, b):
-        """Solve A (n, n) x = b (n, 1), overwriting both; return False if A is singular."""
-        for k in range(n):
-            pivot = k
-            largest = abs(A[k, k])
-            for i in range(k + 1, n):
-                if abs(A[i, k]) > largest:
-                    largest = abs(A[i, k])
-                    pivot = i
-            if not largest > 1e-12:
-                return False
-            if pivot != k:
-                for j in range(k, n):
-                    A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
-                b[k, 0], b[pivot, 0] = b[pivot, 0], b[k, 0]
-            for i in range(k + 1, n):
-                factor = A[i, k] / A[k, k]
-                if factor != 0.0:
-                    for j in range(k + 1, n):
-                        A[i, j] -= factor * A[k, j]
-                    b[i, 0] -= factor * b[k, 0]
-        for i in range(n - 1, -1, -1):
-            total = b[i, 0]
-            for k in range(i + 1, n):
-                total -= A[i, k] * b[k, 0]
-            b[i, 0] = total / A[i, i]
-        return True
-
-    return solve
-
-
-solve_six = _solver_of(6)
-"""Solves six equations, those of the contacts."""
-solve_nine = _solver_of(9)
-"""Solves nine equations, those of the forces."""

@@ -160,10 +160,10 @@ def place(linkage, pose, q, placement):
     pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
     attitude_matrix(q[1], q[2], pose[2], R)
     origin[0], origin[1], origin[2] = pose[0], pose[1], q[0]
-    rocker_c, right_s = np.cos(q[3]), np.sin(q[3])
     for side in range(2):
         px, py, pz = pivots[side, 0], pivots[side, 1], pivots[side, 2]
-        angle, rocker_s = rocker_sign(side) * q[3], rocker_sign(side) * right_s
+        angle = rocker_sign(side) * q[3]
+        rocker_c, rocker_s = np.cos(angle), np.sin(angle)
         bogie_c, bogie_s = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
         to_map(placement, (px, py, pz), placement.rocker_pivots, side)
         dx, dz = bogie_pivots[side, 0] - px, bogie_pivots[side, 2] - pz
