@@ -53,6 +53,7 @@ def without_gaps(terrain: Terrain) -> Terrain:
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 @pytest.mark.parametrize("engine", ["quasi_static", pytest.param("mujoco", marks=on_demand)])
 def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
     terrain, start, goal, sensor_range = boulder_field()
