@@ -14,6 +14,9 @@ PACKAGES := rover_physics msg_adapters rover_planner
 MAP ?=
 # One more than there are cores: many tests wait for a rover that drives.
 WORKERS ?= $(shell echo $$(( $$(nproc) + 1 )))
+# A test that hangs fails, as does a stage that does not end: each says where.
+END_HANGS := --override-ini faulthandler_exit_on_timeout=true
+LIMIT := timeout --foreground --signal INT --kill-after 60 2700
 BROWSER_TESTS := $(shell grep -rl needs_browser test --include="test_*.py")
 # Tests, demo and nodes talk to this machine only.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
@@ -35,9 +38,9 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 test: lint kernels ## lint, type check and all tests
 	@run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
-	  $(BIN)/python -m pytest --cache-clear "$$@" && return
+	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --cache-clear "$$@" && return
 	  echo "== what failed, once more and alone, to tell more; the run has failed"
-	  $(BIN)/python -m pytest "$$@" --numprocesses 0 --last-failed --last-failed-no-failures none || true
+	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) "$$@" --numprocesses 0 --last-failed --last-failed-no-failures none || true
 	  return 1
 	}
 	failed=0

@@ -1,6 +1,7 @@
 """What all tests share: the real maps, and a ROS that stays on this machine."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,9 @@ from hypothesis import settings
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 settings.register_profile("untimed", deadline=None)  # no test fails because a machine is busy
 settings.load_profile("untimed")
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell's background job ignores it, and so would every child that a test interrupts.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LONGEST = (
     "test_docs_blocks",
@@ -21,6 +25,13 @@ LONGEST = (
     "test_reliability",
 )
 """Files that take minutes. They begin first, so that none is left alone on one core at the end."""
+
+
+def pytest_runtest_logreport(report):
+    """Name a failure at once: a run that is cut short prints no summary."""
+    if report.failed and "PYTEST_XDIST_WORKER" not in os.environ:
+        words = report.longreprtext.strip().splitlines() or [""]
+        print(f"\nFAILED {report.nodeid} ({report.when}): {words[-1]}", flush=True)
 
 
 def pytest_collection_modifyitems(items):

@@ -211,6 +211,9 @@ def test_ctrl_c_ends_a_command_without_a_traceback(files):
     assert process.stdout is not None
     process.stdout.readline()  # it has begun
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
+    try:
+        _, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
     assert process.returncode == EXIT_INTERRUPTED
     assert err == ""

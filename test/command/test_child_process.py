@@ -116,5 +116,8 @@ def test_no_child_outlives_a_parent_that_is_signalled(tmp_path, environment, num
         child = int(parent.stdout.readline())
         assert exists(child)
         parent.send_signal(number)
-        assert parent.wait(20) == code
+        try:
+            assert parent.wait(20) == code
+        finally:
+            parent.kill()
     assert wait_until_gone(child)
