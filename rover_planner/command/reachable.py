@@ -64,6 +64,8 @@ def reachable(
 
 def _report(store: "SurveyStore", area: "ReachableArea") -> dict[str, Any]:
     """Return what is printed."""
+    from rover_planner.survey.reach.reachable import say_why_none
+
     notes = store.notes
     farthest = area.farthest
     place = None
@@ -72,6 +74,7 @@ def _report(store: "SurveyStore", area: "ReachableArea") -> dict[str, Any]:
         place = [left + farthest[1] * notes.cell, low + farthest[0] * notes.cell]
     return {
         "cells": area.cells,
+        "reason": "" if area.cells else say_why_none(store, area.start),
         "area": round(area.area, 6),
         "cells_without_return": area.reached - area.cells,
         "longest": None if area.longest is None else round(area.longest, 3),

@@ -15,6 +15,7 @@ import numpy as np
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.survey.kept_layer import KeptLayer, damaged
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     LIMIT_NUMBERS,
@@ -107,7 +108,7 @@ class SurveyStore:
         """Open a store.
 
         Raises:
-            PlanningError: There is none, or it is not that of a survey.
+            PlanningError: There is none, it is not that of a survey, or a layer is missing.
         """
         import zarr
 
@@ -124,6 +125,24 @@ class SurveyStore:
                 f"{show_file(path)} is not a survey: {type(error).__name__}; "
                 "name another folder, or remove it"
             ) from None
+        for name in (*self.layer_names(), SECONDS):
+            self._check_array(name)
+
+    def _check_array(self, name: str) -> None:
+        """Check that an array is there, as it was made.
+
+        Raises:
+            PlanningError: It is not.
+        """
+        layout = self.notes.layout
+        shape = layout.chunks if name == SECONDS else layout.shape
+        try:
+            found = self._group[name].shape
+        except KeyError as error:
+            raise damaged(self.path, name, error) from None
+        if found != shape:
+            error = ValueError(f"{found} cells, not {shape}")
+            raise damaged(self.path, name, error)
 
     def check(self, description: Mapping[str, Any], chunk: int | None) -> None:
         """Check that the store is of the survey that is asked for.
@@ -147,7 +166,7 @@ class SurveyStore:
 
     def find_finished(self) -> set[Index]:
         """Return the chunks that are finished."""
-        rows, columns = np.nonzero(self._group[SECONDS][:] >= 0.0)
+        rows, columns = np.nonzero(self.layer(SECONDS)[:] >= 0.0)
         return set(zip(rows.tolist(), columns.tolist(), strict=True))
 
     def write(self, chunk: Index, layers: Mapping[str, np.ndarray], seconds: float) -> None:
@@ -177,9 +196,9 @@ class SurveyStore:
         """Return the names of the layers."""
         return list(types_of_layers(self.notes.headings, self.notes.turns))
 
-    def layer(self, name: str) -> Any:
-        """Return a layer (rows, columns) as a Zarr array."""
-        return self._group[name]
+    def layer(self, name: str) -> KeptLayer:
+        """Return a layer (rows, columns)."""
+        return KeptLayer(self._group[name], self.path)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

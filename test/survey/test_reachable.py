@@ -21,6 +21,7 @@ from rover_planner.survey.reach.grid import HeadingGrid
 from rover_planner.survey.reach.kept_area import open_area
 from rover_planner.survey.reach.moves import find_moves
 from rover_planner.survey.reach.reachable import find_reachable, search_area
+from rover_planner.survey.store import NOTES
 from support.survey_maps import make_request, make_rough_map, survey_here
 
 CELL = 0.25
@@ -219,6 +220,21 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     store.mark_failed((0, 0))
     with pytest.raises(PlanningError, match="not surveyed yet"):
         find_reachable(store, 3.0, 3.0)
+
+
+def test_a_start_where_the_rover_cannot_stand_says_why(tmp_path, capfd):
+    elevation = np.zeros((60, 60))
+    elevation[:, 30:] += 2.0 * 0.1 * np.arange(30)  # 63 degrees
+    store = survey_here(tmp_path, Terrain(elevation, 0.1), make_request()).store
+    codes = json.loads((store.path / "zarr.json").read_text())["attributes"][NOTES]["limits"]
+    first = codes[str(int(store.layer("first_limit")[30, 45]))]
+    assert main(["reachable", str(store.path), "--from", "4.5,3"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert report["cells"] == 0 and first
+    assert report["reason"] == f"no heading is passable at the start: {first}"
+    assert main(["reachable", str(store.path), "--from", "1.5,3"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert report["cells"] > 0 and report["reason"] == ""
 
 
 def test_chunks_that_are_not_surveyed_are_told(tmp_path, capfd):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import save_terrain
+from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.durable_store import write_durably
@@ -176,6 +178,34 @@ def test_cells_that_are_not_surveyed_say_so(files):
     assert (store.layer("best_class")[:] == 255).all()
     assert np.isnan(store.layer("worst_tilt")[:]).all()
     assert not store.layer("passable_headings")[:].any()
+
+
+@pytest.mark.parametrize("name", ["best_class", "worst_tilt", "seconds"])
+def test_a_missing_layer_is_named(files, name):
+    path = prepare(files).store.path
+    shutil.rmtree(path / name)
+    with pytest.raises(PlanningError, match=f"{name} is damaged .*survey again"):
+        SurveyStore(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"no zstandard frame", None])
+@pytest.mark.parametrize("words", [["reachable", "--from", "1203,-337"], ["survey"]])
+def test_a_damaged_file_is_one_line(files, capfd, content, words):
+    prepared = prepare(files, chunk=192)
+    for chunk in prepared.chunks:
+        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+    path = prepared.store.path
+    name = "passable_headings" if words[0] == "reachable" else "best_class"
+    damaged = path / name / "c" / "0" / "0"
+    damaged.write_bytes(damaged.read_bytes()[:-9] if content is None else content)
+    if words[0] == "survey":
+        words = ["survey", "lsr1", str(files / "map.npz"), str(path), "--headings", "4"]
+    else:
+        words = ["reachable", str(path), *words[1:]]
+    assert main(words) == 2
+    out, err = capfd.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert f"{name} is damaged" in err and "survey again into another folder" in err
 
 
 def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypatch):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.errors import PlanningError
+from rover_planner.survey.layers import LIMIT_NUMBERS
 from rover_planner.survey.layout import Box, Index
 from rover_planner.survey.reach.distances import TileDistances
 from rover_planner.survey.reach.grid import HeadingGrid, choose_tile
@@ -76,6 +77,18 @@ def find_reachable(
     kept = open_area(store)
     assert kept is not None
     return kept
+
+
+def say_why_none(store: SurveyStore, start: Index) -> str:
+    """Return why the rover cannot leave a start from which it reaches nothing.
+
+    Args:
+        store: The survey.
+        start: Row and column of the start.
+    """
+    number = int(store.layer("first_limit")[start])
+    names = {number: name for name, number in LIMIT_NUMBERS.items()}
+    return f"no heading is passable at the start: {names.get(number) or 'not surveyed'}"
 
 
 def search_area(

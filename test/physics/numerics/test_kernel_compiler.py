@@ -1,8 +1,10 @@
 """A kernel is compiled once with all that it calls, and can be called from Python as well."""
 
+import ast
 import functools
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ import pytest
 from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
 from rover_physics.numerics.kernels import allocating_kernel, kernel
 from rover_physics.numerics.threads import CALLS_IN_WORK, run_chunks, run_in_turn
+
+REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 @kernel
@@ -124,3 +128,29 @@ def test_calls_are_drawn_while_others_run_and_an_error_among_them_ends_the_work(
 
     with pytest.raises(ValueError, match="call"):
         run_in_turn(iter([fail] * 50), 3)
+
+
+def find_kernels_inside(path):
+    """Yield the names of kernels that a function or class of a file makes."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    top = set(tree.body)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node not in top:
+            marks = {ast.unparse(mark) for mark in node.decorator_list}
+            if marks & {"kernel", "exact_kernel", "allocating_kernel"}:
+                yield node.name
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("kernel"):
+            yield ast.unparse(node)
+
+
+def test_kernels_are_not_made_by_functions(tmp_path):
+    """Kernels of one name from one line differ for Python only: on disk they may be mixed up."""
+    path = tmp_path / "a.py"
+    path.write_text("def make(n):\n    @kernel\n    def solve(x):\n        return x * n\n")
+    assert list(find_kernels_inside(path)) == ["solve"]
+    path.write_text("solve = [kernel(f) for f in functions]\n")
+    assert list(find_kernels_inside(path)) == ["kernel(f)"]
+    packages = [REPOSITORY / name for name in ("rover_physics", "rover_planner")]
+    files = [path for package in packages for path in package.rglob("*.py")]
+    found = {path.name: list(find_kernels_inside(path)) for path in files}
+    assert {name: kernels for name, kernels in found.items() if kernels} == {}
