@@ -24,7 +24,8 @@ from rover_planner.nodes.traverse_server import SWITCH_INTERVAL, TraverseServer
 from rover_planner.worlds.maps.living_map import LivingMap
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.planner_client import PlannerClient
-from support.ros_fixtures import RosRun, wait_until
+from support.ros_fixtures import RosRun
+from support.waiting import wait_until
 
 SIZES = (400, 1000)
 """Cells along each side of the loaded map."""

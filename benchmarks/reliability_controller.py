@@ -33,7 +33,8 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import sensor_qos
 from rover_planner.ros.realtime import take_priority
-from support.ros_fixtures import RosRun, call, domain_id, wait_until
+from support.ros_fixtures import RosRun, call, domain_id
+from support.waiting import wait_until
 
 TOPIC = "controller"
 LIMIT = 100.0

@@ -18,7 +18,8 @@ from visualization_msgs.msg import MarkerArray
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_planner.ros.qos import map_qos, result_qos, topic_qos
-from support.ros_fixtures import RosRun, call, wait_until
+from support.ros_fixtures import RosRun, call
+from support.waiting import wait_until
 
 SERVER = "/traverse_server"
 START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)

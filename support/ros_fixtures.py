@@ -3,17 +3,13 @@
 import contextlib
 import os
 import threading
-import time
-from collections.abc import Callable
-from typing import Any
 
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-TIMEOUT = 20.0
-"""Default limit of waits [s]; only a broken system takes that long."""
+from support.waiting import TIMEOUT
 
 
 def domain_id() -> int:
@@ -21,17 +17,6 @@ def domain_id() -> int:
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
     run = os.getppid() if "PYTEST_XDIST_WORKER" in os.environ else os.getpid()
     return 1 + (run * 7 + int(worker)) % 100
-
-
-def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT) -> Any:
-    """Return the condition's first true value; fail with `what` after a timeout [s]."""
-    end = time.monotonic() + timeout
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.005)
-    raise AssertionError(f"waited {timeout} s for {what}")
 
 
 class RosRun:

@@ -16,6 +16,7 @@ from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_ch
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.survey import PreparedSurvey, prepare_survey
+from support.waiting import wait_until
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESOLUTION = 0.1
@@ -80,6 +81,17 @@ def finish(process: subprocess.Popen, seconds=200.0) -> tuple[int, dict, str]:
     """Wait for a command; return its exit code, the JSON it printed and its stderr."""
     out, err = process.communicate(timeout=seconds)
     return process.returncode, json.loads(out) if out else {}, err
+
+
+def count_chunks(out: Path) -> int:
+    """Return the number of finished chunks, while a survey runs."""
+    files = Path(out, "seconds", "c").rglob("*")
+    return sum(path.is_file() and not path.name.endswith("partial") for path in files)
+
+
+def wait_for_chunks(out: Path, count: int) -> None:
+    """Wait until so many chunks are finished."""
+    wait_until(lambda: count_chunks(out) >= count, f"{count} chunks", 120.0)
 
 
 def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:

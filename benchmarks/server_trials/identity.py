@@ -9,7 +9,7 @@ from typing import Any
 from benchmarks.server_trials.stage import Client, Pose, Stage, plan_request, straight_path
 from msg_adapters.identity import path_hash, plan_request_hash
 from support.grounds import make_terrain, wall_at
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 WALL = 1.5
 """x of a wall that no rover climbs [m]."""

@@ -16,7 +16,7 @@ from benchmarks.server_trials.stage import (
     wait_for_log,
 )
 from support.grounds import make_terrain, rocky, waves
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 ANSWER_TIME, PAUSE = 0.2, 0.05
 """Time after which a client asks again without an answer, and after a refusal [s]."""

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from benchmarks.server_trials.stage import ROOT, Client, Pose, Stage, finish
 from rover_physics.terrain.grid import Terrain, load_terrain
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 TOLERANCE = 0.1
 MARS_YARD, BOULDERS = "erc_marsyard2021_9cm", "otira_tls_boulders_3cm"

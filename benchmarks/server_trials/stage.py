@@ -25,7 +25,8 @@ from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.ros.qos import map_qos, service_qos, topic_qos
-from support.ros_fixtures import RosRun, call, domain_id, wait_until
+from support.ros_fixtures import RosRun, call, domain_id
+from support.waiting import wait_until
 
 SERVER = "/traverse_server"
 ROOT = Path(__file__).resolve().parents[2]

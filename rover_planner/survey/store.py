@@ -141,8 +141,7 @@ class SurveyStore:
         except KeyError as error:
             raise damaged(self.path, name, error) from None
         if found != shape:
-            error = ValueError(f"{found} cells, not {shape}")
-            raise damaged(self.path, name, error)
+            raise damaged(self.path, name, ValueError(f"{found} cells, not {shape}"))
 
     def check(self, description: Mapping[str, Any], chunk: int | None) -> None:
         """Check that the store is of the survey that is asked for.

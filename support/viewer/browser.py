@@ -2,13 +2,13 @@
 
 import re
 import shutil
-import time
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from rover_planner.viewer.panel.controls import CHANGED
+from support import waiting
 
 viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 sync_api = pytest.importorskip(
@@ -73,13 +73,7 @@ needs_browser = pytest.mark.skipif(
 
 def wait_until(condition: Callable[[], Any], what: str) -> Any:
     """Return the condition's first true value; fail with `what` after WAIT."""
-    end = time.monotonic() + WAIT
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"waited {WAIT} s for {what}")
+    return waiting.wait_until(condition, what, WAIT)
 
 
 class Visitor:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rover_planner.demo.child_process import ChildProcess, stopping_children
+from support.waiting import is_running, wait_until_gone
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -46,21 +47,6 @@ def environment(tmp_path):
     return os.environ | {"PYTHONPATH": f"{REPOSITORY}{os.pathsep}{tmp_path}"}
 
 
-def exists(pid):
-    """Tell whether a process is there and is more than an entry to be collected."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
-def wait_until_gone(pid, seconds=10.0):
-    deadline = time.monotonic() + seconds
-    while exists(pid) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    return not exists(pid)
-
-
 def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
     tmp_path, environment, monkeypatch
 ):
@@ -69,11 +55,11 @@ def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
         child = ChildProcess("stubborn", (), environment, tmp_path / "log")
         children.append(child)
         inner = int(next(child.lines(lambda: None)))
-        assert exists(inner)
+        assert is_running(inner)
         assert child.running
     assert not child.running
     assert child.exit_code == -signal.SIGKILL
-    assert wait_until_gone(inner)
+    wait_until_gone(inner)
 
 
 def test_a_failure_in_the_block_stops_the_children(tmp_path, environment):
@@ -114,10 +100,10 @@ def test_no_child_outlives_a_parent_that_is_signalled(tmp_path, environment, num
         text=True,
     ) as parent:
         child = int(parent.stdout.readline())
-        assert exists(child)
+        assert is_running(child)
         parent.send_signal(number)
         try:
             assert parent.wait(20) == code
         finally:
             parent.kill()
-    assert wait_until_gone(child)
+    wait_until_gone(child)

@@ -11,7 +11,8 @@ from std_srvs.srv import Trigger
 
 import rover_planner.ros.deferred_work
 from rover_planner.ros.deferred_work import MAX_WAITING, DeferredWork
-from support.ros_fixtures import TIMEOUT, call, wait_until
+from support.ros_fixtures import call
+from support.waiting import TIMEOUT, wait_until
 
 
 @pytest.fixture

@@ -16,7 +16,8 @@ from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.long_tests import on_demand
-from support.ros_fixtures import RosRun, wait_until
+from support.ros_fixtures import RosRun
+from support.waiting import wait_until
 
 SERVER = {
     "policy": "optimal",

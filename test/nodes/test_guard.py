@@ -14,7 +14,8 @@ from rover_physics.errors import PoseError
 from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.handover import Handover
 from rover_planner.ros.refusals import refuse_error
-from support.ros_fixtures import call, wait_until
+from support.ros_fixtures import call
+from support.waiting import wait_until
 
 
 class Log:

@@ -6,7 +6,7 @@ from std_msgs.msg import Int32
 
 from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 
 def listen(ros, name="listener"):

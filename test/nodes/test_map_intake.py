@@ -8,8 +8,8 @@ from rover_physics.errors import ModelError
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.traction.prepared_map import prepare_map
-from support.ros_fixtures import wait_until
 from support.rough_grounds import plane
+from support.waiting import wait_until
 
 LSR1 = load_rover("lsr1")
 

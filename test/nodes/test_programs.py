@@ -24,7 +24,8 @@ from rover_planner.nodes.traverse_server import main as traverse_server
 from rover_planner.shell.extras import PLAIN
 from support.command_line import REPOSITORY
 from support.project.checkout import console_scripts, setup_arguments
-from support.ros_fixtures import domain_id, wait_until
+from support.ros_fixtures import domain_id
+from support.waiting import wait_until
 
 MAINS = {
     "traverse_server": traverse_server,

@@ -24,7 +24,8 @@ from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from support.grounds import make_terrain, wall_at, waves
-from support.ros_fixtures import RosRun, wait_until
+from support.ros_fixtures import RosRun
+from support.waiting import wait_until
 
 START_X = -1.0
 

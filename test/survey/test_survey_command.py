@@ -5,7 +5,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +25,7 @@ from rover_planner.survey.survey import prepare_survey
 from support.project.long_tests import on_demand
 from support.survey_maps import (
     assert_same_bits,
+    count_chunks,
     die_on_one,
     fail_on_one,
     finish,
@@ -34,7 +34,9 @@ from support.survey_maps import (
     make_rough_map,
     start_command,
     survey_here,
+    wait_for_chunks,
 )
+from support.waiting import wait_until_gone
 
 SHARED = ("--headings", 4, "--chunk", 64)
 
@@ -64,26 +66,6 @@ def children_of(pid) -> list[int]:
     return found
 
 
-def is_alive(pid) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
-def wait_for(what, seconds=90.0):
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)
-
-
-def count_chunks(out) -> int:
-    """Return the number of finished chunks, while a survey runs."""
-    return sum(path.is_file() and not path.name.endswith("partial")
-               for path in Path(out, "seconds", "c").rglob("*"))  # fmt: skip
-
-
 @pytest.mark.slow
 def test_two_workers_find_what_one_process_finds(whole, tmp_path):
     folder, layers = whole
@@ -110,7 +92,7 @@ def test_a_killed_worker_costs_only_its_chunks_time(whole, tmp_path):
     out = tmp_path / "out"
     process = start_command("survey", "lsr1", folder / "map.npz", out, *SHARED, "--workers", 2)
     try:
-        wait_for(lambda: count_chunks(out) >= 2)
+        wait_for_chunks(out, 2)
         victim = children_of(process.pid)[0]
         os.kill(victim, signal.SIGKILL)
         code, report, err = finish(process)
@@ -130,7 +112,7 @@ def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_p
     words = ("survey", "lsr1", folder / "map.npz", out, *SHARED, "--workers", 2)
     process = start_command(*words)
     try:
-        wait_for(lambda: count_chunks(out) >= 3)
+        wait_for_chunks(out, 3)
         workers = children_of(process.pid)
         assert len(workers) == 2
         process.send_signal(how)
@@ -139,7 +121,8 @@ def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_p
         process.kill()
     if how == signal.SIGINT:
         assert (process.returncode, err) == (130, "")
-    wait_for(lambda: not any(map(is_alive, workers)), 30.0)
+    for worker in workers:
+        wait_until_gone(worker, 30.0)
     done = count_chunks(out)
     assert 3 <= done < 25
     code, report, err = finish(start_command(*words))

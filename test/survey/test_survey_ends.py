@@ -5,8 +5,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +25,9 @@ from support.survey_maps import (
     make_rough_map,
     start_command,
     survey_here,
+    wait_for_chunks,
 )
+from support.waiting import wait_until
 
 SHARED = ("--headings", 4, "--chunk", 64)
 
@@ -46,18 +46,6 @@ def start_dask(*words) -> subprocess.Popen:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-
-
-def wait_for(what, seconds=120.0):
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)
-
-
-def count_chunks(out) -> int:
-    return sum(path.is_file() and not path.name.endswith("partial")
-               for path in Path(out, "seconds", "c").rglob("*"))  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -85,7 +73,7 @@ def test_a_survey_that_is_told_to_end_does_so_without_noise(ground, how):
     out = ground.with_name("out")
     process = start_command("survey", "lsr1", ground, out, *SHARED, "--workers", 1)
     try:
-        wait_for(lambda: count_chunks(out) >= 1)
+        wait_for_chunks(out, 1)
         process.send_signal(how)
         _, err = process.communicate(timeout=60)
     finally:
@@ -101,12 +89,14 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(ground):
                            "--scheduler-file", scheduler_file)  # fmt: skip
     worker = process = None
     try:
-        wait_for(lambda: scheduler_file.exists() and scheduler_file.stat().st_size)
+        wait_until(
+            lambda: scheduler_file.exists() and scheduler_file.stat().st_size, "a scheduler", 120.0
+        )
         worker = start_dask("dask_worker", "--scheduler-file", scheduler_file, "--nthreads", 1,
                             "--no-dashboard", "--no-nanny")  # fmt: skip
         address = scheduler_file.read_text().split('"address": "')[1].split('"')[0]
         process = start_command("survey", "lsr1", ground, out, *SHARED, "--scheduler", address)
-        wait_for(lambda: count_chunks(out) >= 1)
+        wait_for_chunks(out, 1)
         scheduler.kill()
         _, err = process.communicate(timeout=100)
     finally:
@@ -127,7 +117,9 @@ def test_a_scheduler_without_workers_is_refused_after_a_while(ground, monkeypatc
     scheduler = start_dask("dask_scheduler", "--host", "127.0.0.1", "--port", 0, "--no-dashboard",
                            "--scheduler-file", scheduler_file)  # fmt: skip
     try:
-        wait_for(lambda: scheduler_file.exists() and scheduler_file.stat().st_size)
+        wait_until(
+            lambda: scheduler_file.exists() and scheduler_file.stat().st_size, "a scheduler", 120.0
+        )
         address = scheduler_file.read_text().split('"address": "')[1].split('"')[0]
         with pytest.raises(PlanningError, match=r"has had no worker for 0\.3 s; start some"):
             run_survey(prepared.job, prepared.chunks, ClusterSettings(address))

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from rover_planner.traction.watchdog import POLL, Watchdog
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 LATE = 0.1
 """Delay of a thread that a busy machine may cause [s]."""

@@ -20,8 +20,8 @@ from rover_planner.viewer.state.judging import PATH, POLICY, JudgeRequest, judge
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import waves
-from support.ros_fixtures import wait_until
 from support.viewer.sessions import LSR1, ramp, session_on, slow_scenario
+from support.waiting import wait_until
 
 STOP_TIME = 2.0
 """Longest time until work stops [s]; most steps take 0.05 s, few 0.4 s."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from support.ros_fixtures import wait_until
 from support.viewer.sessions import LSR1, ramp, session_on
+from support.waiting import wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 

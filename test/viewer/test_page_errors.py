@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
-from support.ros_fixtures import wait_until
 from support.viewer.sessions import ramp, session_on
+from support.waiting import wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 

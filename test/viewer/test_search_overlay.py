@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from support.grounds import gap, make_terrain, wall_with_gap, whole_wall
-from support.ros_fixtures import wait_until
 from support.viewer.sessions import LSR1, walled_session
+from support.waiting import wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 

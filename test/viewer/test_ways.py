@@ -21,8 +21,8 @@ from rover_planner.viewer.state.judging import (
 )
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
-from support.ros_fixtures import wait_until
 from support.viewer.sessions import LSR1, walled_session
+from support.waiting import wait_until
 
 GOAL = (1.6, 0.0, 0.0)
 """A pose on the other side of the wall."""

@@ -5,7 +5,7 @@ from rclpy.parameter import Parameter
 
 from benchmarks.driven_rover import RATE, DrivenRover
 from rover_planner.nodes.traction_controller import TractionController
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 PATIENT = {"joint_states_timeout": 1.0, "imu_timeout": 1.0, "watchdog_timeout": 1.0}
 """Timeouts at which a busy machine makes no difference."""

@@ -15,8 +15,8 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics.errors import ModelError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.ros.qos import map_qos, sensor_qos
-from support.ros_fixtures import wait_until
 from support.rough_grounds import plane
+from support.waiting import wait_until
 
 CYCLES_IN_A_TENTH = 5
 

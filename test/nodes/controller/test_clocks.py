@@ -6,7 +6,7 @@ import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from benchmarks.driven_rover import NANOSECONDS
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 BOUND = 1.5
 """Longest time from the cause to zero or hold [s]: the timeouts below, and

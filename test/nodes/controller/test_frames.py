@@ -11,8 +11,8 @@ from rover_planner.nodes.navigation import frames
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.messages.transforms import send_transforms
-from support.ros_fixtures import wait_until
 from support.rough_grounds import RESOLUTION, plane
+from support.waiting import wait_until
 
 MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 """Where odometry began, on the map."""

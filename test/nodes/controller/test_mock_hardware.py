@@ -24,7 +24,7 @@ from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from support.grounds import make_terrain
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "ros2_control"
 HARDWARE = {

@@ -8,7 +8,8 @@ from sensor_msgs.msg import PointCloud2
 
 from benchmarks.driven_rover import DrivenRover
 from rover_planner.nodes.traction_controller import TractionController
-from support.ros_fixtures import RosRun, wait_until
+from support.ros_fixtures import RosRun
+from support.waiting import wait_until
 
 
 @pytest.fixture

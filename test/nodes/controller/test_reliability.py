@@ -8,7 +8,7 @@ import pytest
 from benchmarks.reliability_controller import LIBRARIES
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from support.command_line import REPOSITORY
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 LONGEST, LONGEST_SHOWN = 2000.0, 6000.0
 """Longest times to rest and to the error in diagnostics on a busy machine [ms]."""

@@ -13,7 +13,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from support.ros_fixtures import call, domain_id, wait_until
+from support.ros_fixtures import call, domain_id
+from support.waiting import wait_until
 
 
 @pytest.fixture

@@ -12,7 +12,8 @@ from rover_physics.traversability.reach import judge_reach
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain
 from support.messages.tool_messages import make_target, make_wrench
-from support.ros_fixtures import call, wait_until
+from support.ros_fixtures import call
+from support.waiting import wait_until
 
 SERVER = "/traverse_server"
 PATH = [[-1.0, 0.0, 0.0], [0.0, 0.0, 0.5]]

@@ -15,7 +15,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
 from support.messages.transforms import send_transforms, transform_message
 from support.planner_client import GOAL, START, ask, verdict_of
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 MAP_ODOM = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
 """Where odometry began, on the map."""

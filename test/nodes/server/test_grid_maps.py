@@ -15,7 +15,7 @@ from support.messages.grid_maps import grid_map_of, move_buffer, to_message
 from support.messages.interfaces import GRID_MAP_MSGS, TF2_MSGS, importable
 from support.messages.transforms import transform_message
 from support.planner_client import ask
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 PRIOR = make_terrain(waves)
 CELL = PRIOR.resolution

@@ -10,7 +10,8 @@ from msg_adapters.results.hazard_grids import VALUES
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import SERVER
-from support.ros_fixtures import call, wait_until
+from support.ros_fixtures import call
+from support.waiting import wait_until
 
 PASSABLE, IMPASSABLE, UNKNOWN = VALUES[0], VALUES[-1], -1
 

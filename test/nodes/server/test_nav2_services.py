@@ -14,7 +14,7 @@ from rover_planner.nodes.nav2_services import (
 )
 from rover_planner.planning.path_geometry import densify, next_given_poses
 from support.grounds import make_terrain, wall_at, waves
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 
 def ask(server, poses):

@@ -7,7 +7,7 @@ from rclpy.node import Node
 
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.paced_sender import AT_ONCE, PAUSE, PacedSender
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 
 @pytest.fixture

@@ -18,7 +18,8 @@ from rover_physics.prediction.sweep import sweep_path
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import SERVER, verdict_of
-from support.ros_fixtures import call, wait_until
+from support.ros_fixtures import call
+from support.waiting import wait_until
 
 START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
 

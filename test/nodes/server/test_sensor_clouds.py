@@ -13,7 +13,7 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 ROBOT = Rigid.from_rpy(0.7, -0.4, 0.25, 0.03, -0.06, 0.8)
 """Where the rover stands."""

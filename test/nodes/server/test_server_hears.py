@@ -19,7 +19,8 @@ from msg_adapters.paths import poses_path, stamped_pose
 from rover_planner.planning.answering.situation import Situation
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, verdict_of
-from support.ros_fixtures import call, wait_until
+from support.ros_fixtures import call
+from support.waiting import wait_until
 
 LONG_WORK = {"waypoint_spacing": 0.001, "candidate_count": 99, "candidate_spacing": 0.01}
 """Parameters with which a question takes some seconds."""

@@ -17,7 +17,7 @@ from rover_planner.ros.qos import map_qos
 from rover_planner.worlds.maps.map_keeper import MapKeeper
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, ask, verdict_of
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 PRIOR = make_terrain(waves)
 

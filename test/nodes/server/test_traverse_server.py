@@ -22,7 +22,8 @@ from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, PlannerClient, ask, verdict_of
-from support.ros_fixtures import call, wait_until
+from support.ros_fixtures import call
+from support.waiting import wait_until
 
 
 def test_a_passable_goal_gets_a_plan_of_settled_poses(mapped, client):

@@ -18,7 +18,7 @@ from rover_physics.terrain.grid import save_terrain
 from rover_planner.planning.answering.situation import Situation
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, START, ask, verdict_of
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 
 def assert_refused(client, code, text, question):

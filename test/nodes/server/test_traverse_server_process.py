@@ -15,7 +15,8 @@ from msg_adapters.paths import stamped_pose
 from rover_physics.terrain.grid import Terrain, save_terrain
 from support.grounds import make_terrain, waves
 from support.planner_client import PlannerClient
-from support.ros_fixtures import RosRun, domain_id, wait_until
+from support.ros_fixtures import RosRun, domain_id
+from support.waiting import wait_until
 
 
 @pytest.fixture

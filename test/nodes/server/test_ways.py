@@ -12,7 +12,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import SERVER, ask
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
 

@@ -13,6 +13,7 @@ import pytest
 import rover_physics
 from rover_physics.compilation import BackgroundCompilation, Compilation, Step, compile_groups
 from support.project.without_disk import drop_rights, fill_disk, read_only
+from support.waiting import wait_until_gone
 
 MODULE = """
 import os, sys, time
@@ -88,18 +89,6 @@ def wait_for_worker(folder: Path) -> int:
     raise AssertionError("no worker")
 
 
-def runs(pid: int) -> bool:
-    status = Path(f"/proc/{pid}/status")
-    return status.exists() and "zombie" not in status.read_text()
-
-
-def wait_for_end(pid: int) -> None:
-    deadline = time.monotonic() + 10.0
-    while runs(pid):
-        assert time.monotonic() < deadline, "the worker goes on"
-        time.sleep(0.02)
-
-
 def test_a_process_compiles_what_is_missing_and_this_one_loads_it(folder):
     assert output_of(folder) == "first second True 2"
     assert output_of(folder) == "True 2"
@@ -120,7 +109,7 @@ def test_a_closed_compilation_ends_its_process_and_compiles_nothing(folder):
     compilation.close()
     thread.join(10.0)
     assert done == [False]
-    wait_for_end(pid)
+    wait_until_gone(pid)
 
 
 def test_a_background_compilation_can_be_closed(folder):
@@ -128,7 +117,7 @@ def test_a_background_compilation_can_be_closed(folder):
     background.start()
     pid = wait_for_worker(folder)
     background.close()
-    wait_for_end(pid)
+    wait_until_gone(pid)
 
 
 def test_a_background_compilation_that_has_not_begun_can_be_closed():
@@ -146,7 +135,7 @@ def test_the_worker_ends_with_its_parent(folder, how):
         pid = wait_for_worker(folder)
         process.send_signal(how)
         process.wait(10.0)
-    wait_for_end(pid)
+    wait_until_gone(pid)
 
 
 def test_groups_are_compiled_by_several_processes_and_errors_are_raised(folder):

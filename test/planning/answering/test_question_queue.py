@@ -19,7 +19,7 @@ from rover_planner.planning.answering.budget import (
 )
 from rover_planner.planning.answering.question_queue import Question, QuestionQueue
 from support.grounds import make_terrain, waves
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 
 class Desk:

@@ -24,7 +24,7 @@ from rover_planner.ros.qos import result_qos, sensor_qos, topic_qos
 from rover_planner.viewer.live.listener import LiveLink, LiveListener
 from rover_planner.viewer.live.live_state import LiveValues, StateBuilder
 from support.grounds import make_terrain, wall_at, waves
-from support.ros_fixtures import wait_until
+from support.waiting import wait_until
 
 LSR1 = load_rover("lsr1")
 
