@@ -7,6 +7,7 @@ from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Imu, JointState, PointCloud2
+from std_srvs.srv import SetBool
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import imu_to_attitude
@@ -17,14 +18,14 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.terrain.grid import load_terrain, save_terrain
-from rover_planner.nodes.mission.drive import DriveSettings, drive_to
+from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator, main
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from support.grounds import make_terrain, wall_at, waves
-from support.ros_fixtures import RosRun
+from support.ros_fixtures import RosRun, call
 from support.waiting import wait_until
 
 START_X = -1.0
@@ -50,9 +51,9 @@ def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
     return ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
 
 
-def start_controller(ros) -> TractionController:
-    enabled = [Parameter("enabled_at_start", value=True)]
-    return ros.spin(TractionController(context=ros.context, parameter_overrides=enabled))
+def start_controller(ros, enabled=True) -> TractionController:
+    values = [Parameter("enabled_at_start", value=enabled)]
+    return ros.spin(TractionController(context=ros.context, parameter_overrides=values))
 
 
 class Ear(Node):
@@ -230,3 +231,34 @@ def test_a_wall_ahead_stops_it_with_the_reason_in_the_diagnostics(ros, tmp_path)
 def test_an_engine_that_is_none_is_refused_by_the_command_line(capfd):
     assert main(["--engine", "horses"]) == 2
     assert "'horses'; it must be one of quasi_static, mujoco" in capfd.readouterr().err
+
+
+def test_a_rover_that_stands_gets_another_plan_and_at_last_the_drive_is_given_up(
+    ros, terrain_file
+):
+    simulator = start_simulator(ros, terrain_file, follow_commands=True)
+    server = ros.spin(TraverseServer(context=ros.context))
+    controller = start_controller(ros, enabled=False)
+    wait_until(lambda: controller.statistics.updates > 5, "the controller to run")
+    planner = ros.spin(MissionPlanner(context=ros.context))
+    enabling = planner.create_client(SetBool, "traction_controller/enable")
+    planner.wait_for_server()
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    place = simulator.simulation.plant.pose()
+    goal = [place[0] + 0.5, 0.05, 0.0]
+    answer = planner.ask(place, goal)
+    assert answer["traversable"], answer["reason"]
+    settings = DriveSettings(within=0.15, timeout=60.0, period=0.1, patience=0.5)
+    with pytest.raises(DriveFailedError, match="3 other ways led nowhere from .* stood for 0.5 s"):
+        drive_to(planner, goal, answer["poses"], settings, lambda what: None)
+
+    def start_motors_at_the_first_stop(what):
+        if "has stood" in what and len(told) == 0:
+            call(enabling, SetBool.Request(data=True))
+        told.append(what)
+
+    told: list[str] = []
+    settings = DriveSettings(within=0.15, timeout=60.0, patience=4.0)
+    drive_to(planner, goal, answer["poses"], settings, start_motors_at_the_first_stop)
+    assert "another plan" in told[1]
+    assert simulator.simulation.plant.pose()[0] > place[0] + 0.3

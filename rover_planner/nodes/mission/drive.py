@@ -1,4 +1,4 @@
-"""Drives a rover to its goal: watches the rest of the plan, and asks for another one if needed."""
+"""Drives a rover to its goal: watches plan and rover, and asks for another plan if needed."""
 
 import math
 import time
@@ -9,12 +9,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_planner.nodes.mission.standstill import Standstill, Stops
 from rover_planner.planning.navigation.watched_path import WatchedPath
 
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
 MAX_PLANS = 100
 """Largest number of plans on the way to one goal."""
+MAX_STOPS = 3
+"""Largest number of stops at one place before the drive is given up."""
 
 
 class DriveFailedError(Exception):
@@ -47,6 +50,8 @@ class DriveSettings:
     """Time between two looks at the rest of the plan [s]."""
     timeout: float = 3600.0
     """Longest time for the way to a goal [s]."""
+    patience: float = 15.0
+    """Time for which a rover may stand before another way is asked for [s]."""
 
 
 def drive_to(
@@ -56,7 +61,10 @@ def drive_to(
     settings: DriveSettings,
     tell: Callable[[str], object],
 ) -> None:
-    """Drive a plan; replan where the newest map refuses the rest of it, or it ends too early.
+    """Drive a plan, and ask for another one where it cannot be driven to the goal.
+
+    That is where the newest map refuses the rest of it, where the rover stands although it is to
+    drive, and where the plan ends before the goal.
 
     Args:
         client: Server and rover.
@@ -66,17 +74,23 @@ def drive_to(
         tell: Takes in words what happens.
 
     Raises:
-        DriveFailedError: There is no way from where the rover is, or it takes too long.
+        DriveFailedError: There is no way from where the rover is, it does not get on, or it takes
+            too long.
     """
     deadline = time.monotonic() + settings.timeout
+    stops = Stops()
     for _ in range(MAX_PLANS):
-        pose, refused = _follow(client, np.array(plan), settings, deadline)
+        pose, hindrance = _follow(client, np.array(plan), settings, deadline)
         ends_at_goal = math.dist(plan[-1][:2], goal[:2]) < settings.within
-        if not refused and ends_at_goal:
+        if not hindrance and ends_at_goal:
             return
-        if refused:
+        if hindrance:
             client.send_path(pose[None, :])  # it stands there
-            tell(f"the rest of the plan is refused: {refused}")
+            tell(hindrance)
+            if stops.count(pose) > MAX_STOPS:
+                raise DriveFailedError(
+                    f"{MAX_STOPS} other ways led nowhere from {_describe(pose)}: {hindrance}"
+                )
         answer = client.ask(pose.tolist(), goal)
         if not answer["traversable"]:
             raise DriveFailedError(f"no way on from {_describe(pose)}: {answer['reason']}")
@@ -88,8 +102,9 @@ def drive_to(
 def _follow(
     client: RoverClient, plan: Poses, settings: DriveSettings, deadline: float
 ) -> tuple[Poses, str]:
-    """Follow a plan to its end; return the last pose (3,), and why the rest of it is refused."""
+    """Follow a plan to its end; return the last pose (3,), and what hinders the rover there."""
     path, index = WatchedPath(plan), 0
+    standstill = Standstill(settings.patience)
     client.send_path(plan)
 
     def is_there(pose: Poses) -> bool:
@@ -103,8 +118,11 @@ def _follow(
             return pose, ""
         refused = client.check(plan[index:])
         if refused:
-            return pose, refused
-        if time.monotonic() > deadline:
+            return pose, f"the rest of the plan is refused: {refused}"
+        now = time.monotonic()
+        if standstill.is_reached(pose, now):
+            return pose, f"the rover has stood for {settings.patience:g} s on its way"
+        if now > deadline:
             raise DriveFailedError(
                 f"waited {settings.timeout:.0f} s in vain for the rover to get there; it is at "
                 f"{_describe(pose)}"
