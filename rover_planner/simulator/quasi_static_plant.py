@@ -202,8 +202,12 @@ class QuasiStaticPlant:
         headings = middle + angles
         ahead = ways[:, 0] * np.cos(headings) + ways[:, 1] * np.sin(headings)
         rolled = np.copysign(np.hypot(ahead, ways[:, 2]), ahead)
-        turned = rolled / self._rover.wheel.radius
+        wheel = self._rover.wheel
+        turned = rolled / wheel.radius
         turned /= 1.0 - np.clip(self._slip(forces), 0.0, MAX_SLIP)
+        # No motor follows a wheel that drops off an edge within one step: it slides.
+        most = wheel.max_speed * duration
+        turned = np.clip(turned, -most, most)
         self._spin += turned
         self._wheel_rates = turned / duration
 

@@ -15,6 +15,7 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.simulator.second_try import SecondTry
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
 
@@ -53,6 +54,20 @@ def test_wheels_turn_by_the_way_they_roll():
     assert turned == pytest.approx(np.full(6, 0.6 / LSR1.wheel.radius), rel=1e-3)
     rates = [state.joint_velocities[name] for name in WHEEL_JOINTS]
     assert rates == pytest.approx(np.full(6, 0.6), rel=1e-3)
+
+
+def test_no_wheel_turns_faster_than_its_motor_where_it_drops_off_an_edge():
+    """Encoders told 45 rad/s then; the traction controller took them for broken."""
+    ground = make_mars_terrain(5, 8.0, rock_cover=0.15, crater_density=0.0)
+    plant = QuasiStaticPlant(LSR1, ground, (-2.0, 0.0, 0.0), policy="optimal")
+    rates, spins = [], [np.zeros(6)]
+    for _ in range(2000):
+        state = drive(plant, STEP, 0.1)
+        rates.append([state.joint_velocities[name] for name in WHEEL_JOINTS])
+        spins.append([state.joint_positions[name] for name in WHEEL_JOINTS])
+    assert plant.pose()[0] > 1.5
+    assert np.abs(rates).max() == pytest.approx(LSR1.wheel.max_speed)
+    assert np.diff(spins, axis=0) == pytest.approx(STEP * np.array(rates))
 
 
 @pytest.mark.slow
