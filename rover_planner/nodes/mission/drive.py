@@ -4,12 +4,12 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.nodes.mission.standstill import Standstill, Stops
+from rover_planner.nodes.mission.standstill import SAME_PLACE, Standstill, Stops
 from rover_planner.planning.navigation.watched_path import WatchedPath
 
 Poses = NDArray[np.float64]
@@ -18,6 +18,11 @@ MAX_PLANS = 100
 """Largest number of plans on the way to one goal."""
 MAX_STOPS = 3
 """Largest number of stops at one place before the drive is given up."""
+RETREAT = 0.5
+"""Distance by which the rover drives back where no way begins [m]."""
+REST_TIME, LOOK_TIME, LONGEST_BRAKING = 1.0, 0.2, 10.0
+"""A rover that is to stand rests when it has not moved for so long; time between two looks at it;
+time after which it is taken to rest, whatever it does [s]."""
 
 
 class DriveFailedError(Exception):
@@ -54,6 +59,17 @@ class DriveSettings:
     """Time for which a rover may stand before another way is asked for [s]."""
 
 
+class Stretch(NamedTuple):
+    """How far a plan was driven."""
+
+    pose: Poses
+    """(3,) where the rover is."""
+    hindrance: str
+    """What hinders it there; empty at the end of the plan."""
+    behind: Poses
+    """(n, 3) waypoints of the plan up to there."""
+
+
 def drive_to(
     client: RoverClient,
     goal: Sequence[float],
@@ -64,7 +80,8 @@ def drive_to(
     """Drive a plan, and ask for another one where it cannot be driven to the goal.
 
     That is where the newest map refuses the rest of it, where the rover stands although it is to
-    drive, and where the plan ends before the goal.
+    drive, and where the plan ends before the goal. Where no way begins, and where the rover stops
+    again, it first drives back along its plan.
 
     Args:
         client: Server and rover.
@@ -77,56 +94,117 @@ def drive_to(
         DriveFailedError: There is no way from where the rover is, it does not get on, or it takes
             too long.
     """
-    deadline = time.monotonic() + settings.timeout
-    stops = Stops()
-    for _ in range(MAX_PLANS):
-        pose, hindrance = _follow(client, np.array(plan), settings, deadline)
-        ends_at_goal = math.dist(plan[-1][:2], goal[:2]) < settings.within
-        if not hindrance and ends_at_goal:
-            return
-        if hindrance:
-            client.send_path(pose[None, :])  # it stands there
-            tell(hindrance)
-            if stops.count(pose) > MAX_STOPS:
-                raise DriveFailedError(
-                    f"{MAX_STOPS} other ways led nowhere from {_describe(pose)}: {hindrance}"
-                )
-        answer = client.ask(pose.tolist(), goal)
+    _Drive(client, goal, settings, tell).run(np.array(plan))
+
+
+class _Drive:
+    """A drive to one goal."""
+
+    def __init__(
+        self,
+        client: RoverClient,
+        goal: Sequence[float],
+        settings: DriveSettings,
+        tell: Callable[[str], object],
+    ):
+        """Begin; arguments as for `drive_to`."""
+        self._client, self._goal, self._settings, self._tell = client, goal, settings, tell
+        self._deadline = time.monotonic() + settings.timeout
+        self._stops = Stops()
+        self._trail: Poses = np.zeros((0, 3))
+
+    def run(self, plan: Poses) -> None:
+        """Drive a plan (n, 3) and those that follow it."""
+        for _ in range(MAX_PLANS):
+            stretch = self._follow(plan)
+            ends_at_goal = math.dist(plan[-1, :2], self._goal[:2]) < self._settings.within
+            if not stretch.hindrance and ends_at_goal:
+                return
+            plan = self._find_plan(stretch)
+        raise DriveFailedError(f"the goal is not reached after {MAX_PLANS} plans")
+
+    def _find_plan(self, stretch: Stretch) -> Poses:
+        """Return the plan (n, 3) on which the rover goes on after a stretch."""
+        if WatchedPath(stretch.behind).distances[-1] > SAME_PLACE:
+            self._trail = stretch.behind
+        pose, stops = self._stand(stretch.pose), 0
+        if stretch.hindrance:
+            self._tell(stretch.hindrance)
+            stops = self._stops.count(pose)
+        if stops > MAX_STOPS:
+            raise DriveFailedError(
+                f"{MAX_STOPS} other ways led nowhere from {_describe(pose)}: {stretch.hindrance}"
+            )
+        answer = self._ask(pose) if stops < 2 else None
+        if answer is None or not answer["traversable"]:
+            went_back = self._go_back()
+            if went_back or answer is None:
+                pose = self._stand(pose)
+                answer = self._ask(pose)
         if not answer["traversable"]:
             raise DriveFailedError(f"no way on from {_describe(pose)}: {answer['reason']}")
-        plan = answer["poses"]
-        tell(f"another plan from {_describe(pose)}")
-    raise DriveFailedError(f"the goal is not reached after {MAX_PLANS} plans")
+        self._tell(f"another plan from {_describe(pose)}")
+        return np.array(answer["poses"])
 
+    def _ask(self, pose: Poses) -> dict[str, Any]:
+        """Ask for a way to the goal from a pose (3,)."""
+        return self._client.ask(pose.tolist(), self._goal)
 
-def _follow(
-    client: RoverClient, plan: Poses, settings: DriveSettings, deadline: float
-) -> tuple[Poses, str]:
-    """Follow a plan to its end; return the last pose (3,), and what hinders the rover there."""
-    path, index = WatchedPath(plan), 0
-    standstill = Standstill(settings.patience)
-    client.send_path(plan)
+    def _follow(self, plan: Poses) -> Stretch:
+        """Follow a plan (n, 3) to its end, or to where something hinders the rover."""
+        path, index, settings = WatchedPath(plan), 0, self._settings
+        standstill = Standstill(settings.patience)
+        self._client.send_path(plan)
 
-    def is_there(pose: Poses) -> bool:
-        nonlocal index
-        index = path.find_place(pose, index).index
-        return path.is_over(pose, index, settings.within)
+        def is_there(pose: Poses) -> bool:
+            nonlocal index
+            index = path.find_place(pose, index).index
+            return path.is_over(pose, index, settings.within)
 
-    while True:
-        pose = client.wait_for_pose(is_there, settings.period)
-        if is_there(pose):
-            return pose, ""
-        refused = client.check(plan[index:])
-        if refused:
-            return pose, f"the rest of the plan is refused: {refused}"
-        now = time.monotonic()
-        if standstill.is_reached(pose, now):
-            return pose, f"the rover has stood for {settings.patience:g} s on its way"
-        if now > deadline:
-            raise DriveFailedError(
-                f"waited {settings.timeout:.0f} s in vain for the rover to get there; it is at "
-                f"{_describe(pose)}"
-            )
+        while True:
+            pose = self._client.wait_for_pose(is_there, settings.period)
+            behind = plan[: index + 1]
+            if is_there(pose):
+                return Stretch(pose, "", behind)
+            refused = self._client.check(plan[index:])
+            if refused:
+                return Stretch(pose, f"the rest of the plan is refused: {refused}", behind)
+            now = time.monotonic()
+            if standstill.is_reached(pose, now):
+                text = f"the rover has stood for {settings.patience:g} s on its way"
+                return Stretch(pose, text, behind)
+            if now > self._deadline:
+                raise DriveFailedError(
+                    f"waited {settings.timeout:.0f} s in vain for the rover to get there; it is "
+                    f"at {_describe(pose)}"
+                )
+
+    def _go_back(self) -> bool:
+        """Let the rover drive back along the waypoints that it has passed, if they pass that way.
+
+        Where it stands at a limit, by the width of its deviation from the plan, no way begins.
+        """
+        if len(self._trail) < 2:
+            return False
+        lengths = WatchedPath(self._trail).distances
+        is_back = lengths >= lengths[-1] - RETREAT
+        back, self._trail = self._trail[is_back][::-1], self._trail[~is_back]
+        if self._client.check(back):
+            return False
+        self._tell(f"back to {_describe(back[-1])}")
+        return not self._follow(back).hindrance
+
+    def _stand(self, pose: Poses) -> Poses:
+        """Let the rover stand at a pose (3,); return where it has come to rest.
+
+        A plan from where it still moved would begin beside it, and a turn on the spot stay there.
+        """
+        self._client.send_path(pose[None, :])
+        rest = Standstill(REST_TIME)
+        end = time.monotonic() + LONGEST_BRAKING
+        while time.monotonic() < end and not rest.is_reached(pose, time.monotonic()):
+            pose = self._client.wait_for_pose(lambda _: False, LOOK_TIME)
+        return pose
 
 
 def _describe(pose: Poses) -> str:

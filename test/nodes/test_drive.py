@@ -1,0 +1,74 @@
+"""A drive goes on where its rover is held up, and ends where nothing helps."""
+
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
+from rover_planner.planning.path_query import answer_path_query, check_path
+from rover_planner.simulator.path_follower import PathFollower
+from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
+from support.grounds import make_terrain
+from support.rough_grounds import plane
+
+LSR1 = load_rover("lsr1")
+MAP = plane(0.0, 0.0, half=4.0)
+STEP = 0.02
+SETTINGS = DriveSettings(within=0.1, timeout=60.0, patience=0.3)
+
+
+class SimulatedRover:
+    """A rover on a ground that its map does not show; time runs as fast as it is computed."""
+
+    def __init__(self, ground):
+        self.plant = QuasiStaticPlant(LSR1, ground, (-1.5, 0.0, 0.0))
+        self.follower = PathFollower(self.plant.pose()[None], 0.3)
+        self.asked = []
+
+    def ask(self, start, goal):
+        self.asked.append(np.array(start))
+        answer = answer_path_query(LSR1, MAP, start, goal)
+        poses = answer.chosen.poses if answer.traversable else []
+        return {"traversable": answer.traversable, "reason": answer.explain(), "poses": poses}
+
+    def send_path(self, poses):
+        self.follower = PathFollower(poses, 0.3)
+
+    def check(self, poses):
+        candidate = check_path(LSR1, MAP, poses)
+        return "" if candidate.verdict.traversable else candidate.verdict.reason
+
+    def wait_for_pose(self, is_wanted, seconds):
+        for _ in range(round(seconds / STEP)):
+            if is_wanted(self.plant.pose()):
+                break
+            self.plant.drive(*self.follower.steer(self.plant.pose(), 0.1), STEP)
+        return self.plant.pose()
+
+
+def hill(x, y):
+    return 0.9 * np.maximum(x, 0.0) + 0.0 * y
+
+
+def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last():
+    rover = SimulatedRover(make_terrain(hill, half=4.0))
+    goal, told = (1.5, 0.0, 0.0), []
+    plan = rover.ask(rover.plant.pose(), goal)["poses"]
+    with pytest.raises(DriveFailedError, match="3 other ways led nowhere from .* stood for 0.3 s"):
+        drive_to(rover, goal, plan, SETTINGS, told.append)
+    first, again = rover.asked[1], rover.asked[2]
+    assert first[0] - again[0] == pytest.approx(0.4, abs=0.15)  # back along the plan
+    assert sum("has stood" in what for what in told) == 4
+    assert sum("back to" in what for what in told) == 2
+
+
+def test_the_next_plan_begins_where_the_rover_has_come_to_rest():
+    rover = SimulatedRover(MAP)
+    half_way = (0.0, 0.0, 0.0)
+    plan = rover.ask(rover.plant.pose(), half_way)["poses"]
+    resting = []
+    tell = lambda what: resting.append(rover.plant.pose())  # noqa: E731
+    drive_to(rover, (1.5, 0.0, 0.0), plan, SETTINGS, tell)
+    assert len(resting) == 1
+    assert resting[0] == pytest.approx(rover.asked[1])
+    assert rover.plant.pose()[0] == pytest.approx(1.5, abs=0.15)
