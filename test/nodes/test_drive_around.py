@@ -91,7 +91,9 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
     answer = planner.ask(simulator.simulation.plant.pose(), goal)
     assert answer["traversable"], answer["reason"]
     told = []
-    drive_to(planner, goal, answer["poses"], DriveSettings(timeout=400.0), told.append)
+    drive_to(
+        planner, goal, answer["poses"], DriveSettings(timeout=400.0, patience=5.0), told.append
+    )
     place = simulator.simulation.plant.pose()
     assert np.hypot(*(place - goal)[:2]) < 0.25
     assert np.isfinite(server.service.terrain.elevation).sum() > known
