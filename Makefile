@@ -38,7 +38,7 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 test: lint kernels ## lint, type check and all tests
 	@run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
-	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --cache-clear "$$@" && return
+	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 --durations-min 10 --cache-clear "$$@" && return
 	  echo "== what failed, once more and alone, to tell more; the run has failed"
 	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) "$$@" --numprocesses 0 --last-failed --last-failed-no-failures none || true
 	  return 1

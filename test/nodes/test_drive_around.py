@@ -53,9 +53,10 @@ def without_gaps(terrain: Terrain) -> Terrain:
     return Terrain(terrain.elevation[tuple(nearest)], terrain.resolution, terrain.origin)
 
 
+@on_demand  # two to three minutes each; test_drive.py and test_rover_simulator.py drive every time
 @pytest.mark.slow
 @pytest.mark.timed
-@pytest.mark.parametrize("engine", ["quasi_static", pytest.param("mujoco", marks=on_demand)])
+@pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
 def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
     terrain, start, goal, sensor_range = boulder_field()
     save_terrain(tmp_path / "ground.npz", terrain)
