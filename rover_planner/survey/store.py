@@ -15,7 +15,7 @@ import numpy as np
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.survey.kept_layer import KeptLayer, damaged
+from rover_planner.survey.disk.kept_layer import KeptLayer, damaged
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     LIMIT_NUMBERS,
@@ -112,7 +112,7 @@ class SurveyStore:
         """
         import zarr
 
-        from rover_planner.survey.durable_store import DurableStore
+        from rover_planner.survey.disk.durable_store import DurableStore
 
         self.path = path
         if not path.exists():
@@ -239,7 +239,7 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     """
     import zarr
 
-    from rover_planner.survey.durable_store import DurableStore, force_folders
+    from rover_planner.survey.disk.durable_store import DurableStore, force_folders
 
     aside = path.with_name(f"{path.name}.{os.getpid()}.new")
     layout = notes.layout

@@ -15,7 +15,7 @@ from rover_planner.cli import main
 from rover_planner.demo import demo as demo_module
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.processes import ProcessToken
+from support.project.processes import ProcessToken
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("matplotlib", reason="needs matplotlib")

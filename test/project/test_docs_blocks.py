@@ -16,10 +16,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-from support.processes import ProcessToken
 from support.project.checkout import TOP, console_scripts, setup_arguments
 from support.project.command_checks import check_command
 from support.project.doc_blocks import PAGES, Block, Command, read_blocks, split_commands
+from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
 NOT_RUN = {

@@ -13,9 +13,9 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-from support.processes import ProcessToken
 from support.project.checkout import TOP, console_scripts, copy_checkout
 from support.project.doc_blocks import read_blocks
+from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
 pytestmark = pytest.mark.slow

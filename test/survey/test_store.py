@@ -16,7 +16,7 @@ from rover_physics.terrain.grid import save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
-from rover_planner.survey.durable_store import write_durably
+from rover_planner.survey.disk.durable_store import write_durably
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
 from support.survey_maps import (
