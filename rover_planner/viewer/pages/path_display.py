@@ -55,7 +55,8 @@ class PathDisplay:
         """Show the verdict in the tab of the drive; return all of it in one piece, as HTML.
 
         In the tab the broken limit, value and wheel stand above the board, all else below it, so
-        that the board is seen without scrolling.
+        that the board is seen without scrolling. In one piece they stand above the policies, and
+        the reason, which may be long, below them.
 
         Args:
             old: Why it is a verdict on old values; empty if it is not.
@@ -69,7 +70,8 @@ class PathDisplay:
             describe_verdict(*judged, "", shown.by_policy, old, failure=words),
             describe_details(reason if words else "", shown.summary, notes),
         )
-        return describe_verdict(*judged, shown.summary, shown.by_policy, old, notes)
+        below = (reason, *notes) if words else notes
+        return describe_verdict(*judged, shown.summary, shown.by_policy, old, below, failure=words)
 
     def play_shown_path(self) -> None:
         """Play the shown path, from the same distance driven as before."""

@@ -79,6 +79,24 @@ def test_a_refused_path_says_which_limit_by_how_much_where_and_a_button_goes_the
     )
 
 
+def test_beside_the_sliders_a_long_reason_hides_no_policy(page, visitor, monkeypatch):
+    show(page, refused_index(page))
+    short = page.session.finished.reason
+    text = f"no way within the map, closed in by much; the shown path: {short} {short} {short}"
+    monkeypatch.setattr(type(page.session.finished), "reason", text)
+    page.requests.add(page.judged.show_verdict)
+    visitor.open_tab("Rover")
+    wait_until(lambda: text in visitor.text("#verdict:visible"), "the reason")
+    verdict = visitor.tab.locator("#verdict:visible")
+    box = verdict.locator("xpath=..").bounding_box()
+    policies = verdict.locator("#policies").bounding_box()
+    assert policies["y"] > box["y"]
+    assert policies["y"] + policies["height"] <= box["y"] + box["height"]
+    monkeypatch.undo()
+    page.requests.add(page.judged.show_verdict)
+    visitor.open_tab("Drive")
+
+
 def test_the_lanes_are_over_the_plots_with_the_same_scale(page, visitor):
     lanes = visitor.tab.locator("#lanes svg").bounding_box()
     for k in range(3):
