@@ -27,8 +27,8 @@ from rover_planner.survey.layout import Index, SurveyLayout
 from rover_planner.survey.map_source import MapFrame, keep_map
 from rover_planner.survey.request import hash_of
 
-FORMAT = 1
-"""Version of the store's format."""
+FORMAT = 2
+"""Version of the store's format: 2 writes all files of a chunk, also those without values."""
 NOTES = "rover_planner_survey"
 """Attribute of the store with all that is known of its survey."""
 SECONDS = "seconds"
@@ -108,7 +108,8 @@ class SurveyStore:
         """Open a store.
 
         Raises:
-            PlanningError: There is none, it is not that of a survey, or a layer is missing.
+            PlanningError: There is none, it is not that of a survey of this format, or a layer is
+                missing.
         """
         import zarr
 
@@ -119,7 +120,13 @@ class SurveyStore:
             raise PlanningError(f"no survey {show_file(path)}")
         try:
             self._group: Any = zarr.open_group(DurableStore(path), mode="r+")
-            self.notes = StoreNotes.from_dict(self._group.attrs[NOTES])
+            notes = self._group.attrs[NOTES]
+            if notes["format"] != FORMAT:
+                raise PlanningError(
+                    f"{show_file(path)} is a survey of format {notes['format']}; it must be "
+                    f"{FORMAT}: survey again into another folder"
+                )
+            self.notes = StoreNotes.from_dict(notes)
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise PlanningError(
                 f"{show_file(path)} is not a survey: {type(error).__name__}; "
@@ -164,9 +171,14 @@ class SurveyStore:
             )
 
     def find_finished(self) -> set[Index]:
-        """Return the chunks that are finished."""
+        """Return the chunks that are finished, and of which no file was lost since."""
         rows, columns = np.nonzero(self.layer(SECONDS)[:] >= 0.0)
-        return set(zip(rows.tolist(), columns.tolist(), strict=True))
+        layers = [self.layer(name) for name in self.layer_names()]
+        return {
+            chunk
+            for chunk in zip(rows.tolist(), columns.tolist(), strict=True)
+            if all(layer.has_chunk(chunk) for layer in layers)
+        }
 
     def write(self, chunk: Index, layers: Mapping[str, np.ndarray], seconds: float) -> None:
         """Write the layers of a chunk, then that it is finished.
@@ -177,10 +189,14 @@ class SurveyStore:
         Raises:
             OSError: The system refuses.
         """
+        import zarr
+
         rows, columns = self.notes.layout.cells_of(chunk)
+        with zarr.config.set({"array.write_empty_chunks": True}):  # else no file tells of a loss
+            arrays = {name: self._group[name] for name in layers}
 
         def put(name: str) -> None:
-            self._group[name][rows, columns] = layers[name]
+            arrays[name][rows, columns] = layers[name]
 
         with ThreadPoolExecutor(WRITERS) as writers:  # the disk takes many files at a time
             for _ in writers.map(put, layers):

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import save_terrain
+from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
@@ -186,6 +186,39 @@ def test_a_missing_layer_is_named(files, name):
     shutil.rmtree(path / name)
     with pytest.raises(PlanningError, match=f"{name} is damaged .*survey again"):
         SurveyStore(path)
+
+
+@pytest.mark.parametrize("name", ["best_class", "passable_headings", "worst_tilt"])
+def test_a_chunk_that_lost_a_file_is_done_again(files, name):
+    save_terrain(files / "map.npz", make_unknown_corner())
+    prepared = prepare(files, chunk=64)
+    for chunk in prepared.chunks:
+        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+    before = layers_of(prepared)
+    assert prepare(files).chunks == []
+    for lost in ((0, 0), (2, 1)):  # in the first one nothing is known
+        (prepared.store.path / name / "c" / str(lost[0]) / str(lost[1])).unlink()
+    again = prepare(files)
+    assert again.chunks == [(0, 0), (2, 1)] and again.finished == 7
+    for chunk in again.chunks:
+        again.store.write(chunk, compute_chunk(again.job, chunk), 1.0)
+    assert_same_bits(layers_of(again), before)
+    assert prepare(files).chunks == []
+
+
+def make_unknown_corner() -> Terrain:
+    """Return a map whose first chunk of 64 cells is unknown."""
+    ground = make_rough_map(140, 140)
+    elevation = ground.elevation.copy()
+    elevation[:100, :100] = np.nan
+    return replace(ground, elevation=elevation)
+
+
+def test_a_store_of_another_format_is_refused(files):
+    store = prepare(files).store
+    store._group.attrs[NOTES] = store._group.attrs[NOTES] | {"format": 1}
+    with pytest.raises(PlanningError, match="a survey of format 1; it must be 2: survey again"):
+        SurveyStore(store.path)
 
 
 @pytest.mark.parametrize("content", [b"", b"no zstandard frame", None])

@@ -36,6 +36,11 @@ class KeptLayer:
         """Type of the values."""
         return np.dtype(self._array.dtype)
 
+    def has_chunk(self, chunk: tuple[int, int]) -> bool:
+        """Return whether the file of a chunk (row, column) is there."""
+        key = self._array.metadata.encode_chunk_key(chunk)
+        return (self._path / self._array.basename / key).is_file()
+
     def __getitem__(self, key: Any) -> NDArray[Any]:
         """Read a part.
 
