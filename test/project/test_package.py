@@ -3,6 +3,7 @@
 import ast
 import re
 import runpy
+import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -139,6 +140,15 @@ def test_rover_physics_imports_nothing_of_ros_or_above_it(path):
 def test_msg_adapters_imports_nothing_above_it(path):
     tops = {module.split(".")[0] for module in imported_modules(path)}
     assert not tops & {"rover_planner", "rclpy"}
+
+
+def test_the_checkout_keeps_no_downloaded_or_built_file():
+    listed = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True)
+    if listed.returncode != 0:
+        pytest.skip("not a git checkout")
+    kinds = {Path(name).suffix for name in listed.stdout.splitlines()}
+    assert {".py", ".md"} <= kinds
+    assert not kinds & {".whl", ".gz", ".zip", ".so", ".pyc", ".nbi", ".nbc", ".log", ".mcap"}
 
 
 @pytest.mark.parametrize(
