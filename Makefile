@@ -66,7 +66,7 @@ lint: $(READY) ## ruff and mypy
 .PHONY: kernels
 kernels: $(READY) ## compile the numba kernels into their cache
 	@echo "== compiling kernels"
-	$(BIN)/python -m rover_physics.warm_up
+	$(BIN)/python -m rover_planner warm-up
 
 .PHONY: bench
 bench: $(BENCH_READY) kernels ## measure times and memory, as a table and bench_output/results.json

@@ -29,3 +29,12 @@ def console_scripts() -> dict[str, tuple[str, str]]:
 def copy_checkout(folder: Path) -> Path:
     """Copy the project's files to a new folder and return that folder."""
     return Path(shutil.copytree(TOP, folder, ignore=shutil.ignore_patterns(*MADE)))
+
+
+def copy_kernels(packages: Path) -> None:
+    """Copy the compiled kernels beside copies of the packages with the same sources."""
+    for kind in ("nbi", "nbc"):
+        for kernel in TOP.glob(f"rover_*/**/__pycache__/*.{kind}"):
+            copy = packages / kernel.relative_to(TOP)
+            copy.parent.mkdir(exist_ok=True)
+            shutil.copy(kernel, copy)

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-from support.project.checkout import TOP, console_scripts, copy_checkout
+from support.project.checkout import TOP, console_scripts, copy_checkout, copy_kernels
 from support.project.doc_blocks import read_blocks
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
@@ -96,15 +96,17 @@ def test_the_ament_index_and_share_have_the_package(workspace, python):
     assert Path(told.strip()) == share / "rover_planner"
 
 
-@pytest.mark.parametrize("workspace", ["copied"], indirect=True)  # its kernels compile once
+@pytest.mark.parametrize("workspace", ["copied"], indirect=True)
 def test_a_server_of_the_workspace_answers_its_mission_planner(workspace):
+    (packages,) = workspace.glob("install/rover_planner/lib/python*/site-packages")
+    copy_kernels(packages)  # as `rover_planner warm-up` would; compiling takes a minute
     programs = "install/rover_planner/lib/rover_planner"
     file = "install/rover_planner/share/rover_planner/config/parameters/traverse_server.yaml"
     parameters = f"--params-file {file} -p terrain_file:=mars.npz"
     script = f"""
         {programs}/rover_planner terrain mars.npz --seed 7
         {programs}/traverse_server --ros-args {parameters} & trap 'kill $!' EXIT
-        {programs}/mission_planner --start=1,1,0 --goal=3,1,0 --timeout 240  # kernels compile
+        {programs}/mission_planner --start=1,1,0 --goal=3,1,0 --timeout 240
     """
     token = ProcessToken()
     try:
