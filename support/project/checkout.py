@@ -33,7 +33,7 @@ def copy_checkout(folder: Path) -> Path:
 
 def copy_kernels(packages: Path) -> None:
     """Copy the compiled kernels beside copies of the packages with the same sources."""
-    for kind in ("nbi", "nbc"):
+    for kind in ("nbi", "nbc", "sha256"):  # the last tells the sources that they belong to
         for kernel in TOP.glob(f"rover_*/**/__pycache__/*.{kind}"):
             copy = packages / kernel.relative_to(TOP)
             copy.parent.mkdir(exist_ok=True)
