@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge_path import judge_path
@@ -70,7 +70,8 @@ def test_without_known_ground_below_it_is_unknown():
 @given(st.integers(0, 10_000))
 def test_it_is_what_a_look_at_every_cell_gives(seed):
     ground = smooth(seed)
-    prediction = sweep_path(LSR1, ground, random_poses(seed, 2, 0.6))
+    prediction = sweep_poses(LSR1, ground, random_poses(seed, 2, 0.6), np.zeros(2))
+    assert prediction.settled.all()
     ny, nx = ground.elevation.shape
     x, y = np.meshgrid(
         ground.origin[0] + np.arange(nx) * ground.resolution,

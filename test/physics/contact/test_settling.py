@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
@@ -20,6 +20,9 @@ SWAP = [3, 4, 5, 0, 1, 2]
 slopes = st.floats(-0.4, 0.4)
 headings = st.floats(-np.pi, np.pi)
 seeds = st.integers(0, 10_000)
+AHEAD = np.zeros(
+    4
+)  # curvatures: single poses, as a path through them may ask for more than wheels turn
 few = settings(max_examples=25, deadline=None)
 
 
@@ -131,8 +134,9 @@ def test_turned_by_quarters_with_its_path_the_ground_changes_nothing(seed, quart
     turned_ground, turned_poses = ground, poses
     for _ in range(quarters):
         turned_ground, turned_poses = quarter_turn(turned_ground, turned_poses)
-    here = sweep_path(LSR1, ground, poses)
-    there = sweep_path(LSR1, turned_ground, turned_poses)
+    here = sweep_poses(LSR1, ground, poses, AHEAD)
+    assert here.settled.all()
+    there = sweep_poses(LSR1, turned_ground, turned_poses, AHEAD)
     for name in ("status", "roll", "pitch", "rocker_angle", "bogie_angle"):
         assert getattr(there, name) == pytest.approx(getattr(here, name), abs=ANGLE), name
     assert there.position[:, 2] == pytest.approx(here.position[:, 2], abs=2.0 * GAP)
@@ -143,8 +147,9 @@ def test_turned_by_quarters_with_its_path_the_ground_changes_nothing(seed, quart
 @given(seeds)
 def test_mirrored_ground_swaps_right_and_left(seed):
     ground, poses = smooth(seed), random_poses(seed, 4, 0.6)
-    here = sweep_path(LSR1, ground, poses)
-    there = sweep_path(LSR1, *mirrored(ground, poses))
+    here = sweep_poses(LSR1, ground, poses, AHEAD)
+    assert here.settled.all()
+    there = sweep_poses(LSR1, *mirrored(ground, poses), AHEAD)
     assert there.status.tolist() == here.status.tolist()
     assert there.position[:, 2] == pytest.approx(here.position[:, 2], abs=2.0 * GAP)
     assert there.roll == pytest.approx(-here.roll, abs=ANGLE)
@@ -162,8 +167,9 @@ def test_moved_with_its_path_the_ground_changes_nothing(seed, dx, dy, dz):
     x, y = ground.origin
     moved = Terrain(ground.elevation + dz, ground.resolution, (x + dx, y + dy))
     shift = np.array([dx, dy, dz])
-    here = sweep_path(LSR1, ground, poses)
-    there = sweep_path(LSR1, moved, poses + np.array([dx, dy, 0.0]))
+    here = sweep_poses(LSR1, ground, poses, AHEAD)
+    assert here.settled.all()
+    there = sweep_poses(LSR1, moved, poses + np.array([dx, dy, 0.0]), AHEAD)
     assert there.position == pytest.approx(here.position + shift, abs=2.0 * GAP)
     assert there.roll == pytest.approx(here.roll, abs=ANGLE)
     assert there.bogie_angle == pytest.approx(here.bogie_angle, abs=ANGLE)
