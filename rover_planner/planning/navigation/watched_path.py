@@ -16,8 +16,8 @@ TURN_LENGTH = 0.3
 """Distance [m] that counts as much as one radian of heading, to tell places where the path
 crosses itself or turns on the spot."""
 AHEAD_WEIGHT, BEHIND_WEIGHT = 0.05, 0.3
-"""Of two places that are as near, such as start and end of a path that comes back, the one less far
-along the path counts; going back counts more than going on."""
+"""Of two places that are as near, such as start and end of a path that comes back, the one less
+far along the path counts; going back counts more than going on."""
 MOST_AHEAD = 10.0
 """Distance along the path from which on places count as equally far [m]."""
 
