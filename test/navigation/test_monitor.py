@@ -75,7 +75,9 @@ def test_the_place_goes_on_where_a_path_backs_up():
     path = WatchedPath(np.column_stack([x, np.zeros((len(x), 2))]))
     random, last, found = np.random.default_rng(3), 0, []
     for place in np.interp(np.arange(0.0, 60.0, 0.25), np.arange(len(x)), x):
-        last = path.find_place([place, 0.05, 0.0] + random.normal(0.0, 0.003, 3), last).index
+        last = path.find_place(
+            np.array([place, 0.05, 0.0]) + random.normal(0.0, 0.003, 3), last
+        ).index
         found.append(last)
     assert np.abs(np.array(found) - np.arange(0.0, 60.0, 0.25)).max() <= 2.0
     assert path.is_end(path.find_place(np.array([0.0, 0.3, 0.0]), last).index)
