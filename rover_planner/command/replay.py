@@ -126,12 +126,14 @@ class _Results:
 
     def take(self, answer: "Answer") -> None:
         """Write an answer and print it in one line."""
+        from rover_planner.planning.answering.known_map import stamp_text
+
         self.count += 1
         name = f"{self.count:03d}_{answer.kind}"
         told: dict[str, Any] = {
             "question": self.count,
             "kind": answer.kind,
-            "stamp": f"{answer.stamp / 1e9:.9f}",
+            "stamp": stamp_text(answer.stamp),
             "traversable": answer.judgement.traversable,
             "reason": answer.judgement.reason,
             "map": self._save_map(answer),
