@@ -4,6 +4,7 @@ The window grows with what is seen, or rolls with the rover. Heights that a newe
 stay. Each cell knows its source and its time.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -257,9 +258,15 @@ class LivingMap:
         old = self._window
         wanted = self._wanted_box(box, centre)
         if wanted.cells > self.rules.max_cells:
+            most = self.rules.max_cells
+            advice = "set map_window to the side of a window around the rover"
+            if self._rolls:
+                assert self._grid is not None
+                side = math.isqrt(most) * self._grid.resolution
+                advice = f"map_window is {self.rules.window:g} m, set it to at most {side:.4g} m"
             raise PlanningError(
                 f"the map would have {wanted.rows} x {wanted.columns} cells; max_map_cells is "
-                f"{self.rules.max_cells}: set map_window to the side of a window around the rover"
+                f"{most}: {advice}"
             )
         if old is not None and old.box == wanted:
             return old

@@ -259,3 +259,13 @@ def test_a_coarse_map_is_laid_only_onto_the_cells_of_a_window():
     assert cell(living, 10.5, 9.25)[0] == pytest.approx(4019.75, abs=1e-9)
     living.merge(local_map((5e3, 5e3), resolution=0.01), TOPIC, 3.0, (5e3, 5e3))
     assert cell(living, 5000.05, 5000.05)[:2] == (0.0, TOPIC)
+
+
+def test_a_window_of_too_many_cells_is_refused_with_one_that_fits():
+    living = LivingMap(MergeRules(window=100.0, max_cells=10_000))
+    with pytest.raises(PlanningError, match=r"map_window is 100 m, set it to at most 5 m"):
+        living.merge(local_map((0.0, 0.0)), TOPIC, 1.0)
+    assert not living.has_cells
+    living.rules = MergeRules(window=5.0, max_cells=10_000)
+    living.merge(local_map((0.0, 0.0)), TOPIC, 2.0)
+    assert living.snapshot().terrain.elevation.shape == (100, 100)
