@@ -13,7 +13,7 @@ from rover_planner.shell.poses import Pose, pose_option
 if TYPE_CHECKING:
     from rover_planner.parameters.traverse_server import TraverseServerParameters
     from rover_planner.ros.bags.bag_writer import BagWriter
-    from rover_planner.ros.bags.replay import Answer
+    from rover_planner.ros.bags.replay import Answer, Replay
 
 NODE_KEYS = ("/**", "traverse_server", "/traverse_server")
 """Keys of a parameter file that are about traverse_server; later ones take precedence."""
@@ -70,6 +70,8 @@ def replay(
     from rover_planner.ros.bags.replay import Questions, Replay
     from rover_planner.shell.progress import show_bar
 
+    if start is not None and goal is None:
+        raise PlanningError("--start is that of a way to --goal, which is not given")
     if out.exists():
         raise PlanningError(f"{out} exists already; OUT must be a new folder")
     given = {"rover": rover, "map_frame": map_frame, "map_resolution": resolution}
@@ -90,7 +92,7 @@ def replay(
             write_bag(out / "predictions") as predictions,
             show_bar("replay", source.count) as step,
         ):
-            results = _Results(out, work.parameters, predictions)
+            results = _Results(out, work, predictions)
             for recorded in source.messages():
                 for answer in work.take(recorded):
                     results.take(answer)
@@ -99,6 +101,12 @@ def replay(
                 results.take(answer)
     for note in work.notes:
         typer.echo(f"not used: {note}", err=True)
+    if work.without_start:
+        typer.echo(
+            f"no way was asked for on {work.without_start} maps: no odometry before them tells "
+            "where it starts; give --start",
+            err=True,
+        )
     total = {"answers": results.count, "refused_messages": work.refused, "topics": source.topics}
     typer.echo(json.dumps(total))
 
@@ -106,23 +114,26 @@ def replay(
 class _Results:
     """Writes answers to a folder: messages, predictions and maps."""
 
-    def __init__(self, folder: Path, parameters: "TraverseServerParameters", bag: "BagWriter"):
+    def __init__(self, folder: Path, work: "Replay", bag: "BagWriter"):
         from rover_physics.rover.rover_file import load_rover
 
-        self._folder, self._parameters, self._bag = folder, parameters, bag
-        self._rover = load_rover(parameters.rover)
+        self._folder, self._work, self._bag = folder, work, bag
+        self._parameters = work.parameters
+        self._rover = load_rover(work.parameters.rover)
         self._maps: dict[str, str] = {}
         self.count = 0
         """Number of answers."""
 
     def take(self, answer: "Answer") -> None:
         """Write an answer and print it in one line."""
+        from rover_planner.planning.answering.known_map import stamp_text
+
         self.count += 1
         name = f"{self.count:03d}_{answer.kind}"
         told: dict[str, Any] = {
             "question": self.count,
             "kind": answer.kind,
-            "stamp": f"{answer.stamp / 1e9:.9f}",
+            "stamp": stamp_text(answer.stamp),
             "traversable": answer.judgement.traversable,
             "reason": answer.judgement.reason,
             "map": self._save_map(answer),
@@ -173,7 +184,6 @@ class _Results:
 
     def _write_messages(self, answer: "Answer") -> None:
         """Write the messages that a server would publish, under its topics."""
-        from msg_adapters.joint_map import OWN_NAMES
         from msg_adapters.paths import PoseStock
         from msg_adapters.stamps import ns_to_stamp
         from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
@@ -189,8 +199,8 @@ class _Results:
             poses=PoseStock(),
             points=[],
             positive_steering=values.steering_sign,
-            joint_names=OWN_NAMES,
-            to_base=lambda plan: plan,
+            joint_names=self._work.joint_names,
+            to_base=self._work.frames.to_base,
         )
         for topic in RESULT_KINDS:
             self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)

@@ -299,7 +299,7 @@ class TraverseServer(Node):
         plan, report = self._results.take(judgement, identity, rover, spacing)
         if judgement.traversable and judgement.candidate is not None:
             poses = judgement.candidate.poses
-            self.watch.accept(poses, lambda: identity.path_hash or path_hash(plan))
+            self.watch.accept(poses, identity.path_hash or path_hash(plan))
         return plan, report
 
     def _tell_stop(self, judgement: Judgement, watched: str, situation: Situation) -> None:

@@ -38,6 +38,7 @@ def declare_parameters(node: Node, table: type[Table]) -> Table:
     """
     found = []
     for spec in specs_of(table):
+        _refuse_empty_list(node, table, spec)
         try:
             node.declare_parameter(spec.name, spec.ros_default, _descriptor(spec))
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
@@ -95,6 +96,18 @@ def follow_changes(
 
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(pass_on)
+
+
+def _refuse_empty_list(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:
+    """Raise ParameterError if an override is [], which ROS takes for one without a value."""
+    given = node._parameter_overrides.get(spec.name)
+    if given is None or given.type_ != Parameter.Type.NOT_SET:
+        return
+    replace(table(), **{spec.name: ()})
+    raise ParameterError(
+        f"parameter {spec.name} is [], which has no type in ROS; leave it out, its default is "
+        f"{spec.ros_default}"
+    )
 
 
 def _explain_override(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:

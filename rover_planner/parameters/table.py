@@ -79,8 +79,9 @@ class ParameterSpec:
                 of the choices.
         """
         if type(value) is not type(self.default):
+            shown = list(value) if isinstance(value, tuple) else value
             raise ParameterError(
-                f"parameter {self.name} is {value!r}; it must be of "
+                f"parameter {self.name} is {shown!r}; it must be of "
                 f"type {self.type_name}, such as {self.ros_default!r}"
             )
         if isinstance(value, tuple):

@@ -54,9 +54,33 @@ def test_the_place_follows_a_path_that_crosses_itself():
     crossing = path.find_place(loop[100], last=95)
     assert crossing.index == 100
     assert path.find_place(np.array([0.0, 0.0, 0.0]), last=0).index < 10
-    assert path.find_place(loop[-1]).remaining == pytest.approx(0.0, abs=0.1)
+    assert path.find_place(loop[-1], last=190).remaining == pytest.approx(0.0, abs=0.1)
     on_the_spot = np.column_stack([np.zeros(50), np.zeros(50), np.linspace(0.0, 3.0, 50)])
     assert WatchedPath(on_the_spot).find_place(np.array([0.0, 0.0, 1.5])).index in (24, 25)
+
+
+def test_a_path_that_comes_back_to_its_start_is_watched_from_the_start(service):
+    turn = np.linspace(0.0, 2.0 * np.pi, 400)
+    loop = np.column_stack([np.sin(turn), 1.0 - np.cos(turn), turn])
+    for error in ((0.0, 0.0, -0.02), (-0.01, 0.0, 0.0), (-0.02, 0.01, -0.01)):
+        monitor = PathMonitor(WatchSettings())
+        assert monitor.take_path(WatchedPath(loop), sight(service, error))
+        found = monitor.look(sight(service, error))
+        assert found.state == WATCHING and found.place.remaining > 6.0
+
+
+def test_the_place_goes_on_where_a_path_backs_up():
+    there = np.linspace(0.0, 0.6, 31)
+    x = np.concatenate([there, there[-2::-1]])
+    path = WatchedPath(np.column_stack([x, np.zeros((len(x), 2))]))
+    random, last, found = np.random.default_rng(3), 0, []
+    for place in np.interp(np.arange(0.0, 60.0, 0.25), np.arange(len(x)), x):
+        last = path.find_place(
+            np.array([place, 0.05, 0.0]) + random.normal(0.0, 0.003, 3), last
+        ).index
+        found.append(last)
+    assert np.abs(np.array(found) - np.arange(0.0, 60.0, 0.25)).max() <= 2.0
+    assert path.is_end(path.find_place(np.array([0.0, 0.3, 0.0]), last).index)
 
 
 def test_a_wall_ahead_stops_and_one_behind_does_not(service):

@@ -24,10 +24,11 @@ from rover_planner.ros.qos import map_subscriptions_qos
 def make_node(ros):
     nodes = []
 
-    def make(**overrides):
+    def make(*words, **overrides):
         node = Node(
             "parameter_test",
             context=ros.context,
+            cli_args=["--ros-args", *words],
             parameter_overrides=[
                 Parameter(name, value=value) for name, value in overrides.items()
             ],
@@ -170,6 +171,16 @@ def test_an_array_of_names_is_taken_from_ros(make_node):
 def test_a_bad_override_is_refused_at_the_start(make_node, name, value):
     with pytest.raises(ParameterError, match=f"parameter {name}"):
         declare_parameters(make_node(**{name: value}), TraverseServerParameters)
+
+
+def test_an_empty_list_is_refused_in_one_line(make_node):
+    for name, text in (
+        ("friction", r"is \[\]; it must be of type double"),
+        ("joint_map", r"is \[\], which has no type in ROS; leave it out, its default is "),
+        ("base_offset", r"is \[\]; it must hold 6 finite numbers"),
+    ):
+        with pytest.raises(ParameterError, match=f"parameter {name} {text}"):
+            declare_parameters(make_node("-p", f"{name}:=[]"), TraverseServerParameters)
 
 
 def test_a_bad_override_is_refused_in_the_words_of_the_table(make_node):

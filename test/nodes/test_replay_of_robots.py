@@ -4,10 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from nav_msgs.msg import Path as PathMessage
+from rclpy.serialization import deserialize_message
+from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_planner.cli import main
 from rover_planner.planning.navigation.transforms import Rigid
 from support.messages.grid_maps import grid_map_of
 from support.messages.recorded_drives import (
@@ -17,6 +22,7 @@ from support.messages.recorded_drives import (
     imu_at,
     joints_of,
     odometry_at,
+    path_to,
     record,
     record_grid_map,
     record_with_transforms,
@@ -130,3 +136,52 @@ def test_joints_with_the_names_of_the_robot_are_measured(tmp_path, capsys):
     (answer,), _ = replay(capsys, bag, tmp_path / "out", "--parameters", str(file))
     measured = np.load(tmp_path / "out" / answer["measured"])
     assert np.isfinite(measured["bogie_angle"]).all()
+
+
+def messages_on(bag, topic, kind):
+    """Return the messages of a topic."""
+    with Reader(bag) as reader:
+        connections = [one for one in reader.connections if one.topic == topic]
+        found = reader.messages(connections)
+        return [deserialize_message(bytes(raw), kind) for _, _, raw in found]
+
+
+def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_joints(
+    tmp_path, capsys
+):
+    messages = [("/elevation_cloud", cloud(waves())), ("/traverse_server/path", path_to(2.0))]
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {base_offset: [0.2, 0.1, 0.3, 0.0, 0.0, 0.0], "
+        "joint_map: ['bogie_right:bogie_r:-1']}}\n"
+    )
+    words = ["--parameters", str(file), "--start", "1,0,0", "--goal", "2,0,0"]
+    answers, _ = replay(capsys, bag, tmp_path / "out", *words)
+    assert [answer["kind"] for answer in answers] == ["can_traverse", "check_path"]
+    sent = path_to(2.0).poses[0].pose.position
+    for answer, begin in zip(answers, ((1.0, 0.0), (sent.x, sent.y)), strict=True):
+        poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
+        np.testing.assert_allclose(poses[0, :2], np.add(begin, (0.2, 0.1)), atol=1e-6)
+    told = tmp_path / "out" / "predictions"
+    plan = messages_on(told, "/traverse_server/plan", PathMessage)[0].poses[0].pose.position
+    np.testing.assert_allclose([plan.x, plan.y], [1.0, 0.0], atol=0.1)  # the rover leans
+    for joints in messages_on(told, "/traverse_server/predicted_joints", JointTrajectory):
+        assert "bogie_r" in joints.joint_names and "bogie_right" not in joints.joint_names
+
+
+def test_a_wrong_joint_map_is_bad_input(tmp_path, capsys):
+    bag, file = (
+        record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))]),
+        tmp_path / "p.yaml",
+    )
+    file.write_text("/**: {ros__parameters: {joint_map: ['bogie:b']}}\n")
+    assert main(["replay", str(bag), str(tmp_path / "out"), "--parameters", str(file)]) == 2
+    assert "joint_map has joint 'bogie', which the model does not have" in capsys.readouterr().err
+
+
+def test_a_goal_without_a_start_is_told(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
+    assert main(["replay", str(bag), str(tmp_path / "out"), "--goal", "2,0,0"]) == 0
+    assert "no odometry before them tells where it starts" in capsys.readouterr().err
+    assert main(["replay", str(bag), str(tmp_path / "no"), "--start", "2,0,0"]) == 2
+    assert "--goal, which is not given" in capsys.readouterr().err

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rover_physics.errors import RoverFileError
 from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of
-from rover_physics.names import SIDES
+from rover_physics.names import SIDES, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
@@ -25,6 +26,10 @@ PASSIVE = 0.0
 """Effort of a joint without a drive."""
 PIVOT_SPEED = 10.0
 """Velocity limit of a joint without a drive [rad/s]; URDF demands one."""
+ROOT = "base_link"
+"""Name of the body's link."""
+OTHER_LINKS = (ROOT, *WHEELS, ARM_TIP)
+"""Links without the name of their joint."""
 X, Y, Z = np.eye(3)
 ALONG_Y = "1.5707963267948966 0 0"
 """Roll, pitch, yaw that turn a cylinder's axis from z to y [rad]."""
@@ -47,8 +52,15 @@ def write_urdf(path: Path, rover: Rover) -> None:
         rover: The rover.
 
     Raises:
-        RoverFileError: It cannot be written.
+        RoverFileError: It cannot be written, or a joint of the arm has the name of a link.
     """
+    arm = rover.manipulator
+    taken = next((name for name in arm.joints if name in OTHER_LINKS), None) if arm else None
+    if taken is not None:
+        raise RoverFileError(
+            f"manipulator.joints has {taken!r}, which is a link of the URDF; its links have the "
+            "names of their joints: give this one another name"
+        )
     top = ElementTree.Element("robot", name=rover.name)
     # MuJoCo: keeps links that are fixed to another one, and what is only seen.
     extension = ElementTree.SubElement(top, "mujoco")
@@ -84,7 +96,7 @@ class _Writer:
         low = np.array([belly.x[0], belly.y[0], belly.z])
         height = max(BAR, 2.0 * (com[2] - belly.z))
         high = np.array([belly.x[1], belly.y[1], belly.z + height])
-        link = self._link("base_link", mass, com, high - low)
+        link = self._link(ROOT, mass, com, high - low)
         for use in ("visual", "collision"):
             _box(link, use, low, high)
 
@@ -100,7 +112,7 @@ class _Writer:
         self._frame(rocker_name, masses.rocker.mass, mirror * masses.rocker.com, rocker,
                     [bogie, wheels[alone]])  # fmt: skip
         self._frame(bogie_name, masses.bogie.mass, mirror * masses.bogie.com, bogie, hung)
-        joint = self._joint(rocker_name, "base_link", rocker_name, rocker, Y)
+        joint = self._joint(rocker_name, ROOT, rocker_name, rocker, Y)
         _limit(joint, suspension.rocker_limits, PASSIVE, PIVOT_SPEED)
         if side == "left":
             ElementTree.SubElement(
@@ -143,7 +155,7 @@ class _Writer:
     def _arm(self, arm: Manipulator) -> None:
         """Append the arm: column, two links along x, and the tip with its payload."""
         points = link_points(arm, np.zeros(3))
-        parent, place = "base_link", points[0]
+        parent, place = ROOT, points[0]
         for k, (joint_name, axis) in enumerate(zip(arm.joints, (Z, Y, Y), strict=True)):
             step = points[k + 1] - points[k]
             link = self._link(joint_name, arm.link_masses[k], 0.5 * step, np.abs(step))

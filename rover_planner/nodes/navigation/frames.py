@@ -10,12 +10,12 @@ from nav_msgs.msg import Odometry, Path
 from numpy.typing import NDArray
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from scipy.spatial.transform import Rotation
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import read_transform
 from msg_adapters.paths import pose_to_array
 from msg_adapters.stamps import stamp_to_ns
+from rover_planner.planning.navigation.rigid_poses import move_path, read_pose, write_pose
 from rover_planner.planning.navigation.transforms import (
     Rigid,
     TransformError,
@@ -153,7 +153,7 @@ class Frames:
         if not is_here:
             stamp = stamp_to_ns(stamped.header.stamp)
             rigid = self._tree.find(self._map, frame, stamp, self._now()).then(rigid)
-        moved = PoseStamped(pose=_write_pose(self._to_body(rigid)))
+        moved = PoseStamped(pose=_make_pose(self._to_body(rigid)))
         moved.header.stamp = stamped.header.stamp
         moved.header.frame_id = frame if is_here else self._map
         return moved
@@ -185,12 +185,8 @@ class Frames:
 
     def to_base(self, path: Path) -> Path:
         """Change a path of the body into one of the robot, in place, and return it."""
-        if self._offset is not None:
-            back = self._offset.inverse()
-            for stamped in path.poses:
-                moved = _write_pose(read_pose(stamped.pose).then(back))
-                _copy_pose(moved, stamped.pose)
-        return path
+        moved: Path = move_path(path, None if self._offset is None else self._offset.inverse())
+        return moved
 
     def _to_body(self, robot: Rigid) -> Rigid:
         return robot if self._offset is None else robot.then(self._offset)
@@ -215,26 +211,7 @@ def is_empty(stamped: PoseStamped) -> bool:
     return not stamped.header.frame_id and not any(rest) and turn.w in (0.0, 1.0)
 
 
-def read_pose(pose: Pose) -> Rigid:
-    """Return the transform of a pose from the frame that it is in."""
-    place, turn = pose.position, pose.orientation
-    return Rigid(
-        np.array([place.x, place.y, place.z]),
-        Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]),
-    )
-
-
-def _write_pose(rigid: Rigid) -> Pose:
+def _make_pose(rigid: Rigid) -> Pose:
     pose = Pose()
-    place, turn = pose.position, pose.orientation
-    place.x, place.y, place.z = rigid.translation.tolist()
-    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
+    write_pose(rigid, pose)
     return pose
-
-
-def _copy_pose(source: Pose, target: Pose) -> None:
-    """Copy numbers: the messages of a plan are reused, and their parts are known elsewhere."""
-    for part in ("position", "orientation"):
-        one, other = getattr(source, part), getattr(target, part)
-        for name in one.get_fields_and_field_types():
-            setattr(other, name, getattr(one, name))

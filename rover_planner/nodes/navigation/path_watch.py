@@ -108,14 +108,14 @@ class PathWatch:
         self._timer.timer_period_ns = round(1e9 * period)
         self._timer.reset()
 
-    def accept(self, poses: NDArray[np.float64], find_hash: Callable[[], str]) -> None:
+    def accept(self, poses: NDArray[np.float64], about: str) -> None:
         """Watch a path that was judged traversable, from the next look on.
 
         Args:
             poses: (n, 3) x, y [m] and yaw [rad] of its waypoints, map frame.
-            find_hash: Returns its hash.
+            about: Its hash.
         """
-        self._last_path = WatchedPath(poses, find_hash() if self.enabled else "")
+        self._last_path = WatchedPath(poses, about)
         if self.enabled:
             self._set_path(self._last_path)
 

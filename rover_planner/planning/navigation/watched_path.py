@@ -15,6 +15,11 @@ LOOK_BACK = 0.3
 TURN_LENGTH = 0.3
 """Distance [m] that counts as much as one radian of heading, to tell places where the path
 crosses itself or turns on the spot."""
+AHEAD_WEIGHT, BEHIND_WEIGHT = 0.05, 0.3
+"""Of two places that are as near, such as start and end of a path that comes back, the one less
+far along the path counts; going back counts more than going on."""
+MOST_AHEAD = 10.0
+"""Distance along the path from which on places count as equally far [m]."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class WatchedPath:
         Args:
             pose: (3,) x, y [m] and yaw [rad] of the body.
             last: Index of the waypoint found last; only those around it are looked at. None looks
-                at all.
+                at all, for a rover that has yet to drive the path.
         """
         along = self.distances
         first, end = 0, len(self.poses)
@@ -59,7 +64,14 @@ class WatchedPath:
             end = int(np.searchsorted(along, along[last] + LOOK_AHEAD, side="right"))
         away = np.hypot(*(self.poses[first:end, :2] - pose[:2]).T)
         turned = wrap(self.poses[first:end, 2] - pose[2])
-        nearest = int(np.argmin(np.hypot(away, TURN_LENGTH * turned)))
+        apart = np.hypot(away, TURN_LENGTH * turned)
+        on = along[first:end] - along[0 if last is None else last]
+        likely = (
+            apart
+            + AHEAD_WEIGHT * np.clip(on, 0.0, MOST_AHEAD)
+            - BEHIND_WEIGHT * np.minimum(on, 0.0)
+        )
+        nearest = _descend(apart, int(np.argmin(likely)))
         index = first + nearest
         return Place(index, float(away[nearest]), float(along[-1] - along[index]))
 
@@ -83,3 +95,13 @@ class WatchedPath:
     def is_end(self, index: int) -> bool:
         """Return whether a waypoint is the last one."""
         return index >= len(self.poses) - 1
+
+
+def _descend(values: NDArray[np.float64], index: int) -> int:
+    """Return the index (n,) of the local minimum that lies downhill of an index."""
+    while True:
+        low = max(0, index - 1)
+        lowest = low + int(np.argmin(values[low : index + 2]))
+        if values[lowest] >= values[index]:
+            return index
+        index = lowest

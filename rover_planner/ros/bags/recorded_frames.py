@@ -2,12 +2,16 @@
 
 from typing import Any
 
-from nav_msgs.msg import Odometry
+import numpy as np
+from nav_msgs.msg import Odometry, Path
+from numpy.typing import NDArray
 
 from msg_adapters.frames import check_frame, read_transform
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
+from msg_adapters.paths import path_to_poses
 from msg_adapters.stamps import stamp_to_ns
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.navigation.rigid_poses import move_path, read_pose
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.navigation.transforms import Rigid, TransformTree, stamped_transform
 
@@ -61,6 +65,31 @@ class RecordedFrames:
             return found
         body = robot if self._offset is None else robot.then(self._offset)
         return *body.translation.tolist(), *body.rotation.as_euler("xyz").tolist()
+
+    def locate_path(self, path: Path) -> NDArray[np.float64]:
+        """Return (n, 3) x, y [m], yaw [rad] of the body at the poses of a path of the robot.
+
+        Raises:
+            MessageError: As `path_to_poses`.
+        """
+        poses = path_to_poses(path, self._map)
+        if self._offset is None:
+            return poses
+        offset = self._offset
+        return np.array([read_pose(stamped.pose).then(offset).xyyaw for stamped in path.poses])
+
+    def locate_pose(self, pose: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return x, y [m], yaw [rad] of the body where the robot is level at such a pose."""
+        if self._offset is None:
+            return pose
+        x, y, yaw = pose
+        found = Rigid.from_rpy(x, y, 0.0, 0.0, 0.0, yaw).then(self._offset).xyyaw.tolist()
+        return found[0], found[1], found[2]
+
+    def to_base(self, path: Path) -> Path:
+        """Change a path of the body into one of the robot, in place, and return it."""
+        moved: Path = move_path(path, None if self._offset is None else self._offset.inverse())
+        return moved
 
     def find_source(self, message: Any, topic: str, recorded: int) -> Rigid | None:
         """Return where the frame of a map's message was in the map's; None if it is that.

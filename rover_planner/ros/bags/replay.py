@@ -12,8 +12,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joint_map import read_joint_map
-from msg_adapters.paths import path_to_poses
+from msg_adapters.joint_map import JointMap, read_joint_map
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
@@ -97,6 +96,8 @@ class Replay:
     """Number of messages that could not be used, by input."""
     notes: list[str] = field(default_factory=list)
     """Why, for the first MAX_NOTES of them."""
+    without_start: int = 0
+    """Number of new maps without a question for the goal, as nothing told where it starts."""
 
     def __post_init__(self) -> None:
         self._service = TraverseService(load_service_settings(self.parameters))
@@ -113,8 +114,10 @@ class Replay:
         self._pose: NDArray[np.float64] | None = None
         self._measured = Measurements()  # by the times of the recording
         self._looked = -float("inf")
-        self._frames = RecordedFrames(values)
-        self._joint_names = read_joint_map(values.joint_map, self._service.all_joint_names)
+        self.frames = RecordedFrames(values)
+        """Where things are on the map."""
+        self.joint_names = _read_joint_map(values, self._service.all_joint_names)
+        """Names of the joints in messages."""
         self._imu = ImuMounting(values.imu_frame or BASE_FRAME, values.imu_mounting)
         self._take: dict[str, Callable[[Recorded], Iterator[Answer]]] = {
             MAP: self._take_map,
@@ -143,7 +146,7 @@ class Replay:
     def _take_map(self, recorded: Recorded) -> Iterator[Answer]:
         message, values = recorded.message, self.parameters
         stamp = stamp_to_ns(message.header.stamp)
-        source = self._frames.find_source(message, recorded.topic, recorded.stamp)
+        source = self.frames.find_source(message, recorded.topic, recorded.stamp)
         if isinstance(message, PointCloud2):
             size, height = values.map_resolution, values.cell_height
             move = None if source is None else PointMove(*source.matrix)
@@ -159,10 +162,12 @@ class Replay:
         goal = self.questions.goal
         if not is_new or goal is None:
             return
-        start: ArrayLike | None = self.questions.start
-        start = self._pose if start is None else start
-        if start is not None:
-            yield self._ask(PLANNED, recorded.stamp, lambda now: now.answer(start, goal))
+        given, end = self.questions.start, self.frames.locate_pose(goal)
+        start: ArrayLike | None = self._pose if given is None else self.frames.locate_pose(given)
+        if start is None:
+            self.without_start += 1
+            return
+        yield self._ask(PLANNED, recorded.stamp, lambda now: now.answer(start, end))
 
     def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> bool:
         """Keep a map in the service; return whether its content is new."""
@@ -170,13 +175,13 @@ class Replay:
         return self._service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
 
     def _take_joints(self, recorded: Recorded) -> Iterator[Answer]:
-        positions = self._joint_names.positions(recorded.message, self._service.joint_names)
+        positions = self.joint_names.positions(recorded.message, self._service.joint_names)
         self._service.take_joints(positions)
         self._measured.take_joints(positions, recorded.stamp / NANOSECONDS)
         yield from ()
 
     def _take_transforms(self, recorded: Recorded) -> Iterator[Answer]:
-        self._frames.take(recorded.message, is_static=recorded.kind == TF_STATIC)
+        self.frames.take(recorded.message, is_static=recorded.kind == TF_STATIC)
         yield from ()
 
     def _take_imu(self, recorded: Recorded) -> Iterator[Answer]:
@@ -187,7 +192,7 @@ class Replay:
         yield from ()
 
     def _take_odometry(self, recorded: Recorded) -> Iterator[Answer]:
-        x, y, z, roll, pitch, yaw = self._frames.locate(recorded.message, recorded.stamp)
+        x, y, z, roll, pitch, yaw = self.frames.locate(recorded.message, recorded.stamp)
         self._pose, now = np.array([x, y, yaw]), recorded.stamp / NANOSECONDS
         self._service.take_pose(self._pose)
         self._measured.take_pose(self._pose, now, (z, roll, pitch))
@@ -213,7 +218,7 @@ class Replay:
             self._service.amend_map(filled.terrain, filled.sources)
 
     def _take_path(self, recorded: Recorded) -> Iterator[Answer]:
-        poses = path_to_poses(recorded.message, self.parameters.map_frame)
+        poses = self.frames.locate_path(recorded.message)
         about = path_hash(recorded.message), stamp_text(stamp_to_ns(recorded.message.header.stamp))
         self._service.take_path(poses, *about)
         yield self._ask(CHECKED, recorded.stamp, Situation.check_path)
@@ -247,3 +252,11 @@ class Replay:
         identity = self._register.identify(number, kind, "", now)
         identity = replace(identity, path_hash=now.path.hash, path_stamp=now.path.stamp)
         return Answer(kind, stamp, judgement, identity, now.terrain)
+
+
+def _read_joint_map(values: TraverseServerParameters, known: tuple[str, ...]) -> JointMap:
+    """Return the joint map of the parameters; a wrong one is bad input, not a bad message."""
+    try:
+        return read_joint_map(values.joint_map, known)
+    except MessageError as error:
+        raise PlanningError(str(error)) from None

@@ -1,5 +1,6 @@
 """The grid of square cells that all parts of a living map share, and maps laid onto it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -60,6 +61,12 @@ class CellBox:
         end_column = max(self.column + self.columns, other.column + other.columns)
         return CellBox(row, column, end_row - row, end_column - column)
 
+    def cut(self, other: "CellBox") -> "CellBox":
+        """Return the part of this box that lies in another one; it may have no cells."""
+        rows, columns = other.within(self)
+        row, column = self.row + rows.start, self.column + columns.start
+        return CellBox(row, column, rows.stop - rows.start, columns.stop - columns.start)
+
     def within(self, other: "CellBox") -> tuple[slice, slice]:
         """Return the rows and columns of `other` that this box covers; both may be empty."""
         rows = _overlap(self.row - other.row, self.rows, other.rows)
@@ -81,29 +88,69 @@ class Patch:
     """Layers (rows, columns): elevation, and elevation_std, friction and soil if there are."""
 
 
+_Lay = Callable[[Terrain, CellGrid, CellBox], Patch]
+"""Lays a map onto the cells of a box."""
+
+
 def grid_of(terrain: Terrain) -> CellGrid:
     """Return the grid of which the cells of a terrain are a part."""
     return CellGrid(terrain.origin, terrain.resolution)
 
 
-def lay_onto(terrain: Terrain, grid: CellGrid) -> Patch:
+def box_on(terrain: Terrain, grid: CellGrid) -> CellBox:
+    """Return the cells of a grid onto which `lay_onto` lays a map."""
+    return _place_on(terrain, grid)[1]
+
+
+def lay_onto(terrain: Terrain, grid: CellGrid, within: CellBox | None = None) -> Patch:
     """Lay a map onto the cells of a grid.
 
     A map whose cells are those of the grid keeps its values to the bit. One with cells of about
     the same size or larger is interpolated bilinearly; a cell is then unknown if one of the four
     around it is. Of several finer cells in one cell, the highest height, the largest standard
     deviation and the lowest friction count.
+
+    Args:
+        terrain: The map.
+        grid: The grid.
+        within: Cells that are wanted; others are left out where they would be interpolated, as
+            they may be many times those of the map.
     """
+    lays, box = _place_on(terrain, grid)
+    return lays(
+        terrain, grid, box if within is None or lays is not _interpolate else box.cut(within)
+    )
+
+
+def _place_on(terrain: Terrain, grid: CellGrid) -> tuple[_Lay, CellBox]:
+    """Return how a map is laid onto a grid, and the cells that it takes there."""
     column, row = grid.coordinates(*terrain.origin)
     ny, nx = terrain.elevation.shape
     ratio = terrain.resolution / grid.resolution
     first = round(row), round(column)
     drift = abs(ratio - 1.0) * max(ny, nx)
     if max(abs(row - first[0]), abs(column - first[1])) + drift <= MAX_OFF_CENTRE:
-        return Patch(CellBox(*first, ny, nx), _layers_of(terrain))
+        return _copy, CellBox(*first, ny, nx)
     if ratio < MAX_FINER:
-        return _combine(terrain, grid)
-    return _interpolate(terrain, grid, (row, column), ratio)
+        rows, columns = _cells_of(terrain, grid)
+        low, high = (int(rows[0]), int(columns[0])), (int(rows[-1]), int(columns[-1]))
+        return _combine, CellBox(*low, high[0] - low[0] + 1, high[1] - low[1] + 1)
+    ends = row + (ny - 1) * ratio, column + (nx - 1) * ratio
+    low = int(np.ceil(row - 1e-6)), int(np.ceil(column - 1e-6))
+    counts = [
+        max(int(np.floor(end + 1e-6)) - start + 1, 0) for end, start in zip(ends, low, strict=True)
+    ]
+    return _interpolate, CellBox(*low, *counts)
+
+
+def _cells_of(terrain: Terrain, grid: CellGrid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the rows (ny,) and columns (nx,) of a grid in which the cells of a map are."""
+    ny, nx = terrain.elevation.shape
+    columns, rows = grid.coordinates(
+        terrain.origin[0] + terrain.resolution * np.arange(nx),
+        terrain.origin[1] + terrain.resolution * np.arange(ny),
+    )
+    return np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
 
 
 def _layers_of(terrain: Terrain) -> dict[str, Layer]:
@@ -112,17 +159,13 @@ def _layers_of(terrain: Terrain) -> dict[str, Layer]:
     return {name: layer for name, layer in layers.items() if layer is not None}
 
 
-def _interpolate(
-    terrain: Terrain, grid: CellGrid, start: tuple[float, float], ratio: float
-) -> Patch:
-    ny, nx = terrain.elevation.shape
-    ends = start[0] + (ny - 1) * ratio, start[1] + (nx - 1) * ratio
-    first = [int(np.ceil(value - 1e-6)) for value in start]
-    counts = [
-        max(int(np.floor(end + 1e-6)) - low + 1, 0) for end, low in zip(ends, first, strict=True)
-    ]
-    x = grid.anchor[0] + grid.resolution * (first[1] + np.arange(counts[1]))
-    y = grid.anchor[1] + grid.resolution * (first[0] + np.arange(counts[0]))[:, None]
+def _copy(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
+    return Patch(box, _layers_of(terrain))
+
+
+def _interpolate(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
+    x = grid.anchor[0] + grid.resolution * (box.column + np.arange(box.columns))
+    y = grid.anchor[1] + grid.resolution * (box.row + np.arange(box.rows))[:, None]
     bounds = terrain.bounds
     x, y = np.clip(x, *bounds[:2]), np.clip(y, *bounds[2:])
     layers: dict[str, Layer] = {"elevation": terrain.elevation_at(x, y)}
@@ -135,18 +178,12 @@ def _interpolate(
         layer = getattr(terrain, name)
         if layer is not None:
             layers[name] = layer[i, j]
-    return Patch(CellBox(first[0], first[1], counts[0], counts[1]), layers)
+    return Patch(box, layers)
 
 
-def _combine(terrain: Terrain, grid: CellGrid) -> Patch:
-    ny, nx = terrain.elevation.shape
-    columns, rows = grid.coordinates(
-        terrain.origin[0] + terrain.resolution * np.arange(nx),
-        terrain.origin[1] + terrain.resolution * np.arange(ny),
-    )
-    j, i = np.rint(columns).astype(int), np.rint(rows).astype(int)
-    box = CellBox(int(i[0]), int(j[0]), int(i[-1] - i[0]) + 1, int(j[-1] - j[0]) + 1)
-    at = (i - i[0])[:, None], (j - j[0])[None, :]
+def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
+    rows, columns = _cells_of(terrain, grid)
+    at = (rows - box.row)[:, None], (columns - box.column)[None, :]
     layers: dict[str, Layer] = {}
     for name, layer in _layers_of(terrain).items():
         if name == "soil":

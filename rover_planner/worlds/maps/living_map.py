@@ -4,6 +4,7 @@ The window grows with what is seen, or rolls with the rover. Heights that a newe
 stay. Each cell knows its source and its time.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,15 @@ from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
-from rover_planner.worlds.maps.cells import CellBox, CellGrid, Layer, Patch, grid_of, lay_onto
+from rover_planner.worlds.maps.cells import (
+    CellBox,
+    CellGrid,
+    Layer,
+    Patch,
+    box_on,
+    grid_of,
+    lay_onto,
+)
 from rover_planner.worlds.maps.layers import Window, empty_window
 from rover_planner.worlds.maps.sources import (
     CONTACT,
@@ -121,16 +130,14 @@ class LivingMap:
             centre: Place x, y [m] of the rover, for a rolling window; None: the middle of the map.
 
         Raises:
-            PlanningError: The window would be too large.
+            PlanningError: The window would be too large; all stays as it was.
         """
-        self._choose_grid(terrain)
-        assert self._grid is not None
-        self._rolls = self.rules.window > 0.0
-        patch = lay_onto(terrain, self._grid)
-        if centre is None:
-            x0, x1, y0, y1 = terrain.bounds
-            centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-        window = self._room_for(patch.box, centre)
+        before = self._grid, self._window, self._rolls
+        try:
+            window, patch = self._lay(terrain, centre)
+        except PlanningError:
+            self._grid, self._window, self._rolls = before
+            raise
         if time < self._last.get(source, time):
             layers = window.layers | {"time": np.minimum(window.layers["time"], time)}
             window = Window(window.box, layers)
@@ -138,6 +145,17 @@ class LivingMap:
         take = self._wins(window, patch, time)
         self._window = window.written(patch, take, self._index_of(source), time)
         self._whole = None
+
+    def _lay(self, terrain: Terrain, centre: tuple[float, float] | None) -> tuple[Window, Patch]:
+        """Return a window with room for a local map, and the map on its cells."""
+        self._choose_grid(terrain)
+        assert self._grid is not None
+        self._rolls = self.rules.window > 0.0
+        if centre is None:
+            x0, x1, y0, y1 = terrain.bounds
+            centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        window = self._room_for(box_on(terrain, self._grid), centre)
+        return window, lay_onto(terrain, self._grid, window.box)
 
     def fill(self, patch: Patch, is_contact: Layer, time: float) -> bool:
         """Fill cells under the rover; return whether any changed.
@@ -240,9 +258,15 @@ class LivingMap:
         old = self._window
         wanted = self._wanted_box(box, centre)
         if wanted.cells > self.rules.max_cells:
+            most = self.rules.max_cells
+            advice = "set map_window to the side of a window around the rover"
+            if self._rolls:
+                assert self._grid is not None
+                side = math.isqrt(most) * self._grid.resolution
+                advice = f"map_window is {self.rules.window:g} m, set it to at most {side:.4g} m"
             raise PlanningError(
                 f"the map would have {wanted.rows} x {wanted.columns} cells; max_map_cells is "
-                f"{self.rules.max_cells}: set map_window to the side of a window around the rover"
+                f"{most}: {advice}"
             )
         if old is not None and old.box == wanted:
             return old
@@ -263,7 +287,7 @@ class LivingMap:
             return old if is_kept and old is not None else CellBox(row, column, n, n)
         if old is None:
             loaded = self._loaded
-            return box if loaded is None else lay_onto(loaded, self._grid).box.union(box)
+            return box if loaded is None else box_on(loaded, self._grid).union(box)
         if old.contains(box):
             return old
         union = old.union(box)
@@ -281,7 +305,7 @@ class LivingMap:
     def _with_loaded(self, window: Window) -> Window:
         """Return a window whose unknown cells are those of the loaded map."""
         assert self._loaded is not None and self._grid is not None
-        patch = lay_onto(self._loaded, self._grid)
+        patch = lay_onto(self._loaded, self._grid, window.box)
         std = self._std_to_add()
         if std > 0.0:
             known = np.isfinite(patch.layers["elevation"])

@@ -13,6 +13,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.identity import path_hash
 from msg_adapters.paths import stamped_pose
 from rover_physics.prediction.sweep import sweep_path
 from rover_planner.ros.qos import latched_qos
@@ -209,12 +210,14 @@ def test_the_service_turns_the_monitor_on_and_off(start_server, client, ros):
     rover = ros.spin(Rover(ros))
     client.send_terrain(make_terrain(waves))
     wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
-    assert client.can_traverse(START, GOAL).poses
+    plan = client.can_traverse(START, GOAL)
+    assert plan.poses
     switch = rover.create_client(SetBool, f"{SERVER}/monitor")
     assert call(switch, SetBool.Request(data=True)).success
     assert server.get_parameter("monitor").value is True
     rover.wait_for_stop(False)
     wait_until(lambda: server.watch.finding.state == "watching", "the watch")
+    assert server.watch.finding.path_hash == path_hash(plan)
     client.send_terrain(make_terrain(wall_at(0.5)))
     rover.wait_for_stop()
     assert call(switch, SetBool.Request(data=False)).success

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -339,3 +340,13 @@ def test_the_joint_map_of_the_guide_is_one():
     page = Path(__file__).parents[3] / "docs" / "integration" / "robot.md"
     (block,) = re.findall(r"```yaml\n(axes:.*?)```", page.read_text(), re.DOTALL)
     assert set(yaml.safe_load(block)) == {"axes", "rocker", "bogie", "wheels", "steering", "rover"}
+
+
+@pytest.mark.parametrize("name", ["base_link", "front_left", "arm_tip"])
+def test_a_joint_of_the_arm_with_the_name_of_a_link_is_refused(name, tmp_path):
+    rover = load_rover("lsr1")
+    joints = ("arm_yaw", name, "arm_elbow")
+    named = replace(rover, manipulator=replace(rover.manipulator, joints=joints))
+    with pytest.raises(RoverFileError, match=f"manipulator.joints has '{name}'"):
+        write_urdf(tmp_path / "rover.urdf", named)
+    assert not (tmp_path / "rover.urdf").exists()

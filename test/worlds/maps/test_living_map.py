@@ -234,3 +234,38 @@ def test_replacing_keeps_nothing_and_the_terrain_itself():
     now = living.snapshot()
     assert now.terrain is only and not living.has_loaded
     assert UNKNOWN not in now.sources.source
+
+
+def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():
+    living = LivingMap(MergeRules(max_cells=1_000_000))
+    living.load(PRIOR, 0.0)
+    with pytest.raises(PlanningError, match="max_map_cells is 1000000"):
+        living.merge(local_map((0.0, 0.0), resolution=1e-5), TOPIC, 1.0)
+    assert living.snapshot().terrain is PRIOR
+    living.merge(local_map(PRIOR.origin, height=1.0), TOPIC, 2.0)
+    assert living.snapshot().terrain.resolution == PRIOR.resolution
+    assert cell(living, *PRIOR.origin)[:2] == (1.0, TOPIC)
+
+
+def test_a_coarse_map_is_laid_only_onto_the_cells_of_a_window():
+    orbital = Terrain(np.add.outer(np.arange(4000.0), np.arange(4000.0)), 1.0, (-2000.0, -2000.0))
+    living = LivingMap(MergeRules(window=4.0))
+    living.load(orbital, 0.0)  # on cells of 1 cm it would have 1.6e11
+    living.merge(local_map((0.0, 0.0), height=1.0, resolution=0.01), TOPIC, 1.0, (0.0, 0.0))
+    assert living.snapshot().terrain.elevation.shape == (400, 400)
+    height, source, _ = cell(living, 1.5, 1.25)
+    assert height == pytest.approx(4002.75, abs=1e-9) and source == "loaded"
+    living.merge(local_map((9.0, 9.0), resolution=0.01), TOPIC, 2.0, (9.0, 9.0))
+    assert cell(living, 10.5, 9.25)[0] == pytest.approx(4019.75, abs=1e-9)
+    living.merge(local_map((5e3, 5e3), resolution=0.01), TOPIC, 3.0, (5e3, 5e3))
+    assert cell(living, 5000.05, 5000.05)[:2] == (0.0, TOPIC)
+
+
+def test_a_window_of_too_many_cells_is_refused_with_one_that_fits():
+    living = LivingMap(MergeRules(window=100.0, max_cells=10_000))
+    with pytest.raises(PlanningError, match=r"map_window is 100 m, set it to at most 5 m"):
+        living.merge(local_map((0.0, 0.0)), TOPIC, 1.0)
+    assert not living.has_cells
+    living.rules = MergeRules(window=5.0, max_cells=10_000)
+    living.merge(local_map((0.0, 0.0)), TOPIC, 2.0)
+    assert living.snapshot().terrain.elevation.shape == (100, 100)
