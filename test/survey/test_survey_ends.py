@@ -1,5 +1,6 @@
 """Surveys that cannot go on end in one line, in order, and leave what they found."""
 
+import math
 import os
 import signal
 import subprocess
@@ -65,6 +66,42 @@ def test_what_cannot_end_well_is_refused_before_a_store_is_made(ground, words, s
     assert main(["survey", "lsr1", str(ground), str(out), *words]) == 2
     err = capfd.readouterr().err
     assert said in err and err.count("\n") == 1 and not out.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [("--workers", "1"), ()])
+def test_a_chunk_beyond_this_machine_is_refused_before_a_store_is_made(tmp_path, workers, capfd):
+    rasterio = pytest.importorskip("rasterio", reason="install the extra survey")
+    side = 64 * 3125  # cells; the file has none of its blocks
+    with rasterio.open(
+        tmp_path / "map.tif", "w", driver="GTiff", width=side, height=side, count=1,
+        dtype="float32", nodata=math.nan, crs="EPSG:32633", tiled=True, blockxsize=8192,
+        blockysize=8192, SPARSE_OK=True, BIGTIFF="YES",
+        transform=rasterio.Affine(1.0, 0.0, 5e5, 0.0, -1.0, 5e6),
+    ):  # fmt: skip
+        pass
+    words = ["survey", "lsr1", str(tmp_path / "map.tif"), str(tmp_path / "out")]
+    assert main([*words, "--chunk", str(side), *workers]) == 2
+    err = capfd.readouterr().err
+    assert f"a chunk of {side} x {side} cells needs" in err and "a worker has" in err
+    assert err.count("\n") == 1 and not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_a_chunk_beyond_the_workers_of_a_scheduler_is_refused_before_a_store_is_made(
+    ground, capfd
+):
+    from distributed import LocalCluster
+
+    out = ground.with_name("out")
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None,
+        protocol="tcp://", memory_limit="300MB",
+    ) as cluster:  # fmt: skip
+        words = ["survey", "lsr1", str(ground), str(out)]
+        assert main([*words, "--scheduler", cluster.scheduler_address]) == 2
+    err = capfd.readouterr().err
+    assert "a worker has 300 MB: give a smaller --chunk" in err and not out.exists()
 
 
 @pytest.mark.slow
