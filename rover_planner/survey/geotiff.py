@@ -16,6 +16,7 @@ import numpy as np
 from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
+from rover_planner.survey.disk.gdal_messages import catch_messages, find_reason
 from rover_planner.survey.layout import Box
 from rover_planner.survey.map_source import Grids, MapFrame
 from rover_planner.survey.store import SurveyStore
@@ -162,8 +163,6 @@ def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
     """
     need("rasterio", "a GeoTIFF")
     rasterio = _import_rasterio()
-    from rasterio.shutil import copy
-
     rows, columns = layer.shape
     size = step * frame.resolution
     left, low = (start - 0.5 * size for start in frame.origin)
@@ -184,18 +183,43 @@ def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
         profile["crs"] = frame.crs
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-            plain, whole = Path(folder) / "plain.tif", Path(folder) / "whole.tif"
+            whole = Path(folder) / "whole.tif"
+            _write_aside(Path(folder) / "plain.tif", whole, layer, profile)
+            whole.replace(path)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise PlanningError(f"{show_file(path)}: cannot be written: {why}") from None
+
+
+def _write_aside(plain: Path, whole: Path, layer: Any, profile: dict[str, Any]) -> None:
+    """Write a layer as a plain GeoTIFF, and that as a COG which is whole and on the disk.
+
+    Raises:
+        OSError: The system refuses, in the words of GDAL if it gives no others.
+    """
+    rasterio = _import_rasterio()
+    from rasterio._err import CPLE_BaseError  # what GDAL raises where rasterio adds nothing
+    from rasterio.shutil import copy
+
+    rows, columns = layer.shape
+    why = ""
+    with catch_messages() as messages:
+        try:
             with rasterio.open(plain, "w", **profile) as file:
                 for first in range(0, rows, BAND):
                     end = min(first + BAND, rows)
                     window = rasterio.windows.Window(0, rows - end, columns, end - first)
                     file.write(layer[first:end][::-1], 1, window=window)
             copy(plain, whole, driver="COG", compress="deflate", overview_resampling="nearest")
-            whole.replace(path)
-    except rasterio.errors.RasterioError as error:
-        raise PlanningError(f"{show_file(path)}: cannot be written: {error}") from None
-    except OSError as error:
-        raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+            with rasterio.open(whole) as file:  # GDAL does not tell of all that it could not write
+                why = _find_missing(file, whole)
+        except (rasterio.errors.RasterioError, CPLE_BaseError) as error:
+            why = str(error)
+    why = find_reason(messages) or why
+    if why:
+        raise OSError(why)
+    with whole.open("rb") as done:
+        os.fsync(done.fileno())
 
 
 def write_layers(store: SurveyStore, folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -214,6 +215,30 @@ def test_a_finished_survey_is_drawn_from_where_nothing_can_be_written(tmp_path, 
     words = ["survey", "lsr1", str(tmp_path / "map.npz"), str(tmp_path / "out"), "--headings", "4"]
     assert main([*words, "--picture", str(tmp_path / "p.png")]) == 0
     assert (tmp_path / "p.png").exists() and capfd.readouterr().err == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("most", [100, 5_000, 12_000, 14_000])
+def test_no_space_for_a_layer_is_one_line_and_leaves_nothing(tmp_path, most):
+    """The size of files is limited, as a full disk cannot be had without rights."""
+    pytest.importorskip("rasterio", reason="install the extra survey")
+    survey_here(tmp_path, make_rough_map(130, 130), make_request())
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+
+    words = [sys.executable, "-m", "rover_planner", "survey", "lsr1", str(tmp_path / "map.npz"),
+             str(tmp_path / "out"), "--headings", "4",
+             "--geotiff", str(tmp_path / "layers")]  # fmt: skip
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=120, preexec_fn=limit)
+    assert ended.returncode == 2, ended.stderr
+    assert ".tif: cannot be written: File too large" in ended.stderr
+    assert ended.stderr.count("\n") == 1
+    rasterio = pytest.importorskip("rasterio")
+    for path in (tmp_path / "layers").iterdir():  # what is there is whole
+        with rasterio.open(path) as layer:
+            layer.read()
 
 
 @pytest.mark.slow
