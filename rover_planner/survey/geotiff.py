@@ -126,7 +126,8 @@ class GeoTiffMap:
         )
         values = file.read(1, window=window, masked=True)
         unknown = np.ma.getmaskarray(values)
-        heights = np.where(unknown, np.nan, values.data.astype(np.float64))
+        with np.errstate(invalid="ignore"):  # of signalling NaNs
+            heights = np.where(unknown, np.nan, values.data.astype(np.float64))
         if file.nodata is None:
             self._check_declared(heights)
         return np.asarray((heights * file.scales[0] + file.offsets[0])[::-1])

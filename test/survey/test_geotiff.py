@@ -2,6 +2,7 @@
 
 import math
 import tracemalloc
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -280,6 +281,16 @@ def test_a_mask_or_a_nodata_value_beside_the_file_makes_another_map(tmp_path):
         hashes.append(GeoTiffMap(path).hash_content())
     assert GeoTiffMap(path).read((slice(0, 1), slice(0, 1)))["elevation"][0, 0] > 6.0
     assert len(set(hashes)) == 4 and hashes[3] == hashes[2]  # an offset of 0 changes no height
+
+
+def test_signalling_nans_are_unknown_without_noise(tmp_path):
+    heights = np.zeros((40, 50), np.float32)
+    heights.view(np.uint32)[3, 4] = 0x7FA00000
+    path = write_tif(tmp_path / "map.tif", heights, nodata=-1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = GeoTiffMap(path).read((slice(0, 40), slice(0, 50)))["elevation"]
+    assert np.isnan(found).sum() == 1 and np.isnan(found[36, 4])
 
 
 def test_a_thinned_map_is_read_by_parts(tmp_path):
