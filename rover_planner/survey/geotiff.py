@@ -91,11 +91,11 @@ class GeoTiffMap:
         """Return a hash of all that heights come from.
 
         That is the file, its mask, which may be a file beside it, and what other files beside it
-        (.aux.xml, .tfw, .prj) may say instead of it.
+        (.aux.xml, .tfw) may say instead of it. The projection changes no height, and versions of
+        GDAL word it differently.
         """
         with self._open() as file:
-            place = tuple(file.transform), file.crs.to_wkt() if file.crs else ""
-            told = repr((place, file.nodata, file.scales, file.offsets))
+            told = repr((tuple(file.transform), file.nodata, file.scales, file.offsets))
             masks = [Path(name) for name in file.files if name.endswith(".msk")]
         found = hashlib.sha256(told.encode())
         for path in (self.path, *masks):
