@@ -54,7 +54,8 @@ def draw_survey(path: Path, store: SurveyStore) -> None:
     labels = [*zip(CLASS_LABELS, CLASS_COLOURS, strict=True), (UNKNOWN_LABEL, _UNKNOWN)]
     rover = store.notes.description["rover"]["name"]
     title = f"{rover}: worst class over {store.notes.headings} headings"
-    _draw(path, store, shown, (ListedColormap(CLASS_COLOURS), 0.0, SOME_HEADINGS), labels, title)
+    colours = ListedColormap(CLASS_COLOURS).with_extremes(bad=_UNKNOWN)
+    _draw(path, store, shown, (colours, 0.0, SOME_HEADINGS), labels, title)
 
 
 def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
@@ -72,9 +73,10 @@ def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
     distance = area.distance[::every, ::every]
     shown = np.where(np.isfinite(distance), distance, np.nan)
     longest = area.longest or 0.0
-    title = f"reached and returned from: {area.area:.0f} m2, longest way {longest:.1f} m"
+    title = f"reached and returned from: {area.area:.1f} m2, longest way {longest:.1f} m"
     colours = matplotlib.colormaps["viridis"]
-    labels = [(f"way of {share * longest:.0f} m", colours(share)) for share in (0.0, 0.5, 1.0)]
+    shares = (0.0, 0.5, 1.0) if longest > 0.0 else ()
+    labels = [(f"way of {share * longest:.1f} m", colours(share)) for share in shares]
     left, low = store.notes.frame.origin
     start = left + area.start[1] * area.cell, low + area.start[0] * area.cell
     _draw(path, store, shown, (colours, 0.0, max(longest, 1e-9)), labels, title, start)
@@ -86,8 +88,9 @@ def _draw(path, store, shown, scale, labels, title, start=None) -> None:
     Args:
         path: The picture.
         store: The survey.
-        shown: Values, NaN where nothing is drawn.
-        scale: Colour map, and the values at its ends.
+        shown: Values, NaN where there is none.
+        scale: Colour map, with the colour of NaN if that is to be drawn, and the values at its
+            ends.
         labels: Text and colour of each entry of the legend.
         title: Title.
         start: x, y of the start [m] (default: none).
@@ -111,10 +114,8 @@ def _draw(path, store, shown, scale, labels, title, start=None) -> None:
             axes.plot(*start, "o", color=_INK, markersize=7, markeredgecolor="white")
         axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=extent[:2], ylim=extent[2:])
         axes.set_title(title, loc="left")
-        axes.legend(
-            handles=[Patch(color=colour, label=text) for text, colour in labels],
-            loc="upper left", frameon=True, framealpha=0.85,
-        )  # fmt: skip
+        handles = [Patch(color=colour, label=text) for text, colour in labels]
+        figure.legend(handles=handles, loc="outside lower center", ncols=3)  # hides no ground
         _draw_scale_bar(axes, extent)
         save_figure(path, figure)
 
@@ -133,13 +134,19 @@ def _draw_ground(axes: Axes, store: SurveyStore, extent: _Extent) -> None:
 def _draw_scale_bar(axes: Axes, extent: _Extent) -> None:
     """Draw a bar of a round length, about a fifth of the map's width."""
     width, height = extent[1] - extent[0], extent[3] - extent[2]
-    length = 10.0 ** math.floor(math.log10(0.25 * width))
-    length *= max(k for k in (1, 2, 5) if k * length <= 0.25 * width)
+    length = choose_bar(width)
     x, y = extent[1] - 0.05 * width - length, extent[2] + 0.04 * height
     axes.add_patch(Rectangle((x, y), length, 0.012 * height, color=_INK))
     plate = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
     middle, above = x + 0.5 * length, y + 0.02 * height
     axes.text(middle, above, f"{length:g} m", ha="center", color=_INK, bbox=plate)
+
+
+def choose_bar(width: float) -> float:
+    """Return the round length of a bar: at most a quarter of a width, up to rounding, all in m."""
+    most = 0.25 * width * (1.0 + 1e-9)
+    power = 10.0 ** math.floor(math.log10(most))
+    return power * max(k for k in (1, 2, 5) if k * power <= most)
 
 
 def _thinning(store: SurveyStore) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
+from rover_planner.survey.disk.gdal_messages import catch_messages, find_reason
 from rover_planner.survey.layout import Box
 from rover_planner.survey.map_source import Grids, MapFrame
 from rover_planner.survey.store import SurveyStore
@@ -33,7 +34,7 @@ CELL_SIZES = (1e-5, 1e6)
 UNDECLARED = (-9999.0, -32767.0, -32768.0, float(np.finfo(np.float32).min))
 """Values that programs write where they know no height; refused in a file that does not say so."""
 BAND = 512
-"""Rows that are written at a time."""
+"""Rows that are read or written at a time."""
 
 
 def is_geotiff(path: str | Path) -> bool:
@@ -71,29 +72,36 @@ class GeoTiffMap:
         return ()
 
     def read(self, box: Box, every: int = 1) -> Grids:
-        """Return the heights in a box of cells, every so many cells of them; NaN for nodata."""
-        from rasterio.windows import Window
+        """Return the heights in a box of cells, every so many cells of them; NaN for nodata.
 
+        They are read some rows at a time, as the box may be the whole map for a picture.
+        """
         rows, columns = box
+        size = every * max(1, BAND // every)
         with self._open() as file:
-            window = Window(
-                columns.start,
-                file.height - rows.stop,
-                columns.stop - columns.start,
-                rows.stop - rows.start,
-            )
-            values = file.read(1, window=window, masked=True)
-            unknown = np.ma.getmaskarray(values)
-            heights = np.where(unknown, np.nan, values.data.astype(np.float64))
-            if file.nodata is None:
-                self._check_declared(heights)
-            heights = heights * file.scales[0] + file.offsets[0]
-        return {"elevation": np.ascontiguousarray(heights[::-1][::every, ::every])}
+            bands = [
+                self._read_window(file, (slice(first, min(first + size, rows.stop)), columns))[
+                    ::every, ::every
+                ].copy()
+                for first in range(rows.start, rows.stop, size)
+            ]
+        return {"elevation": np.concatenate(bands)}
 
     def hash_content(self) -> str:
-        """Return a hash of the file."""
-        with self.path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        """Return a hash of all that heights come from.
+
+        That is the file, its mask, which may be a file beside it, and what other files beside it
+        (.aux.xml, .tfw) may say instead of it. The projection changes no height, and versions of
+        GDAL word it differently.
+        """
+        with self._open() as file:
+            told = repr((tuple(file.transform), file.nodata, file.scales, file.offsets))
+            masks = [Path(name) for name in file.files if name.endswith(".msk")]
+        found = hashlib.sha256(told.encode())
+        for path in (self.path, *masks):
+            with path.open("rb") as content:
+                found.update(hashlib.file_digest(content, "sha256").digest())
+        return found.hexdigest()[:16]
 
     @contextlib.contextmanager
     def _open(self) -> Iterator[Any]:
@@ -105,13 +113,32 @@ class GeoTiffMap:
             why = error.__cause__ or error
             raise PlanningError(f"{show_file(self.path)}: cannot be read: {why}") from None
 
+    def _read_window(self, file: Any, box: Box) -> np.ndarray:
+        """Return the heights in a box of cells of an open file, NaN for nodata."""
+        from rasterio.windows import Window
+
+        rows, columns = box
+        window = Window(
+            columns.start,
+            file.height - rows.stop,
+            columns.stop - columns.start,
+            rows.stop - rows.start,
+        )
+        values = file.read(1, window=window, masked=True)
+        unknown = np.ma.getmaskarray(values)
+        with np.errstate(invalid="ignore"):  # of signalling NaNs
+            heights = np.where(unknown, np.nan, values.data.astype(np.float64))
+        if file.nodata is None:
+            self._check_declared(heights)
+        return np.asarray((heights * file.scales[0] + file.offsets[0])[::-1])
+
     def _check_declared(self, heights: np.ndarray) -> None:
         """Check that heights of a file without a nodata value are none that stand for it."""
         for value in UNDECLARED:
             if (heights == value).any():
                 raise PlanningError(
-                    f"{show_file(self.path)}: holds {value:g} and declares no nodata value; "
-                    f"gdal_edit.py -a_nodata {value:g} declares it"
+                    f"{show_file(self.path)}: holds {value:.17g} and declares no nodata value; "
+                    f"gdal_edit.py -a_nodata {value:.17g} declares it"
                 )
 
     def _check(self, file: Any) -> None:
@@ -124,6 +151,8 @@ class GeoTiffMap:
 def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
     """Write a layer of a survey as a cloud-optimised GeoTIFF with the map's georeference.
 
+    Its overviews have values of the layer, as there is nothing between classes, bits or limits.
+
     Args:
         path: File to write; an existing one is replaced.
         layer: (rows, columns) array, such as of Zarr; row 0 at the smallest y.
@@ -135,8 +164,6 @@ def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
     """
     need("rasterio", "a GeoTIFF")
     rasterio = _import_rasterio()
-    from rasterio.shutil import copy
-
     rows, columns = layer.shape
     size = step * frame.resolution
     left, low = (start - 0.5 * size for start in frame.origin)
@@ -157,18 +184,43 @@ def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
         profile["crs"] = frame.crs
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-            plain, whole = Path(folder) / "plain.tif", Path(folder) / "whole.tif"
+            whole = Path(folder) / "whole.tif"
+            _write_aside(Path(folder) / "plain.tif", whole, layer, profile)
+            whole.replace(path)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise PlanningError(f"{show_file(path)}: cannot be written: {why}") from None
+
+
+def _write_aside(plain: Path, whole: Path, layer: Any, profile: dict[str, Any]) -> None:
+    """Write a layer as a plain GeoTIFF, and that as a COG which is whole and on the disk.
+
+    Raises:
+        OSError: The system refuses, in the words of GDAL if it gives no others.
+    """
+    rasterio = _import_rasterio()
+    from rasterio._err import CPLE_BaseError  # what GDAL raises where rasterio adds nothing
+    from rasterio.shutil import copy
+
+    rows, columns = layer.shape
+    why = ""
+    with catch_messages() as messages:
+        try:
             with rasterio.open(plain, "w", **profile) as file:
                 for first in range(0, rows, BAND):
                     end = min(first + BAND, rows)
                     window = rasterio.windows.Window(0, rows - end, columns, end - first)
                     file.write(layer[first:end][::-1], 1, window=window)
-            copy(plain, whole, driver="COG", compress="deflate")
-            whole.replace(path)
-    except rasterio.errors.RasterioError as error:
-        raise PlanningError(f"{show_file(path)}: cannot be written: {error}") from None
-    except OSError as error:
-        raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
+            copy(plain, whole, driver="COG", compress="deflate", overview_resampling="nearest")
+            with rasterio.open(whole) as file:  # GDAL does not tell of all that it could not write
+                why = _find_missing(file, whole)
+        except (rasterio.errors.RasterioError, CPLE_BaseError) as error:
+            why = str(error)
+    why = find_reason(messages) or why
+    if why:
+        raise OSError(why)
+    with whole.open("rb") as done:
+        os.fsync(done.fileno())
 
 
 def write_layers(store: SurveyStore, folder: Path) -> None:

@@ -1,6 +1,8 @@
 """GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
 
 import math
+import tracemalloc
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +15,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.geotiff import GeoTiffMap, write_cog, write_layers
 from rover_planner.survey.layers import unpack_bits
+from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.survey import prepare_survey
 from rover_planner.survey.tile_survey import outline_of
 from rover_planner.viewer.state.survey_layers import load_map
@@ -92,6 +95,17 @@ def test_a_tif_gives_the_bits_of_the_same_map_in_an_npz_file(tmp_path):
     terrain = Terrain(heights.astype(float), CELL, (7.0, -3.0))
     other = survey_here(tmp_path / "npz", terrain, make_request(), chunk=192)
     assert_same_bits(layers_of(one), layers_of(other))
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.uint64, np.float32])
+def test_overviews_have_values_of_the_layer(tmp_path, kind):
+    values = np.array([0, 3, 255], kind) if kind != np.float32 else np.array([0.5, np.inf], kind)
+    layer = np.random.default_rng(3).choice(values, (700, 1100))
+    write_cog(tmp_path / "a.tif", layer, MapFrame((700, 1100), CELL, (0.0, 0.0), MARS), 1)
+    for level in range(2):
+        with rasterio.open(tmp_path / "a.tif", overview_level=level) as overview:
+            assert overview.shape[0] < 400
+            assert set(np.unique(overview.read(1))) <= set(values)
 
 
 @pytest.mark.parametrize("step", [2, 5])
@@ -193,8 +207,12 @@ def test_heights_that_stand_for_nothing_are_refused_where_no_nodata_is_declared(
     declared = write_tif(tmp_path / "a.tif", heights, nodata=value)
     assert np.isnan(GeoTiffMap(declared).read(box)["elevation"]).sum() == 1
     path = write_tif(tmp_path / "b.tif", heights)
-    with pytest.raises(PlanningError, match=r"b\.tif: holds -.* and declares no nodata value"):
+    said = r"b\.tif: holds -.* and declares no nodata value"
+    with pytest.raises(PlanningError, match=said) as refusal:
         GeoTiffMap(path).read(box)
+    advised = float(str(refusal.value).split("-a_nodata")[1].split()[0])
+    GeoTiffMap(write_tif(path, heights, nodata=advised)).read(box)
+    assert advised == value  # as GDAL compares it with the heights
 
 
 def test_a_turn_by_less_than_a_millionth_of_a_cell_is_none(tmp_path):
@@ -244,6 +262,48 @@ def test_another_content_is_another_map(tmp_path):
     write_tif(path, heights)
     with pytest.raises(PlanningError, match="another map"):
         prepare_survey(make_request(), str(path), tmp_path / "out")
+
+
+def test_a_mask_or_a_nodata_value_beside_the_file_makes_another_map(tmp_path):
+    heights = make_rough_map(40, 50).elevation.astype(np.float32)
+    path = write_tif(tmp_path / "map.tif", heights)
+    hashes = [GeoTiffMap(path).hash_content()]
+    mask = np.full(heights.shape, 255, np.uint8)
+    for row in (3, 20):
+        mask[row, 5] = 0
+        with rasterio.Env(GDAL_TIFF_INTERNAL_MASK=False), rasterio.open(path, "r+") as file:
+            file.write_mask(mask)
+        hashes.append(GeoTiffMap(path).hash_content())
+    assert (tmp_path / "map.tif.msk").exists()
+    note = "<PAMDataset><PAMRasterBand band='1'><Offset>{}</Offset></PAMRasterBand></PAMDataset>"
+    for offset in (0, 7):
+        (tmp_path / "map.tif.aux.xml").write_text(note.format(offset))
+        hashes.append(GeoTiffMap(path).hash_content())
+    assert GeoTiffMap(path).read((slice(0, 1), slice(0, 1)))["elevation"][0, 0] > 6.0
+    assert len(set(hashes)) == 4 and hashes[3] == hashes[2]  # an offset of 0 changes no height
+
+
+def test_signalling_nans_are_unknown_without_noise(tmp_path):
+    heights = np.zeros((40, 50), np.float32)
+    heights.view(np.uint32)[3, 4] = 0x7FA00000
+    path = write_tif(tmp_path / "map.tif", heights, nodata=-1.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = GeoTiffMap(path).read((slice(0, 40), slice(0, 50)))["elevation"]
+    assert np.isnan(found).sum() == 1 and np.isnan(found[36, 4])
+
+
+def test_a_thinned_map_is_read_by_parts(tmp_path):
+    heights = np.random.default_rng(5).random((2100, 3000)).astype(np.float32)
+    source = GeoTiffMap(write_tif(tmp_path / "map.tif", heights))
+    box = slice(1, 2100), slice(0, 3000)
+    source.read((slice(0, 4), slice(0, 4)))  # libraries are loaded
+    tracemalloc.start()
+    found = source.read(box, 7)["elevation"]
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    np.testing.assert_array_equal(found, heights[::-1][box][::7, ::7])
+    assert peak < 8 * heights.size
 
 
 def test_the_page_gets_the_map_that_was_surveyed_and_not_one_that_has_changed(tmp_path):

@@ -1,6 +1,8 @@
 """Surveys that cannot go on end in one line, in order, and leave what they found."""
 
+import math
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -65,6 +67,42 @@ def test_what_cannot_end_well_is_refused_before_a_store_is_made(ground, words, s
     assert main(["survey", "lsr1", str(ground), str(out), *words]) == 2
     err = capfd.readouterr().err
     assert said in err and err.count("\n") == 1 and not out.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [("--workers", "1"), ()])
+def test_a_chunk_beyond_this_machine_is_refused_before_a_store_is_made(tmp_path, workers, capfd):
+    rasterio = pytest.importorskip("rasterio", reason="install the extra survey")
+    side = 64 * 3125  # cells; the file has none of its blocks
+    with rasterio.open(
+        tmp_path / "map.tif", "w", driver="GTiff", width=side, height=side, count=1,
+        dtype="float32", nodata=math.nan, crs="EPSG:32633", tiled=True, blockxsize=8192,
+        blockysize=8192, SPARSE_OK=True, BIGTIFF="YES",
+        transform=rasterio.Affine(1.0, 0.0, 5e5, 0.0, -1.0, 5e6),
+    ):  # fmt: skip
+        pass
+    words = ["survey", "lsr1", str(tmp_path / "map.tif"), str(tmp_path / "out")]
+    assert main([*words, "--chunk", str(side), *workers]) == 2
+    err = capfd.readouterr().err
+    assert f"a chunk of {side} x {side} cells needs" in err and "a worker has" in err
+    assert err.count("\n") == 1 and not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_a_chunk_beyond_the_workers_of_a_scheduler_is_refused_before_a_store_is_made(
+    ground, capfd
+):
+    from distributed import LocalCluster
+
+    out = ground.with_name("out")
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None,
+        protocol="tcp://", memory_limit="300MB",
+    ) as cluster:  # fmt: skip
+        words = ["survey", "lsr1", str(ground), str(out)]
+        assert main([*words, "--scheduler", cluster.scheduler_address]) == 2
+    err = capfd.readouterr().err
+    assert "a worker has 300 MB: give a smaller --chunk" in err and not out.exists()
 
 
 @pytest.mark.slow
@@ -177,6 +215,30 @@ def test_a_finished_survey_is_drawn_from_where_nothing_can_be_written(tmp_path, 
     words = ["survey", "lsr1", str(tmp_path / "map.npz"), str(tmp_path / "out"), "--headings", "4"]
     assert main([*words, "--picture", str(tmp_path / "p.png")]) == 0
     assert (tmp_path / "p.png").exists() and capfd.readouterr().err == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("most", [100, 5_000, 12_000, 14_000])
+def test_no_space_for_a_layer_is_one_line_and_leaves_nothing(tmp_path, most):
+    """The size of files is limited, as a full disk cannot be had without rights."""
+    pytest.importorskip("rasterio", reason="install the extra survey")
+    survey_here(tmp_path, make_rough_map(130, 130), make_request())
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+
+    words = [sys.executable, "-m", "rover_planner", "survey", "lsr1", str(tmp_path / "map.npz"),
+             str(tmp_path / "out"), "--headings", "4",
+             "--geotiff", str(tmp_path / "layers")]  # fmt: skip
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=120, preexec_fn=limit)
+    assert ended.returncode == 2, ended.stderr
+    assert ".tif: cannot be written: File too large" in ended.stderr
+    assert ended.stderr.count("\n") == 1
+    rasterio = pytest.importorskip("rasterio")
+    for path in (tmp_path / "layers").iterdir():  # what is there is whole
+        with rasterio.open(path) as layer:
+            layer.read()
 
 
 @pytest.mark.slow

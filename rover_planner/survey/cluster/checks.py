@@ -5,28 +5,32 @@ from typing import Any
 
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob, estimate_memory
-from rover_planner.survey.cluster.client import ClusterSettings
+from rover_planner.survey.cluster.client import ClusterSettings, open_client
 
 WORKERS_TIME = 300.0
 """Longest time to wait for the first worker of a scheduler [s]."""
 
 
 def check_machine(job: SurveyJob, settings: ClusterSettings) -> None:
-    """Check that this machine's workers have the memory for the largest chunk, before they start.
+    """Check that workers have the memory for the largest chunk, before a store is made for it.
+
+    Those of a scheduler are asked if there are some by now.
 
     Raises:
-        PlanningError: They do not.
+        PlanningError: They do not have it, or there is no such scheduler.
     """
     from dask.system import CPU_COUNT
     from distributed.system import MEMORY_LIMIT
 
     if settings.scheduler is not None:
+        with open_client(settings) as client:
+            check_memory(job, client)
         return
     needed = estimate_memory(job)
-    if settings.memory_limit is not None:
-        _compare(job, needed, settings.memory_size)
+    share = MEMORY_LIMIT // CPU_COUNT  # of a worker, by Dask's default
+    _compare(job, needed, settings.memory_size or share)
     workers = settings.workers or CPU_COUNT
-    if workers > 1 and workers * needed > MEMORY_LIMIT:
+    if workers * needed > MEMORY_LIMIT:
         raise PlanningError(
             f"{workers} workers need {workers * needed / 1e6:.0f} MB; this machine has "
             f"{MEMORY_LIMIT / 1e6:.0f} MB: give fewer --workers or a smaller --chunk"
