@@ -344,8 +344,9 @@ class ViewSession:
                 arm_angles=assumptions.joint_angles or {},
             )
         first = next((k for k, reason in enumerate(reasons) if reason), -1)
+        driven = prediction if first < 0 else prediction.cut(first + 1)
         verdict = dataclasses.replace(
-            judge(self.wanted.rover, prediction),
+            judge(self.wanted.rover, driven),
             traversable=first < 0,
             reasons=tuple(reasons),
             first_failure=first,
