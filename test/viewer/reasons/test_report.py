@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 
-viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
-
 from rover_planner.viewer.browser.export import write_page
 from rover_planner.viewer.browser.report import describe_judgement
 from rover_planner.viewer.state.context import describe_scenario
 from support.grounds import gap
 from support.viewer.sessions import session_on
+
+viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 
 def report_of(session) -> str:
