@@ -187,7 +187,12 @@ class ViewSession:
         return self._want(options=dataclasses.replace(self.wanted.options, **changes))  # type: ignore[arg-type]
 
     def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
-        """Take another rover, changed from a loaded one (default: not), and plan again."""
+        """Take another rover, changed from a loaded one (default: not), and plan again.
+
+        Changed from the one that is loaded now, it is a change like those of sliders.
+        """
+        if loaded is not None and loaded == self.wanted.loaded:
+            loaded = self.wanted.loaded
         return self._want(loaded=loaded or rover, rover=rover, arm_angles={})
 
     def plan_again(self) -> bool:

@@ -1,10 +1,13 @@
 """Why and where a path is refused: limits along it, the failure, candidates, before and after."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rover_physics.names import OPTIMAL, SERVO, WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.traversability.judge_path import judge_path
 from rover_physics.traversability.verdict import judge
@@ -264,9 +267,43 @@ def test_undo_goes_back_rover_by_rover():
         changed(session, friction)
         session.plan_again()
         history.take(session.finished)
-    assert history.undo().scenario.rover.friction == 0.7
-    assert history.undo().scenario.rover.friction == 0.8
-    assert history.undo() is None
+    for friction in (0.7, 0.8):
+        back = history.undo(session.wanted).scenario
+        assert back.rover.friction == friction
+        session.restore_rover(back.rover, back.arm_angles)
+        history.take(session.finished)
+    assert history.undo(session.wanted) is None
+
+
+def test_undo_takes_back_a_change_before_all_its_paths_are_judged():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    changed(session, 0.7)  # only the shown path is judged
+    assert history.undo(session.wanted).scenario.rover.friction == 0.8
+    session.plan_again()
+    history.take(session.finished)
+    changed(session, 0.6)
+    assert history.undo(session.wanted).scenario.rover.friction == 0.7
+
+
+def test_undo_never_brings_numbers_of_one_rover_to_another_that_was_loaded_since():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    changed(session, 0.7)
+    session.plan_again()
+    history.take(session.finished)
+    session.take_rover(load_rover("m2020"))  # and not taken by the history yet
+    assert history.undo(session.wanted) is None
+
+
+def test_the_best_rover_of_a_study_of_the_loaded_one_is_a_change_that_can_be_undone():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    best = replace(LSR1, friction=0.6)
+    session.take_rover(best, load_rover("lsr1"))  # the study has read its rover by itself
+    history.take(session.finished)
+    assert history.reference_for(session.finished) is not None
+    assert history.undo(session.wanted).scenario.rover == LSR1
 
 
 def test_another_goal_begins_the_history_anew():

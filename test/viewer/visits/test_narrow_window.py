@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rover_planner.planning.path_query import PathQueryOptions
@@ -36,7 +37,7 @@ HIDDEN = """() => {
             && p.top < q.bottom && q.top < p.bottom);
     }).map(box => box.textContent)];
 }"""
-"""How many labels there are, and which stand behind the header or the hint, or above the window."""
+"""How many labels there are, and which are behind the header or the hint, or above the window."""
 PLACES = "() => [...document.querySelectorAll('.leader')].map(e => e.style.transform)"
 """Where on the screen the places of the labels are."""
 
@@ -90,7 +91,7 @@ def test_no_label_stands_behind_the_header(page, visitor, down):
     [client] = page.server.get_clients().values()
     before = visitor.tab.evaluate(PLACES)
     client.camera.look_at = failure - [0.0, 0.0, down]
-    client.camera.position = failure + [-2.5, 0.3, 0.6]  # the failure is at the upper edge
+    client.camera.position = np.add(failure, [-2.5, 0.3, 0.6])  # the failure is at the upper edge
     wait_until(lambda: visitor.tab.evaluate(PLACES) != before, "the view from there")
     wait_until(lambda: visitor.tab.evaluate(HIDDEN)[0] >= 3, "the labels")
     wait_until(lambda: visitor.tab.evaluate(HIDDEN)[1] == [], "labels beside the header")
