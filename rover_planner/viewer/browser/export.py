@@ -1,5 +1,7 @@
 """One HTML file with the scene as it is and a report beside it, to send to somebody."""
 
+import html
+import re
 from typing import Any
 
 from rover_planner.viewer.browser import label_script
@@ -19,6 +21,8 @@ STYLE = """
   bottom: 8px; }
 @media (max-width: 1000px) { #report { top: auto; right: 0; width: auto; height: 45%; } }
 """
+VISERS_TITLE = re.compile("<title>.*?</title>")
+"""The title that viser gives a file; a browser shows the first one."""
 
 
 def write_page(server: Any, camera: Any, report: str, title: str, labels: str) -> bytes:
@@ -28,15 +32,17 @@ def write_page(server: Any, camera: Any, report: str, title: str, labels: str) -
         server: The server of viser.
         camera: The camera of the visitor, from which the file looks at first.
         report: The report, HTML.
-        title: Title of the file, HTML.
+        title: Title of the file, text.
         labels: The labels of the scene for the script that keeps them apart, HTML.
     """
     server.initial_camera.position = camera.position
     server.initial_camera.look_at = camera.look_at
+    safe = html.escape(title)
     page: str = server.get_scene_serializer().as_html()
+    page = VISERS_TITLE.sub(lambda _found: f"<title>{safe}</title>", page, count=1)
     inserted = (
-        f"<style>{STYLE}</style><title>{title}</title>"
-        f'<div id="report"><h1>{title}</h1>{report}</div>{labels}'
+        f"<style>{STYLE}</style>"
+        f'<div id="report"><h1>{safe}</h1>{report}</div>{labels}'
         f"<script>{label_script.SCRIPT}</script>"
     )
     at = page.rindex("</body>")

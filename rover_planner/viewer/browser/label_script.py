@@ -3,7 +3,8 @@
 It runs in the page and in files that were saved from it. It follows the camera of viser, picture
 by picture. In the order of their ranks, each box takes the nearest free position about its place
 on the screen: first the place itself, then the position that it had, then positions on rings
-around it. A line leads from the place to a box that has moved.
+around it. A line leads from the place to a box that has moved. What lies over the scene, such as
+the header, is no free position, nor is what is between it and the edge of the window.
 """
 
 STYLE = """
@@ -77,6 +78,19 @@ SCRIPT = r"""
     Math.abs(one.x - other.x) < one.half[0] + other.half[0] + GAP &&
     Math.abs(one.y - other.y) < one.half[1] + other.half[1] + GAP;
 
+  // Returns what lies over the scene, as boxes that reach to the upper or lower edge and beyond.
+  const FAR = 1e4;
+  const findCovers = () => {
+    const scene = layer.getBoundingClientRect();
+    return [...document.querySelectorAll(".over-scene, #report")].map((part) => {
+      const { left, right, top, bottom, width } = part.getBoundingClientRect();
+      const isUpper = top + bottom < scene.top + scene.bottom;
+      const [from, to] = isUpper ? [-FAR, bottom] : [top, FAR];
+      return { x: (left + right) / 2 - scene.left, y: (from + to) / 2 - scene.top,
+        half: [width / 2, (to - from) / 2] };
+    }).filter((cover) => cover.half[0] > 0);
+  };
+
   const put = (label, anchor, taken) => {
     const [w, h] = label.half, down = label.stands ? -h : 0;
     const at = ([x, y]) => ({ x: anchor[0] + x, y: anchor[1] + down + y, half: label.half });
@@ -104,10 +118,11 @@ SCRIPT = r"""
     const { clientWidth: width, clientHeight: height } = viser.canvas;
     const view = [root.matrixWorld.elements, viser.camera.matrixWorldInverse.elements,
       viser.camera.projectionMatrix.elements];
-    const now = [width, height, ...view.map((matrix) => matrix.join())].join();
+    const taken = findCovers();
+    const now = [width, height, ...view.map((matrix) => matrix.join()),
+      ...taken.map(({ x, y, half }) => [x, y, ...half].join())].join();
     if (now === last && !isNew) return;
     last = now;
-    const taken = [];
     for (const label of labels) {
       const anchor = project(view, label.place, width, height);
       const seen = anchor && Math.abs(anchor[0]) < 2 * width && Math.abs(anchor[1]) < 2 * height;

@@ -21,6 +21,8 @@ VALUE, JOINT = "rover.", "arm."
 """What comes before the keys of changed numbers and of the arm's joints."""
 MAX_LENGTH = 8000
 """Most characters of a link; servers accept hardly more."""
+HALF_TURN = 180.0
+"""Largest heading of a layer, both ways [deg]."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,10 @@ def read_link(query: str) -> Link | None:
         goal=_read_pose("goal", words["goal"]),
         policy=words["torques"],
         soil=words.get("soil", ""),
-        path=int(_read("path", words.get("path", "1"))),
+        path=_read_path(words.get("path", "1")),
         time=_read("time", words.get("time", "0")),
         layer=words["layer"],
-        heading=_read("heading", words.get("heading", "0")),
+        heading=_read_heading(words.get("heading", "0")),
         values=_read_all(VALUE, words),
         joints=_read_all(JOINT, words),
         along=words.get("along") == "1",
@@ -168,6 +170,23 @@ def _read(name: str, text: str) -> float:
     if not math.isfinite(value):
         raise PlanningError(f"{name} of the link is {describe(text)}; it must be a number")
     return value
+
+
+def _read_path(text: str) -> int:
+    number = _read("path", text)
+    if number < 1.0 or number != int(number):
+        raise PlanningError(f"path of the link is {describe(text)}; it must be 1, 2, 3, ...")
+    return int(number)
+
+
+def _read_heading(text: str) -> float:
+    heading = _read("heading", text)
+    if abs(heading) > HALF_TURN:
+        raise PlanningError(
+            f"heading of the link is {describe(text)}; it must be -{HALF_TURN:g} to "
+            f"{HALF_TURN:g} deg"
+        )
+    return heading
 
 
 def _read_pose(name: str, text: str) -> Pose:

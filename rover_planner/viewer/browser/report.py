@@ -51,11 +51,11 @@ def describe_judgement(judgement: Judgement, context: Context, query: str) -> st
         "goal": _pose(scenario.goal),
         "path": f"{shown.index + 1} of {len(judgement.answer.candidates)}, "
         f"{shown.candidate.length:.2f} m",
-        "largest friction utilisation": f"{verdict.max_friction_utilisation:.2f}",
-        "largest torque saturation": f"{verdict.max_torque_saturation:.2f}",
-        "smallest stability margin": f"{verdict.min_tip_over_ratio:.2f}",
-        "largest tilt": f"{np.degrees(verdict.max_tilt):.1f} deg",
-        "smallest belly clearance": f"{MILLI * verdict.min_belly_clearance:.0f} mm",
+        "largest friction utilisation": _number(verdict.max_friction_utilisation, 2),
+        "largest torque saturation": _number(verdict.max_torque_saturation, 2),
+        "smallest stability margin": _number(verdict.min_tip_over_ratio, 2),
+        "largest tilt": f"{_number(np.degrees(verdict.max_tilt), 1)} deg",
+        "smallest belly clearance": f"{_number(MILLI * verdict.min_belly_clearance, 0)} mm",
         "versions": _versions(),
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "link": f"?{query}" if query else "too long; the rover file is below",
@@ -107,9 +107,16 @@ def _wheel_table(part: PathPrediction, row: int) -> str:
     lines = []
     for title, (field, digits) in WHEEL_ROWS.items():
         values = getattr(part, field)[row] * (MILLI if "[mm]" in title else 1.0)
-        cells = "".join(f"<td>{value:.{digits}f}</td>" for value in values)
+        cells = "".join(f"<td>{_number(value, digits)}</td>" for value in values)
         lines.append(f"<tr><th>{title}</th>{cells}</tr>")
     return f'<table id="wheels"><tr><th></th>{head}</tr>{"".join(lines)}</table>'
+
+
+def _number(value: float, digits: int) -> str:
+    """Return a number with digits behind the point; "?" if it is not known."""
+    if np.isnan(value):
+        return "?"
+    return f"{value:.{digits}f}" if np.isfinite(value) else "infinite"
 
 
 def _list(facts: dict[str, str]) -> str:

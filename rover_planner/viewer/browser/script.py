@@ -9,11 +9,9 @@ SCRIPT = r"""
   if (window.__VISER_EMBED_DATA__ || window.roverPlannerPage) return;
   window.roverPlannerPage = true;
 
-  if (localStorage.getItem("rover_planner-hint") === "off") {
-    const style = document.createElement("style");
-    style.textContent = "#hint { display: none !important; }";
-    document.head.append(style);
-  }
+  // The whole document is marked: viser makes the hint anew in a window of another width.
+  if (localStorage.getItem("rover_planner-hint") === "off")
+    document.documentElement.dataset.hint = "off";
 
   // A typed number counts when Enter is pressed or its box is left; Escape puts it back.
   const isBox = (e) => e instanceof HTMLInputElement &&

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 
 from rover_physics.rover.model import Rover
+from rover_planner.errors import PlanningError
 from rover_planner.viewer.panel.tabs.rover_tab import RoverTab
 from rover_planner.viewer.state.reasons.before_after import (
     ChangeHistory,
@@ -45,10 +46,15 @@ class ChangeDesk:
         self._tab.show_changes(changed, differences)
 
     def undo(self) -> None:
-        """Take the last rover again."""
-        judgement = self._history.undo()
-        if judgement is not None:
-            self._take_back(judgement.scenario.rover, judgement.scenario.arm_angles)
+        """Take the last rover again.
+
+        Raises:
+            PlanningError: There is none.
+        """
+        judgement = self._history.undo(self._session.wanted)
+        if judgement is None:
+            raise PlanningError("there is no change of this rover on these paths to undo")
+        self._take_back(judgement.scenario.rover, judgement.scenario.arm_angles)
 
     def reset(self) -> None:
         """Take the rover as it was loaded."""

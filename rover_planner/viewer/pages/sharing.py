@@ -6,7 +6,9 @@ from typing import Any
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.browser.channel import run_for
 from rover_planner.viewer.browser.export import write_page
@@ -40,8 +42,8 @@ class Sharing:
         self._session, self._playback = session, playback
         self._ground_tab, self._share_tab = ground_tab, share_tab
         self._fingerprint: tuple[Terrain | None, str] = (None, "")
-        self._opening: Link | None = None
-        """The link whose path and time are not shown yet."""
+        self._opening: tuple[Link, Scenario] | None = None
+        """The link whose path and time are not shown yet, and what it asks for."""
 
     def save(self, server: Any, client: Any, labels: str) -> None:
         """Send a visitor the scene with its labels, HTML, and its report as one HTML file."""
@@ -101,32 +103,43 @@ class Sharing:
             raise PlanningError("the link is about another map than this page shows")
         if link.layer not in self._ground_tab.layers:
             raise PlanningError(f"the link names the layer {link.layer!r}, which there is not")
-        self._session.take_scenario(self._read(link, wanted))
+        asked = self._read(link, wanted)
+        self._session.take_scenario(asked)
         self._ground_tab.choose_layer(link.layer, link.heading, along=link.along)
-        self._opening = link
+        self._opening = link, asked
 
     def _read(self, link: Link, wanted: Scenario) -> Scenario:
         loaded = _read_loaded(link)
         if loaded == wanted.loaded:
             loaded = wanted.loaded
+        _check_joints(link, loaded)
         same = (link.start, link.goal) == (wanted.start, wanted.goal)
+        options = dataclasses.replace(wanted.options, policy=link.policy, soil=link.soil or None)
+        _check_options(options)
         return dataclasses.replace(
             wanted,
             loaded=loaded,
             rover=change_values(loaded, link.values),
             start=link.start,
             goal=link.goal,
-            options=dataclasses.replace(
-                wanted.options, policy=link.policy, soil=link.soil or None
-            ),
+            options=options,
             arm_angles=dict(link.joints),
             recorded=wanted.recorded if same else None,
         )
 
     def go_on(self) -> None:
-        """Show path and time of the link that was opened, as soon as they are judged."""
-        link, session = self._opening, self._session
-        if link is None or session.is_outdated:
+        """Show path and time of the link that was opened, as soon as they are judged.
+
+        They are forgotten if the link was refused, or a visitor wants something else meanwhile.
+        """
+        session = self._session
+        if self._opening is None:
+            return
+        link, asked = self._opening
+        if session.wanted is not asked:
+            self._opening = None
+            return
+        if session.is_outdated:
             return
         if session.shown.index == link.path - 1:
             self._opening = None
@@ -149,6 +162,21 @@ def _write_short(link: Link) -> str:
         return write_link(link)
     except PlanningError:
         return ""
+
+
+def _check_options(options: PathQueryOptions) -> None:
+    """Check torques and soil by their names, before the page shows them as chosen."""
+    options.sweep_options()
+    if options.soil is not None:
+        soil_named(options.soil)
+
+
+def _check_joints(link: Link, rover: Rover) -> None:
+    """Check that the rover of a link has the joints that the link turns."""
+    known = () if rover.manipulator is None else rover.manipulator.joints
+    for joint in link.joints:
+        if joint not in known:
+            raise PlanningError(f"the link turns the joint {joint!r}, which {rover.name} lacks")
 
 
 def _is_preset(rover: Rover) -> bool:

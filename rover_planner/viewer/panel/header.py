@@ -96,6 +96,7 @@ def _style() -> str:
         "font-size:13px;line-height:1.5;padding:.35em .8em;border-radius:.5em;"
         "background:rgba(255,255,255,.88);color:#222;pointer-events:none;"
         "width:fit-content;margin:0 auto}"
+        "[data-hint=off] #hint{display:none!important}"
         f".mantine-Notifications-root{{top:auto!important;bottom:{NOTICES}px!important}}"
         f"@media (max-width:{NARROW - 1}px){{.over-scene{{left:8px}}"
         f"#hint{{bottom:{FLOATING + 12}px!important}}"
@@ -109,7 +110,7 @@ def _hint() -> str:
     """Return the hint, which a visitor can close for ever."""
     close = (
         "localStorage.setItem('rover_planner-hint','off');"
-        "document.getElementById('hint').style.display='none'"
+        "document.documentElement.dataset.hint='off'"
     )
     return (
         f'<div id="hint" class="over-scene" style="bottom:8px"><span>{HINT}</span>'

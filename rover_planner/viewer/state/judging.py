@@ -82,8 +82,7 @@ def _judge_all(request: JudgeRequest, report: Report) -> Judgement:
     candidates = []
     for k, path in enumerate(paths):
         report(PATH, k + 1, len(paths))
-        whole = len(paths) == 1 and not recorded
-        candidates.append(_check(scenario, path, stop_at_failure=not whole))
+        candidates.append(_check(scenario, path))
     answer = choose(tuple(candidates))
     passable = sum(candidate.verdict.traversable for candidate in candidates)
     words = f"{passable} of {len(paths)} candidate paths passable, judged in"
@@ -190,15 +189,15 @@ def _judge_under(policy: str, scenario: Scenario, candidate: Candidate) -> Polic
     return _own_verdict(other)
 
 
-def _check(scenario: Scenario, poses: Floats, *, stop_at_failure: bool = True) -> Candidate:
-    """Judge a path, by default up to its first failure, where its playback ends."""
+def _check(scenario: Scenario, poses: Floats) -> Candidate:
+    """Judge a path up to its first failure, where its playback ends."""
     return check_path(
         scenario.rover,
         scenario.terrain,
         poses,
         scenario.options,
         scenario.arm_angles,
-        stop_at_failure=stop_at_failure,
+        stop_at_failure=True,
     )
 
 

@@ -187,7 +187,12 @@ class ViewSession:
         return self._want(options=dataclasses.replace(self.wanted.options, **changes))  # type: ignore[arg-type]
 
     def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
-        """Take another rover, changed from a loaded one (default: not), and plan again."""
+        """Take another rover, changed from a loaded one (default: not), and plan again.
+
+        Changed from the one that is loaded now, it is a change like those of sliders.
+        """
+        if loaded is not None and loaded == self.wanted.loaded:
+            loaded = self.wanted.loaded
         return self._want(loaded=loaded or rover, rover=rover, arm_angles={})
 
     def plan_again(self) -> bool:
@@ -344,8 +349,9 @@ class ViewSession:
                 arm_angles=assumptions.joint_angles or {},
             )
         first = next((k for k, reason in enumerate(reasons) if reason), -1)
+        driven = prediction if first < 0 else prediction.cut(first + 1)
         verdict = dataclasses.replace(
-            judge(self.wanted.rover, prediction),
+            judge(self.wanted.rover, driven),
             traversable=first < 0,
             reasons=tuple(reasons),
             first_failure=first,

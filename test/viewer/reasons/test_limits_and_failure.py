@@ -1,12 +1,17 @@
 """Why and where a path is refused: limits along it, the failure, candidates, before and after."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rover_physics.names import OPTIMAL, SERVO, WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.verdict import judge
+from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.viewer.state.reasons.before_after import (
     ChangeHistory,
     compare_drives,
@@ -22,6 +27,7 @@ from rover_planner.viewer.state.reasons.path_limits import (
     find_path_limits,
 )
 from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on, straight
 
@@ -150,6 +156,19 @@ def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond
     np.testing.assert_allclose(failure.state.attitude[:2], 0.0)
 
 
+@pytest.mark.parametrize("start", [-1.0, 0.4])
+def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played(start):
+    session = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0))
+    shown, why = session.shown, explain(session.finished)
+    assert why.failure is not None and why.failure.code == "unknown_ground"
+    assert why.failure.time == shown.trajectory.duration
+    assert (shown.trajectory.length == 0) == (start > 0.0) == (why.failure.time == 0.0)
+    assert np.isfinite(why.limits.rows.time).all()
+    count = len(session.candidates)
+    for row in list_candidates(session.candidates, 0, [False] * count):
+        assert np.isfinite(row.energy)
+
+
 def test_wheels_on_flat_ground_are_where_the_prediction_has_them():
     prediction, _ = judged_on(lambda x, y: 0.0 * x)
     offsets = prediction.wheel_centres[0] - prediction.position[0]
@@ -183,6 +202,27 @@ def test_a_row_of_a_candidate_has_the_numbers_of_its_verdict():
         assert row.utilisation == verdict.max_friction_utilisation
         assert row.margin == verdict.min_tip_over_ratio
     assert [row.number for row in rows if row.is_best] == [session.answer.nearest + 1]
+
+
+@pytest.mark.parametrize("replayed", [False, True])
+def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
+    session = session_on(gap, start=(-1.5, 0.0, 0.0), goal=(2.5, 0.0, 0.0))
+    poses = session.candidates[0].poses
+
+    def slope_beyond(x, y):
+        return gap(x, y) + 0.5 * np.maximum(x - 1.0, 0.0)
+
+    prediction, verdict = judged_on(slope_beyond, poses=poses)
+    assert verdict.max_tilt > 0.4
+    session = ViewSession(
+        LSR1, make_terrain(slope_beyond), session.start, session.goal, PathQueryOptions(count=1)
+    )
+    if replayed:
+        session.replay(prediction, verdict.reasons)
+    [candidate] = session.candidates
+    assert candidate.verdict.code == "unknown_ground"
+    before = prediction.cut(verdict.first_failure + 1)
+    assert candidate.verdict.max_tilt == judge(LSR1, before).max_tilt < 0.2
 
 
 def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():
@@ -227,9 +267,43 @@ def test_undo_goes_back_rover_by_rover():
         changed(session, friction)
         session.plan_again()
         history.take(session.finished)
-    assert history.undo().scenario.rover.friction == 0.7
-    assert history.undo().scenario.rover.friction == 0.8
-    assert history.undo() is None
+    for friction in (0.7, 0.8):
+        back = history.undo(session.wanted).scenario
+        assert back.rover.friction == friction
+        session.restore_rover(back.rover, back.arm_angles)
+        history.take(session.finished)
+    assert history.undo(session.wanted) is None
+
+
+def test_undo_takes_back_a_change_before_all_its_paths_are_judged():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    changed(session, 0.7)  # only the shown path is judged
+    assert history.undo(session.wanted).scenario.rover.friction == 0.8
+    session.plan_again()
+    history.take(session.finished)
+    changed(session, 0.6)
+    assert history.undo(session.wanted).scenario.rover.friction == 0.7
+
+
+def test_undo_never_brings_numbers_of_one_rover_to_another_that_was_loaded_since():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    changed(session, 0.7)
+    session.plan_again()
+    history.take(session.finished)
+    session.take_rover(load_rover("m2020"))  # and not taken by the history yet
+    assert history.undo(session.wanted) is None
+
+
+def test_the_best_rover_of_a_study_of_the_loaded_one_is_a_change_that_can_be_undone():
+    session = session_on(waves)
+    history = ChangeHistory(session.finished)
+    best = replace(LSR1, friction=0.6)
+    session.take_rover(best, load_rover("lsr1"))  # the study has read its rover by itself
+    history.take(session.finished)
+    assert history.reference_for(session.finished) is not None
+    assert history.undo(session.wanted).scenario.rover == LSR1
 
 
 def test_another_goal_begins_the_history_anew():

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rover_planner.planning.path_query import PathQueryOptions
@@ -26,14 +27,33 @@ IN_SIGHT = """e => {
 }"""
 """Returns whether the upper and the lower edge of an element are on the screen, not hidden."""
 
+HIDDEN = """() => {
+    const covers = [...document.querySelectorAll('#header, #hint')].map(
+        e => e.getBoundingClientRect()).filter(e => e.width > 0);
+    const boxes = [...document.querySelectorAll('.label-box')].filter(e => e.offsetParent);
+    return [boxes.length, boxes.filter(box => {
+        const p = box.getBoundingClientRect();
+        return p.bottom < 0 || covers.some(q => p.left < q.right && q.left < p.right
+            && p.top < q.bottom && q.top < p.bottom);
+    }).map(box => box.textContent)];
+}"""
+"""How many labels there are, and which are behind the header or the hint, or above the window."""
+PLACES = "() => [...document.querySelectorAll('.leader')].map(e => e.style.transform)"
+"""Where on the screen the places of the labels are."""
+
 
 @pytest.fixture(scope="module")
-def visitor() -> Iterator[Visitor]:
-    """A visitor of a page with a refused path, whose notice needs the most room."""
+def page() -> Page:
+    """A page with a refused path, whose notice needs the most room."""
     options, search = PathQueryOptions(count=3, spacing=0.5), LatticeSettings(budget=0.1)
     slippery = replace(LSR1, friction=0.4)
     ends = (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0)
-    page = Page(ViewSession(slippery, make_terrain(ramp), *ends, options, search), port=0)
+    return Page(ViewSession(slippery, make_terrain(ramp), *ends, options, search), port=0)
+
+
+@pytest.fixture(scope="module")
+def visitor(page) -> Iterator[Visitor]:
+    """A visitor of the page at rest."""
     with open_browser() as browser, visit(page, browser) as opened:
         opened.tab.add_style_tag(content=".mantine-Notifications-root { display: none; }")
         wait_for_rest(page)
@@ -62,3 +82,16 @@ def test_a_window_that_grows_wide_has_its_panels_side_by_side_again(visitor):
     wait_until(lambda: canvas.bounding_box()["x"] < 20.0, "the panels to float")
     visitor.tab.set_viewport_size(LAPTOP)
     wait_until(lambda: canvas.bounding_box()["x"] >= 250.0, "the panels side by side")
+
+
+@pytest.mark.parametrize("down", [0.9, 1.2])
+def test_no_label_stands_behind_the_header(page, visitor, down):
+    visitor.tab.set_viewport_size(LAPTOP)
+    failure = page.scene.frame.to_scene(page.judged.path.why.failure.state.position)
+    [client] = page.server.get_clients().values()
+    before = visitor.tab.evaluate(PLACES)
+    client.camera.look_at = failure - [0.0, 0.0, down]
+    client.camera.position = np.add(failure, [-2.5, 0.3, 0.6])  # the failure is at the upper edge
+    wait_until(lambda: visitor.tab.evaluate(PLACES) != before, "the view from there")
+    wait_until(lambda: visitor.tab.evaluate(HIDDEN)[0] >= 3, "the labels")
+    wait_until(lambda: visitor.tab.evaluate(HIDDEN)[1] == [], "labels beside the header")

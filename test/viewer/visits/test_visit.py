@@ -300,6 +300,10 @@ def test_the_hint_for_first_visitors_can_be_closed_for_ever(visitor):
     assert "Space" in hint and "goal" in hint
     visitor.press("Got it")
     visitor.tab.locator("#hint").wait_for(state="hidden")
+    for width in (500, 900, LAPTOP["width"]):  # each time the panels are made anew
+        visitor.tab.set_viewport_size({"width": width, "height": LAPTOP["height"]})
+        visitor.tab.wait_for_timeout(700)
+        assert not visitor.tab.locator("#hint").is_visible()
     visitor.tab.reload()
     visitor.tab.wait_for_selector("#dashboard")
     visitor.tab.wait_for_selector("#hint", state="attached")

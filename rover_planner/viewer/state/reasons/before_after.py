@@ -8,7 +8,7 @@ import numpy as np
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_contents import rover_to_dict
 from rover_planner.studies.rover_values import get_value, list_values
-from rover_planner.viewer.state.scenario import Judgement
+from rover_planner.viewer.state.scenario import Judgement, Scenario
 from rover_planner.viewer.state.trajectory import Trajectory
 
 MAX_STEPS = 50
@@ -57,7 +57,7 @@ class ChangeHistory:
         asked, last = judgement.scenario, self._done[-1].scenario
         if not asked.has_paths_of(last):
             self._done = [judgement]
-        elif asked.rover == last.rover and dict(asked.arm_angles) == dict(last.arm_angles):
+        elif not _differ(asked, last):
             self._done[-1] = judgement
         elif judgement.answered is asked:
             self._done = [*self._done[-MAX_STEPS:], judgement]
@@ -67,18 +67,36 @@ class ChangeHistory:
         now = judgement.scenario
         for one in reversed(self._done):
             then = one.scenario
-            is_other = then.rover != now.rover or dict(then.arm_angles) != dict(now.arm_angles)
-            if is_other:
+            if _differ(then, now):
                 same = then.has_paths_of(now) and one.shown.index == judgement.shown.index
                 return one if same else None
         return None
 
-    def undo(self) -> Judgement | None:
-        """Return the judgement of the rover before the newest one, and forget the newest."""
+    def undo(self, wanted: Scenario) -> Judgement | None:
+        """Return the judgement of the rover before the newest one, and forget the newest.
+
+        The newest one is that which is wanted, also while not all of its paths are judged.
+
+        Args:
+            wanted: What visitors want judged.
+
+        Returns:
+            None if there is no rover before, or another one was loaded since.
+        """
+        last = self._done[-1].scenario
+        if wanted.loaded is not last.loaded:
+            return None
+        if _differ(wanted, last):
+            return self._done[-1]
         if len(self._done) < 2:
             return None
         self._done.pop()
         return self._done[-1]
+
+
+def _differ(one: Scenario, other: Scenario) -> bool:
+    """Return whether two scenarios have different numbers of the rover or angles of its arm."""
+    return one.rover != other.rover or dict(one.arm_angles) != dict(other.arm_angles)
 
 
 def list_changes(loaded: Rover, now: Rover) -> dict[str, tuple[float, float]]:

@@ -29,7 +29,7 @@ class CandidateRow:
     driven: float
     """Length up to the first failure [m]."""
     energy: float
-    """Energy up to there [J]."""
+    """Energy up to there, or to the last waypoint before at which the rover settles [J]."""
     utilisation: float
     """Largest friction utilisation."""
     margin: float
@@ -61,7 +61,7 @@ def list_candidates(
                 reason=verdict.reason,
                 length=candidate.length,
                 driven=float(prediction.distance[last]),
-                energy=float(prediction.energy[last]),
+                energy=_last_known(prediction.energy[: last + 1 or None]),
                 utilisation=verdict.max_friction_utilisation,
                 margin=verdict.min_tip_over_ratio,
                 is_best=k == best,
@@ -69,6 +69,12 @@ def list_candidates(
             )
         )
     return tuple(rows)
+
+
+def _last_known(values: Floats) -> float:
+    """Return the last of the values (n,) that is no NaN, 0 without one."""
+    known = values[~np.isnan(values)]
+    return float(known[-1]) if known.size else 0.0
 
 
 def place_numbers(paths: Sequence[Floats], taken: Floats) -> Floats:

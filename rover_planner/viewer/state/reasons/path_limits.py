@@ -36,7 +36,8 @@ class PathRows:
     distance: Floats
     """(m,) horizontal distance since the start [m]."""
     time: Floats
-    """(m,) time since the start [s]."""
+    """(m,) time since the start [s]; where the rover does not settle, and so has no time, that of
+    the last waypoint before at which it does, 0 without one."""
     waypoint: NDArray[np.int64]
     """(m,) index of the waypoint, or of the next one for a pose in between."""
     is_between: NDArray[np.bool_]
@@ -149,12 +150,17 @@ def _merge_rows(prediction: PathPrediction) -> tuple[PathRows, NDArray[np.intp]]
     along = place[order]
     rows = PathRows(
         np.interp(along, np.arange(n), prediction.distance),
-        np.interp(along, np.arange(n), prediction.time),
+        np.interp(along, np.arange(n), _hold_known(prediction.time)),
         waypoint[order],
         order >= n,
         row[order],
     )
     return rows, order
+
+
+def _hold_known(times: Floats) -> Floats:
+    """Return times (n,) [s], ascending, with the last known one, or 0, in place of each NaN."""
+    return np.maximum.accumulate(np.where(np.isnan(times), 0.0, times))
 
 
 def _places(poses: Floats, between: PathPrediction) -> Floats:
