@@ -3,10 +3,11 @@
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
 from rclpy.clock import Clock, ClockType
@@ -19,6 +20,7 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.class_kernels import UNKNOWN
 from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
 from rover_planner.planning.navigation.pose_classes import RoverOnMap
 from rover_planner.ros.guard import Guard
@@ -83,10 +85,20 @@ class HazardTopics:
         """Take new parameters."""
         if not parameters.hazard_map:
             self._enabled.clear()
+            self._withdraw()
             return
         if not self._topics:
             self._create_topics()
         self._enabled.set()
+
+    def _withdraw(self) -> None:
+        """Publish that no class is known: nobody judges what changes from now on."""
+        shown, self._shown = self._shown, None
+        if shown is None:
+            return
+        blank = shown.without_classes(self._node.get_clock().now().to_msg())
+        for name, topic in self._topics.items():
+            topic.publish(partial(blank.grid, name))
 
     def _create_topics(self) -> None:
         """Create the topics, which a node without a hazard map does not have."""
@@ -151,7 +163,9 @@ class HazardTopics:
         shown_at, is_done = time.monotonic(), False
         while not is_done and self._enabled.is_set():
             known, settings = self._service.known_map, self._service.settings
-            if known is None or self._done == (known.terrain, settings):
+            if known is None or (
+                self._shown is not None and self._done == (known.terrain, settings)
+            ):
                 return
             query = settings.query
             hazards.take(
@@ -186,6 +200,8 @@ class HazardTopics:
 
     def _publish(self, shown: "_Shown") -> None:
         """Publish a view; called in the executor's thread."""
+        if not self._enabled.is_set():
+            return
         self._shown = shown
         for name, topic in self._topics.items():
             topic.publish(partial(shown.grid, name))
@@ -205,6 +221,11 @@ class _Shown:
     """Frame of the map."""
     stamp: Any
     """builtin_interfaces/Time of all grids."""
+
+    def without_classes(self, stamp: Any) -> "_Shown":
+        """Return the same cells, none of them judged, at another time."""
+        unknown = np.full_like(self.view.classes, UNKNOWN)
+        return replace(self, view=replace(self.view, classes=unknown), stamp=stamp)
 
     def grid(self, name: str) -> OccupancyGrid:
         """Return the grid of a topic."""

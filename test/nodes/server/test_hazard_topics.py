@@ -83,6 +83,40 @@ def test_a_change_of_the_map_changes_the_grid_around_it(mapping, client, ros):
     wait_until(lambda: (cells(best[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
 
 
+def test_switched_off_no_cell_is_free_and_switched_on_it_is_that_of_the_newest_map(
+    mapping, client, ros
+):
+    costmap = ros.spin(Costmap(ros, ("worst", "heading_1")))
+    worst, first = costmap.grids["worst"], costmap.grids["heading_1"]
+    wait_until(lambda: is_free(worst) and is_free(first), "the map", 60.0)
+    assert client.set_parameter("hazard_map", False)[0]
+    for grids in (worst, first):
+        wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
+    client.send_terrain(make_terrain(slope_and_rock, half=3.0))
+    wait_until(lambda: mapping.service.terrain.elevation.max() > 0.4, "the rock in the map")
+    assert client.set_parameter("hazard_map", True)[0]
+    asked = []
+
+    def is_shown():
+        asked.append(call(costmap.ask, GetMap.Request()).map)
+        return is_free(worst)  # away from the rock
+
+    wait_until(is_shown, "the map", 60.0)
+    there = (1.5, 2.5), (1.5, 2.5)
+    assert all((cells(grid, *there) != PASSABLE).any() for grid in asked if grid.data)
+    wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
+
+
+def test_switched_off_and_on_the_same_map_is_published_again(mapping, client, ros):
+    costmap = ros.spin(Costmap(ros, ("worst",)))
+    worst = costmap.grids["worst"]
+    wait_until(lambda: is_free(worst), "the map", 60.0)
+    assert client.set_parameter("hazard_map", False)[0]
+    wait_until(lambda: not is_free(worst), "the withdrawal")
+    assert client.set_parameter("hazard_map", True)[0]
+    wait_until(lambda: is_free(worst), "the same map", 60.0)
+
+
 def test_without_the_parameter_there_is_no_map(mapped, ros):
     costmap = ros.spin(Costmap(ros, ("worst",)))
     assert len(call(costmap.ask, GetMap.Request()).map.data) == 0
