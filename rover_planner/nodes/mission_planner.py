@@ -279,7 +279,8 @@ def _run(words: Sequence[str] | None) -> int:
     node = MissionPlanner(options.map_frame, options.timeout)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    thread = threading.Thread(target=_spin, args=(executor,), daemon=True)
+    ended = threading.Event()
+    thread = threading.Thread(target=spin_until, args=(ended, executor), daemon=True)
     thread.start()
     try:
         return _carry_out(node, terrain, options)
@@ -290,8 +291,10 @@ def _run(words: Sequence[str] | None) -> int:
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_INTERRUPTED
     finally:
-        rclpy.try_shutdown()
+        ended.set()
+        executor.wake()
         thread.join(2.0)
+        rclpy.try_shutdown()
         node.destroy_node()
 
 
@@ -334,11 +337,17 @@ def _exit_code(answer: dict[str, Any]) -> int:
     return EXIT_NOT_TRAVERSABLE if _was_judged(answer) else EXIT_FAILED
 
 
-def _spin(executor: SingleThreadedExecutor) -> None:
-    try:
-        executor.spin()
-    except ExternalShutdownException:
-        return
+def spin_until(ended: threading.Event, executor: SingleThreadedExecutor) -> None:
+    """Spin until the mission has ended, or a signal has shut ROS down."""
+    while not ended.is_set():
+        try:
+            executor.spin_once(timeout_sec=0.2)
+        except ExternalShutdownException:
+            return
+        except Exception:
+            if executor.context.ok():
+                raise
+            return  # ROS was shut down while the executor began to wait
 
 
 def _report_change(report: Callable[[dict[str, Any]], None], goal: int, text: str) -> None:

@@ -4,13 +4,19 @@ import json
 import os
 import subprocess
 import sys
+import threading
 
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
 from rover_planner.nodes.mission.options import MissionOptions
-from rover_planner.nodes.mission_planner import main
+from rover_planner.nodes.mission_planner import main, spin_until
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.shell.poses import Pose
@@ -20,6 +26,28 @@ from support.ros_fixtures import domain_id
 
 START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
 """Words for a start, a goal before the wall at x = 0.5 m, and one behind it."""
+
+
+def test_ros_that_is_shut_down_while_the_node_spins_is_the_end_of_spinning():
+    context = Context()
+    rclpy.init(context=context, domain_id=domain_id())
+    node, executor = Node("spun", context=context), SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    rclpy.shutdown(context=context)
+    spin_until(threading.Event(), executor)  # as where a signal comes between two looks
+    node.destroy_node()
+
+
+def test_errors_while_the_node_spins_are_told():
+    context = Context()
+    rclpy.init(context=context, domain_id=domain_id())
+    node, executor = Node("spun", context=context), SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    node.create_timer(0.01, lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        spin_until(threading.Event(), executor)
+    node.destroy_node()
+    rclpy.shutdown(context=context)
 
 
 @pytest.mark.parametrize(
