@@ -12,6 +12,7 @@ import numpy as np
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.shell.end_signals import END_SIGNALS
 from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk, survey_chunk
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
@@ -67,14 +68,21 @@ def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -
 
 
 def start_command(*words, **environment) -> subprocess.Popen:
-    """Start `rover_planner` with words in a process of its own."""
+    """Start `rover_planner` with words in a process of its own, as from a terminal."""
     return subprocess.Popen(
         [sys.executable, "-m", "rover_planner", *map(str, words)],
         env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=_heed_signals,
     )
+
+
+def _heed_signals() -> None:
+    """Undo what tests under nohup would pass on: a signal that is ignored."""
+    for one in END_SIGNALS:
+        signal.signal(one, signal.SIG_DFL)
 
 
 def finish(process: subprocess.Popen, seconds=200.0) -> tuple[int, dict, str]:

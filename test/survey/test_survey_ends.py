@@ -109,7 +109,8 @@ def test_a_chunk_beyond_the_workers_of_a_scheduler_is_refused_before_a_store_is_
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGHUP])
 def test_a_survey_that_is_told_to_end_does_so_without_noise(ground, how):
     out = ground.with_name("out")
-    process = start_command("survey", "lsr1", ground, out, *SHARED, "--workers", 1)
+    words = ("--headings", 16, "--chunk", 64, "--workers", 1)
+    process = start_command("survey", "lsr1", ground, out, *words)
     try:
         wait_for_chunks(out, 1)
         process.send_signal(how)

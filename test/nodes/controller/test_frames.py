@@ -20,9 +20,7 @@ MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 
 @pytest.fixture
 def drive_in_odom(rover):
-    """Return a function that sends odometry in odom until a condition holds; there is a map."""
-    cloud = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-    cloud.publish(terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time()))
+    """Return a function that sends odometry in odom until a condition holds."""
     sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
     odometry = Odometry(child_frame_id="base_link")
     odometry.header.frame_id = "odom"
@@ -44,6 +42,8 @@ def contact_source(rover):
 
 
 def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller, drive_in_odom):
+    cloud = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    cloud.publish(terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time()))
     controller = start_controller(transform_timeout=5.0)
     known = controller._inputs.frames
     send_transforms(controller, known.take, ("map", "odom", MAP_ODOM), age=7.5)
