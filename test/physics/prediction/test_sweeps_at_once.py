@@ -1,7 +1,7 @@
 """Sweeps in several threads do not wait for each other, and find what each finds alone."""
 
 import threading
-import time
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -50,18 +50,24 @@ def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
 
 
 def test_a_short_sweep_does_not_wait_for_the_end_of_a_long_one():
-    terrain, ended = make_terrain(rocky), threading.Event()
+    terrain = make_terrain(rocky)
+    begun, enough, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def check():
+        begun.set()
+        if enough.is_set():
+            raise InterruptedError
 
     def sweep():
-        with interruptible(lambda: None):
-            judge_path(ROVER, terrain, path_along(0.3, 40_000))
-        ended.set()
+        with suppress(InterruptedError), interruptible(check):
+            judge_path(ROVER, terrain, path_along(0.3, 400_000))
+            ended.set()
 
-    judge_path(ROVER, terrain, path_along(0.0, 20))
     thread = threading.Thread(target=sweep)
     thread.start()
-    time.sleep(0.05)
+    assert begun.wait(20.0)
     for _ in range(3):
         judge_path(ROVER, terrain, path_along(0.0, 20))
     assert not ended.is_set()
+    enough.set()
     thread.join()
