@@ -99,7 +99,7 @@ def count_chunks(out: Path) -> int:
 
 def wait_for_chunks(out: Path, count: int) -> None:
     """Wait until so many chunks are finished."""
-    wait_until(lambda: count_chunks(out) >= count, f"{count} chunks", 120.0)
+    wait_until(lambda: count_chunks(out) >= count, f"{count} chunks", 300.0)
 
 
 def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:

@@ -212,7 +212,7 @@ def test_ctrl_c_ends_a_command_without_a_traceback(files):
     process.stdout.readline()  # it has begun
     process.send_signal(signal.SIGINT)
     try:
-        _, err = process.communicate(timeout=30)
+        _, err = process.communicate(timeout=60)
     finally:
         process.kill()
     assert process.returncode == EXIT_INTERRUPTED

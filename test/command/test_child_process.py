@@ -103,7 +103,7 @@ def test_no_child_outlives_a_parent_that_is_signalled(tmp_path, environment, num
         assert is_running(child)
         parent.send_signal(number)
         try:
-            assert parent.wait(20) == code
+            assert parent.wait(60) == code
         finally:
             parent.kill()
     wait_until_gone(child)

@@ -31,7 +31,8 @@ from support.survey_maps import (
 )
 from support.waiting import wait_until
 
-SHARED = ("--headings", 4, "--chunk", 64)
+LONG = ("--headings", 16, "--chunk", 64)
+"""Options of a survey of seconds, so that it is under way when it is told to end."""
 
 
 @pytest.fixture
@@ -109,8 +110,7 @@ def test_a_chunk_beyond_the_workers_of_a_scheduler_is_refused_before_a_store_is_
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGHUP])
 def test_a_survey_that_is_told_to_end_does_so_without_noise(ground, how):
     out = ground.with_name("out")
-    words = ("--headings", 16, "--chunk", 64, "--workers", 1)
-    process = start_command("survey", "lsr1", ground, out, *words)
+    process = start_command("survey", "lsr1", ground, out, *LONG, "--workers", 1)
     try:
         wait_for_chunks(out, 1)
         process.send_signal(how)
@@ -134,7 +134,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(ground):
         worker = start_dask("dask_worker", "--scheduler-file", scheduler_file, "--nthreads", 1,
                             "--no-dashboard", "--no-nanny")  # fmt: skip
         address = scheduler_file.read_text().split('"address": "')[1].split('"')[0]
-        process = start_command("survey", "lsr1", ground, out, *SHARED, "--scheduler", address)
+        process = start_command("survey", "lsr1", ground, out, *LONG, "--scheduler", address)
         wait_for_chunks(out, 1)
         scheduler.kill()
         _, err = process.communicate(timeout=100)

@@ -134,7 +134,7 @@ def test_the_worker_ends_with_its_parent(folder, how):
     with start(folder, PARENT, stderr=subprocess.DEVNULL) as process:
         pid = wait_for_worker(folder)
         process.send_signal(how)
-        process.wait(10.0)
+        process.wait(60.0)
     wait_until_gone(pid)
 
 
