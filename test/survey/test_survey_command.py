@@ -116,7 +116,7 @@ def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_p
         workers = children_of(process.pid)
         assert len(workers) == 2
         process.send_signal(how)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=200)
     finally:
         process.kill()
     if how == signal.SIGINT:

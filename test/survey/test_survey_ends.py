@@ -114,7 +114,7 @@ def test_a_survey_that_is_told_to_end_does_so_without_noise(ground, how):
     try:
         wait_for_chunks(out, 1)
         process.send_signal(how)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=200)
     finally:
         process.kill()
     assert (process.returncode, err) == (130, "")
@@ -137,7 +137,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(ground):
         process = start_command("survey", "lsr1", ground, out, *LONG, "--scheduler", address)
         wait_for_chunks(out, 1)
         scheduler.kill()
-        _, err = process.communicate(timeout=100)
+        _, err = process.communicate(timeout=200)
     finally:
         for one in (scheduler, worker, process):
             if one is not None:
