@@ -3,13 +3,15 @@
 import contextlib
 import os
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from support.waiting import TIMEOUT
+from support.waiting import TIMEOUT, wait_until
 
 
 def domain_id() -> int:
@@ -56,6 +58,13 @@ class RosRun:
         with contextlib.suppress(ExternalShutdownException):
             while not self._ending.is_set():
                 executor.spin_once(timeout_sec=0.2)
+
+
+def run_in_executor(node: Node, function: Callable[[], Any]) -> Any:
+    """Run a function in the thread that spins a node, as its callbacks are; return its result."""
+    task = node.executor.create_task(function)
+    wait_until(task.done, "the executor")
+    return task.result()
 
 
 def call(client, request, timeout: float = TIMEOUT):
