@@ -64,6 +64,12 @@ def start_controller(ros, enabled=True) -> TractionController:
     return ros.spin(TractionController(context=ros.context, parameter_overrides=parameters))
 
 
+def start_server(ros) -> TraverseServer:
+    """Return a server that answers however busy the machine is."""
+    values = [Parameter("time_budget", value=60.0)]
+    return ros.spin(TraverseServer(context=ros.context, parameter_overrides=values))
+
+
 class Ear(Node):
     """Keeps what it hears."""
 
@@ -175,7 +181,7 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     ros, terrain_file, engine
 ):
     simulator = start_simulator(ros, terrain_file, follow_commands=True, engine=engine)
-    server = ros.spin(TraverseServer(context=ros.context))
+    server = start_server(ros)
     controller = start_controller(ros)
     planner = ros.spin(MissionPlanner(context=ros.context))
     planner.wait_for_server()
@@ -250,7 +256,7 @@ def test_a_rover_that_stands_gets_another_plan_and_at_last_the_drive_is_given_up
     ros, terrain_file
 ):
     simulator = start_simulator(ros, terrain_file, follow_commands=True)
-    server = ros.spin(TraverseServer(context=ros.context))
+    server = start_server(ros)
     controller = start_controller(ros, enabled=False)
     wait_until(lambda: controller.statistics.updates > 5, "the controller to run")
     planner = ros.spin(MissionPlanner(context=ros.context))
