@@ -14,7 +14,6 @@ from rclpy.node import Node
 
 from support.waiting import TIMEOUT, wait_until
 
-
 DOMAINS = 50
 """Number of the domains of tests, 1 to 50; a demo takes one above them."""
 

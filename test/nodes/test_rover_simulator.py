@@ -191,7 +191,9 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     answer = planner.ask(place, goal)
     assert answer["traversable"], answer["reason"]
     told = []
-    drive_to(planner, goal, answer["poses"], DriveSettings(within=0.15, timeout=200.0), told.append)
+    drive_to(
+        planner, goal, answer["poses"], DriveSettings(within=0.15, timeout=200.0), told.append
+    )
     assert simulator.simulation.plant.pose()[0] > place[0] + 0.4
     assert controller.statistics.updates > 50
     assert controller.statistics.fallbacks == 0

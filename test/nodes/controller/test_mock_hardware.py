@@ -184,7 +184,9 @@ def test_efforts_drive_the_robot_straight_ahead(ros, start, tmp_path):
     ros.spin(SimulatedRobot(ros))
     controller = start()
     place = plant.simulation.plant.pose()
-    wait_until(lambda: plant.simulation.plant.pose()[0] > place[0] + 0.15, "the robot to drive", 60.0)
+    wait_until(
+        lambda: plant.simulation.plant.pose()[0] > place[0] + 0.15, "the robot to drive", 60.0
+    )
     moved = plant.simulation.plant.pose() - place
     assert abs(moved[1]) < 0.02 and abs(moved[2]) < 0.05
     wait_until(lambda: controller.state == "driving", "driving")
