@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist, TwistStamped
 from rcl_interfaces.msg import Log
 from rclpy.clock import Clock, ClockType
@@ -16,13 +16,18 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray, String
 
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import sensor_qos
+from support.waiting import wait_until
 
 RATE = 50.0
 """Messages per second of each sensor."""
 NANOSECONDS = 1_000_000_000
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 CONTROLLER = "traction_controller"
+QUEUE = 1000
+"""Messages that wait for a listener that is late; none is lost."""
+LATENESS = ("waiting for ", " stale: none for ", "updates came too late", "the clock was stepped")
+"""What faults say that come at the start, and on a machine that stalls."""
 
 Stamp = Callable[[], int]
 """Returns a header stamp [ns]."""
@@ -54,11 +59,14 @@ class DrivenRover(Node):
         """cmd_vel is sent with every so many-th message of the sensors."""
         self.commands: list[tuple[float, float, float]] = []
         """Time of arrival [s], largest magnitude and sum of each command's torques [N m]."""
+        self.command_stamps: list[int] = []
+        """Time [ns] at which each of them was sent."""
         self.states: list[str] = []
         self.brakes: list[bool] = []
         self.diagnostics: list[tuple[float, Any]] = []
         """Time of arrival [s] and status."""
         self.log: list[str] = []
+        self._sent_at = 0
         self._count = 0
         self._senders = {
             "joint_states": self.create_publisher(JointState, "joint_states", sensor_qos()),
@@ -75,18 +83,20 @@ class DrivenRover(Node):
 
     def listen(self) -> None:
         """Subscribe to what the controller publishes."""
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        latched = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        queue = QoSProfile(depth=QUEUE)
         for kind, name, hear, qos in (
-            (Float64MultiArray, f"{CONTROLLER}/commands", self._hear_command, topic_qos()),
+            (Float64MultiArray, f"{CONTROLLER}/commands", self._hear_command, queue),
             (String, f"{CONTROLLER}/state", lambda m: self.states.append(m.data), latched),
             (Bool, f"{CONTROLLER}/brake", lambda m: self.brakes.append(m.data), latched),
-            (DiagnosticArray, "diagnostics", self._hear_diagnostics, topic_qos()),
-            (Log, "/rosout", self._hear_log, 100),
+            (DiagnosticArray, "diagnostics", self._hear_diagnostics, queue),
+            (Log, "/rosout", self._hear_log, latched),
         ):
             self.create_subscription(kind, name, hear, qos)
 
     def _send(self) -> None:
         self._count += 1
+        self._sent_at = time.time_ns()
         stamp = self.stamp()
         now = Time(sec=stamp // NANOSECONDS, nanosec=stamp % NANOSECONDS)
         self.joints.header.stamp = self.imu.header.stamp = now
@@ -100,7 +110,8 @@ class DrivenRover(Node):
                 continue
             sender.publish(messages[name])
 
-    def _hear_command(self, message: Float64MultiArray) -> None:
+    def _hear_command(self, message: Float64MultiArray, info: dict[str, int]) -> None:
+        self.command_stamps.append(info["source_timestamp"])
         torques = list(message.data)
         self.commands.append((time.monotonic(), max(map(abs, torques)), sum(torques)))
 
@@ -130,8 +141,36 @@ class DrivenRover(Node):
 
     @property
     def status(self) -> Any:
-        """The controller's last status on diagnostics; None if there is none."""
-        return self.diagnostics[-1][1] if self.diagnostics else None
+        """The controller's last status on diagnostics; an empty one if there is none."""
+        return self.diagnostics[-1][1] if self.diagnostics else DiagnosticStatus()
+
+    @property
+    def faults(self) -> list[str]:
+        """Lines of the log about faults, without those of the start and of a late machine."""
+        lines = [line for line in self.log if "fault" in line]
+        return [line for line in lines if not any(text in line for text in LATENESS)]
+
+    def pushes_on(self, heard: int, count: int) -> bool:
+        """Return whether so many commands in a row push, of those after the first `heard`.
+
+        On a machine that stalls inputs are stale; the rover then rests, and a new row begins.
+        """
+        row = 0
+        for *_, push in self.commands[heard:]:
+            row = row + 1 if push > 0.0 else 0
+            if row >= count:
+                return True
+        return False
+
+    def commands_after(self, stamp: int) -> list[tuple[int, float]]:
+        """Return time [ns] and sum of torques of the commands that were sent after a time [ns]."""
+        sent = zip(self.command_stamps, self.commands, strict=False)
+        return [(at, push) for at, (*_, push) in sent if at > stamp]
+
+    def wait_for_send(self) -> int:
+        """Return when the first message was sent of those that are sent from now on [ns]."""
+        now = time.time_ns()
+        return wait_until(lambda: self._sent_at if self._sent_at > now else 0, "a message")
 
     def count_lines(self, text: str) -> int:
         """Return how many lines of the controller's log have a text."""

@@ -3,20 +3,30 @@
 import contextlib
 import os
 import threading
+import zlib
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from support.waiting import TIMEOUT
+from support.waiting import TIMEOUT, wait_until
+
+DOMAINS = 50
+"""Number of the domains of tests, 1 to 50; a demo takes one above them."""
 
 
 def domain_id() -> int:
-    """Return the domain (1 to 100) of this test process, so that parallel runs are separate."""
-    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
-    run = os.getppid() if "PYTEST_XDIST_WORKER" in os.environ else os.getpid()
-    return 1 + (run * 7 + int(worker)) % 100
+    """Return the domain of this test process, so that parallel runs are separate.
+
+    The processes that a test starts have the domain of their test, not that of another one.
+    """
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
+    first = os.getpid() if run is None else zlib.crc32(run.encode())
+    return 1 + (first + worker) % DOMAINS
 
 
 class RosRun:
@@ -56,6 +66,13 @@ class RosRun:
         with contextlib.suppress(ExternalShutdownException):
             while not self._ending.is_set():
                 executor.spin_once(timeout_sec=0.2)
+
+
+def run_in_executor(node: Node, function: Callable[[], Any]) -> Any:
+    """Run a function in the thread that spins a node, as its callbacks are; return its result."""
+    task = node.executor.create_task(function)
+    wait_until(task.done, "the executor")
+    return task.result()
 
 
 def call(client, request, timeout: float = TIMEOUT):

@@ -235,7 +235,9 @@ class TractionController(Node):
             self._trips = self._watchdog.trips
             self._supervisor.trip(LOOP_FAULT)
         clock = self.get_clock()
-        fault = self._clock_watch.check(now, clock.now().nanoseconds, clock.ros_time_is_active)
+        # Both clocks are read at once: what the update did before is no step of one of them.
+        seen, stamp = time.monotonic(), clock.now().nanoseconds
+        fault = self._clock_watch.check(seen, stamp, clock.ros_time_is_active)
         if self._clock_watch.stepped:
             self._inputs.stamps.forget()
             self.service.forget_times()

@@ -16,6 +16,7 @@ from rover_planner.demo import demo as demo_module
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.processes import ProcessToken
+from support.ros_fixtures import DOMAINS, domain_id
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("matplotlib", reason="needs matplotlib")
@@ -140,6 +141,11 @@ def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     assert err.count("\n") == 1
     assert "traverse_server" in err
     assert_nothing_left(demo)
+
+
+def test_a_demo_takes_no_domain_of_a_test_though_it_looks_unused():
+    taken = {int(demo_module._environment()["ROS_DOMAIN_ID"]) for _ in range(20)}
+    assert domain_id() <= DOMAINS < min(taken)
 
 
 def test_children_find_the_packages_and_the_standard_library():

@@ -45,15 +45,29 @@ def terrain_file(tmp_path_factory):
     return str(path)
 
 
-def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
+def make_simulator(ros, terrain_file, **values) -> RoverSimulator:
+    """Return a simulator that is not spun yet."""
     values = {"terrain_file": terrain_file, "start_x": START_X, "speed": 0.08} | values
     parameters = [Parameter(name, value=value) for name, value in values.items()]
-    return ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
+    return RoverSimulator(context=ros.context, parameter_overrides=parameters)
+
+
+def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
+    return ros.spin(make_simulator(ros, terrain_file, **values))
 
 
 def start_controller(ros, enabled=True) -> TractionController:
-    values = [Parameter("enabled_at_start", value=enabled)]
-    return ros.spin(TractionController(context=ros.context, parameter_overrides=values))
+    """Return a controller with the longest timeouts, for the sake of busy machines."""
+    values = {"enabled_at_start": enabled, "cmd_vel_timeout": 10.0}
+    values |= dict.fromkeys(("joint_states_timeout", "imu_timeout", "watchdog_timeout"), 1.0)
+    parameters = [Parameter(name, value=value) for name, value in values.items()]
+    return ros.spin(TractionController(context=ros.context, parameter_overrides=parameters))
+
+
+def start_server(ros) -> TraverseServer:
+    """Return a server that answers however busy the machine is."""
+    values = [Parameter("time_budget", value=60.0)]
+    return ros.spin(TraverseServer(context=ros.context, parameter_overrides=values))
 
 
 class Ear(Node):
@@ -79,7 +93,8 @@ class Ear(Node):
 def test_it_publishes_what_a_rover_would(ros, terrain_file):
     ear = Ear(ros)
     simulator = start_simulator(ros, terrain_file)
-    wait_until(lambda: len(ear.heard) >= 3, "joint states, attitude and map")
+    wanted = {"joint_states", "imu", "elevation_cloud"}
+    wait_until(lambda: wanted <= ear.heard.keys(), "joint states, attitude and map")
     state = ear.heard["joint_states"][-1]
     arm = simulator.simulation.settings.rover.manipulator.joints
     steering = steering_joints(simulator.simulation.settings.rover)
@@ -106,10 +121,12 @@ def test_joint_states_have_the_steering_angles_with_the_sign_of_the_rover(
         ear.commands.publish(twist)
         return simulator.simulation.plant.pose()[2] > 0.03
 
-    wait_until(has_turned, "the rover to turn left")
-    state = ear.heard["joint_states"][-1]
-    angles = dict(zip(state.name, state.position, strict=True))
-    assert sign * angles["front_left_steering"] > 0.2
+    def steers():
+        turned, heard = has_turned(), ear.heard.get("joint_states", ())
+        found = dict(zip(heard[-1].name, heard[-1].position, strict=True)) if heard else {}
+        return turned and sign * found.get("front_left_steering", 0.0) > 0.2 and found
+
+    angles = wait_until(steers, "the rover to turn left, with the sign of its joints")
     assert angles["rear_left_steering"] == pytest.approx(-angles["front_left_steering"], abs=0.01)
 
 
@@ -144,7 +161,8 @@ def test_bad_parameters_are_refused_by_name(ros, terrain_file):
 
 def test_soil_and_policy_are_those_of_the_model_that_moves_it(ros, terrain_file):
     given = {"soil": "dry_sand", "policy": "optimal"}
-    plant = start_simulator(ros, terrain_file, **given).simulation.plant
+    simulator = make_simulator(ros, terrain_file, **given)  # nothing else drives its plant
+    plant = simulator.simulation.plant
     model = sweep_path(
         load_rover("lsr1"),
         load_terrain(terrain_file),
@@ -154,6 +172,7 @@ def test_soil_and_policy_are_those_of_the_model_that_moves_it(ros, terrain_file)
     plant.drive(0.08, 0.0, 1e-9)
     assert (model.motion_resistance > 0.0).all()
     assert plant.state().wheel_torques == pytest.approx(model.torque[0], rel=1e-3)
+    simulator.destroy_node()
 
 
 @pytest.mark.slow
@@ -162,7 +181,7 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     ros, terrain_file, engine
 ):
     simulator = start_simulator(ros, terrain_file, follow_commands=True, engine=engine)
-    server = ros.spin(TraverseServer(context=ros.context))
+    server = start_server(ros)
     controller = start_controller(ros)
     planner = ros.spin(MissionPlanner(context=ros.context))
     planner.wait_for_server()
@@ -172,7 +191,9 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     answer = planner.ask(place, goal)
     assert answer["traversable"], answer["reason"]
     told = []
-    drive_to(planner, goal, answer["poses"], DriveSettings(within=0.15, timeout=60.0), told.append)
+    drive_to(
+        planner, goal, answer["poses"], DriveSettings(within=0.15, timeout=200.0), told.append
+    )
     assert simulator.simulation.plant.pose()[0] > place[0] + 0.4
     assert controller.statistics.updates > 50
     assert controller.statistics.fallbacks == 0
@@ -191,10 +212,10 @@ def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(ros, t
 
     def has_moved():
         ear.commands.publish(twist)
-        return simulator.simulation.plant.pose()[0] > place[0] + 0.05
+        moved = simulator.simulation.plant.pose()[0] > place[0] + 0.05
+        return moved and simulator.simulation.steering[0] == 0.06
 
-    wait_until(has_moved, "the rover to move", 60.0)
-    assert simulator.simulation.steering[0] == 0.06
+    wait_until(has_moved, "the rover to move at the speed from elsewhere", 60.0)
     wait_until(lambda: simulator.simulation.steering[0] == 0.0, "the speeds to be forgotten")
 
 
@@ -237,7 +258,7 @@ def test_a_rover_that_stands_gets_another_plan_and_at_last_the_drive_is_given_up
     ros, terrain_file
 ):
     simulator = start_simulator(ros, terrain_file, follow_commands=True)
-    server = ros.spin(TraverseServer(context=ros.context))
+    server = start_server(ros)
     controller = start_controller(ros, enabled=False)
     wait_until(lambda: controller.statistics.updates > 5, "the controller to run")
     planner = ros.spin(MissionPlanner(context=ros.context))
@@ -248,7 +269,7 @@ def test_a_rover_that_stands_gets_another_plan_and_at_last_the_drive_is_given_up
     goal = [place[0] + 0.5, 0.05, 0.0]
     answer = planner.ask(place, goal)
     assert answer["traversable"], answer["reason"]
-    settings = DriveSettings(within=0.15, timeout=60.0, period=0.1, patience=0.5)
+    settings = DriveSettings(within=0.15, timeout=200.0, period=0.1, patience=0.5)
     with pytest.raises(DriveFailedError, match="3 other ways led nowhere from .* stood for 0.5 s"):
         drive_to(planner, goal, answer["poses"], settings, lambda what: None)
 
@@ -258,7 +279,7 @@ def test_a_rover_that_stands_gets_another_plan_and_at_last_the_drive_is_given_up
         told.append(what)
 
     told: list[str] = []
-    settings = DriveSettings(within=0.15, timeout=60.0, patience=4.0)
+    settings = DriveSettings(within=0.15, timeout=200.0, patience=4.0)
     drive_to(planner, goal, answer["poses"], settings, start_motors_at_the_first_stop)
     assert "another plan" in told[1]
     assert simulator.simulation.plant.pose()[0] > place[0] + 0.3

@@ -12,7 +12,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.messages.transforms import send_transforms
 from support.rough_grounds import RESOLUTION, plane
-from support.waiting import wait_until
+from support.waiting import TIMEOUT, wait_until
 
 MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 """Where odometry began, on the map."""
@@ -37,8 +37,7 @@ def drive_in_odom(rover):
 
 
 def contact_source(rover):
-    values = {} if rover.status is None else {one.key: one.value for one in rover.status.values}
-    return values.get("contact_source")
+    return {one.key: one.value for one in rover.status.values}.get("contact_source")
 
 
 def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller, drive_in_odom):
@@ -47,8 +46,10 @@ def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller, drive_
     controller = start_controller(transform_timeout=5.0)
     known = controller._inputs.frames
     send_transforms(controller, known.take, ("map", "odom", MAP_ODOM), age=7.5)
-    stale = "the transform from 'odom' to 'map' is stale: it is 7."
+    stale = "the transform from 'odom' to 'map' is stale: it is "
     drive_in_odom(lambda: rover.count_lines(stale), "the refusal of a stale transform")
+    line = next(line for line in rover.log if stale in line)
+    assert 7.5 <= float(line.partition(stale)[2].split()[0]) < 7.5 + TIMEOUT
     drive_in_odom(lambda: contact_source(rover) == "motion", "the drive without the map")
     send_transforms(controller, known.take_static, ("map", "odom", MAP_ODOM), age=0.0)
     drive_in_odom(lambda: contact_source(rover) == "map", "contacts from the map")

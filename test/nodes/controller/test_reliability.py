@@ -10,7 +10,7 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from support.command_line import REPOSITORY
 from support.waiting import wait_until
 
-LONGEST, LONGEST_SHOWN = 2000.0, 6000.0
+LONGEST, LONGEST_SHOWN = 5000.0, 10000.0
 """Longest times to rest and to the error in diagnostics on a busy machine [ms]."""
 
 
@@ -22,7 +22,7 @@ def test_every_fault_ends_the_push_and_nothing_normal_does(tmp_path):
         log = tmp_path / "log"
         child = ChildProcess("benchmarks.reliability_controller", words, environment, log)
         children.append(child)
-        wait_until(lambda: not child.running, "the benchmark", 200.0)
+        wait_until(lambda: not child.running, "the benchmark", 400.0)
         assert child.exit_code == 0, log.read_text()
     rows = json.loads((tmp_path / "figures.json").read_text())
     found = {row["name"]: row["value"] for row in rows}
