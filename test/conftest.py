@@ -81,7 +81,10 @@ def client(ros):
 
 @pytest.fixture
 def start_server(ros):
-    """Return a function that starts a traverse server with parameters."""
+    """Return a function that starts a traverse server with parameters.
+
+    Questions have more time than by default, so that a busy machine makes no difference.
+    """
     from rclpy.parameter import Parameter
 
     from rover_physics.warm_up import warm_up
@@ -90,7 +93,8 @@ def start_server(ros):
     warm_up()
 
     def start(**overrides):
-        parameters = [Parameter(name, value=value) for name, value in overrides.items()]
+        values = {"time_budget": 60.0} | overrides
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
         return ros.spin(TraverseServer(context=ros.context, parameter_overrides=parameters))
 
     return start
