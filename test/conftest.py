@@ -101,6 +101,16 @@ def start_server(ros):
 
 
 @pytest.fixture
+def lasting(monkeypatch):
+    """Let a measurement count as one of now for a minute, so that a late thread changes nothing."""
+    from rover_planner.planning.answering import measurements
+    from rover_planner.planning.answering.traverse_service import TraverseService
+
+    monkeypatch.setattr(measurements, "MAX_AGE", 60.0)
+    monkeypatch.setattr(TraverseService.fresh_pose, "__defaults__", (60.0,))
+
+
+@pytest.fixture
 def server(start_server):
     """Return a traverse server without a map."""
     return start_server()
