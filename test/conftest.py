@@ -1,5 +1,6 @@
 """What all tests share: the real maps, and a ROS that stays on this machine."""
 
+import contextlib
 import os
 import signal
 from pathlib import Path
@@ -98,6 +99,26 @@ def start_server(ros):
         return ros.spin(TraverseServer(context=ros.context, parameter_overrides=parameters))
 
     return start
+
+
+@pytest.fixture
+def endless():
+    """Return a context in which the work on plans goes on until it is stopped."""
+    from rover_planner.planning.answering.situation import Situation
+
+    find = Situation.answer
+
+    def find_for_ever(situation, *asked):
+        while True:
+            find(situation, *asked)
+
+    @contextlib.contextmanager
+    def work_for_ever():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Situation, "answer", find_for_ever)
+            yield
+
+    return work_for_ever
 
 
 @pytest.fixture

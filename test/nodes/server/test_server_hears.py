@@ -36,27 +36,14 @@ def begin(ros, start=START, goal=FAR):
 
 
 @pytest.fixture
-def endless(monkeypatch):
-    """Let the work on a question go on until it is stopped, however late the test is."""
-    find = Situation.answer
-
-    def find_for_ever(situation, *asked):
-        while True:
-            find(situation, *asked)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Situation, "answer", find_for_ever)
-        yield patch
-
-
-@pytest.fixture
 def working(start_server, client, ros, endless):
     """Return a mapped server at work on a long question, and the question's future."""
     server = start_server(time_budget=600.0)
     client.send_terrain(make_terrain(waves))
-    _, future = begin(ros)
-    wait_until(lambda: server.desk.open_count == 1, "the question")
-    return server, future
+    with endless():
+        _, future = begin(ros)
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        yield server, future
 
 
 def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(working, client, ros):
@@ -125,9 +112,9 @@ def test_a_question_without_time_is_too_long_and_the_next_is_answered(
         # What a busy machine has not begun in time is busy, and to be asked again.
         return verdict["code"] != "busy" and verdict
 
-    verdict = wait_until(ask_in_time, "a question that was begun")
+    with endless():
+        verdict = wait_until(ask_in_time, "a question that was begun")
     assert verdict["code"] == "too_long" and "time budget of 0.2 s" in verdict["reason"]
-    endless.undo()
     assert client.set_parameter("time_budget", 60.0)[0]
     assert client.can_traverse(START, GOAL).poses
 
@@ -135,13 +122,14 @@ def test_a_question_without_time_is_too_long_and_the_next_is_answered(
 def test_questions_beyond_the_queue_are_busy_at_once(start_server, client, ros, endless):
     server = start_server(time_budget=600.0, max_waiting=0)
     client.send_terrain(make_terrain(waves))
-    _, first = begin(ros)
-    wait_until(lambda: server.desk.open_count == 1, "the question")
-    assert client.can_traverse(START, FAR).poses == [] and not first.done()
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
-    assert verdict["code"] == "busy" and verdict["request"] == "2"
-    server.desk.cancel("cancelled", "the end of the test")
+    with endless():
+        _, first = begin(ros)
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        assert client.can_traverse(START, FAR).poses == [] and not first.done()
+        wait_until(lambda: client.heard["verdict"], "the verdict")
+        verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+        assert verdict["code"] == "busy" and verdict["request"] == "2"
+        server.desk.cancel("cancelled", "the end of the test")
 
 
 def test_each_of_two_clients_can_tell_its_own_verdict(mapped, client, ros):
