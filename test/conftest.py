@@ -123,7 +123,7 @@ def endless():
 
 @pytest.fixture
 def lasting(monkeypatch):
-    """Let a measurement count as one of now for a minute, so that a late thread changes nothing."""
+    """Let a measurement count as one of now for a minute: a late thread changes nothing."""
     from rover_planner.planning.answering import measurements
     from rover_planner.planning.answering.traverse_service import TraverseService
 

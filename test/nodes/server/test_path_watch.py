@@ -27,7 +27,7 @@ from support.waiting import wait_until
 
 START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
 WATCHFUL = {"planner": "fan", "candidate_count": 1, "monitor_timeout": 60.0}
-"""Parameters; a busy machine may keep the pose from the server for more than the default second."""
+"""Parameters; a busy machine may keep the pose from the server for more than the usual second."""
 
 
 def rock_ahead(x, y):
