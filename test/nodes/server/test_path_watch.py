@@ -116,9 +116,12 @@ def watched(start_server, client, ros):
 def time_stop(rover, client) -> float:
     """Put a rock across the path; return the time until the stop is heard [s]."""
     cloud = terrain_to_point_cloud(make_terrain(rock_ahead), "map")
+    client.logs.clear()
     sent = time.monotonic()
     client.send_cloud(cloud)
-    return rover.wait_for_stop() - sent
+    delay = rover.wait_for_stop() - sent
+    client.wait_for_log("map from elevation_cloud")  # else the next map is taken for this one
+    return delay
 
 
 def clear_the_path(rover, client):
