@@ -83,7 +83,8 @@ def test_another_process_gets_an_answer(start_process, tmp_path):
     run = RosRun()
     try:
         client = run.spin(PlannerClient(run))
-        process = start_process(f"terrain_file:={tmp_path / 'flat.npz'}")
+        file = tmp_path / "flat.npz"
+        process = start_process(f"terrain_file:={file}", "time_budget:=60.0")
         read_until(process, "ready for rover lsr1")
         plan, results = client.next_results(
             lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
