@@ -1,6 +1,6 @@
 """A client of the traverse server for tests: publishes, calls, and keeps the results."""
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -47,10 +47,10 @@ class PlannerClient(Node):
         super().__init__("test_planner", context=ros.context)
         self.heard: dict[str, list] = {topic: [] for topic in RESULTS}
         self.logs: list[str] = []
-        self._heard_last: Callable[[], bool] = lambda: True
+        self._answers, self._counts = 0, dict.fromkeys(RESULTS, 0)
         for topic, kind in RESULTS.items():
             self.create_subscription(
-                kind, f"{SERVER}/{topic}", self.heard[topic].append, result_qos()
+                kind, f"{SERVER}/{topic}", partial(self._hear, topic), result_qos()
             )
         self.create_subscription(Log, "/rosout", lambda log: self.logs.append(log.msg), 100)
         self._plan = self.create_client(GetPlan, f"{SERVER}/can_traverse")
@@ -95,18 +95,14 @@ class PlannerClient(Node):
         """Ask for a plan between two PoseStamped."""
         request = GetPlan.Request(start=start, goal=goal, tolerance=float(tolerance))
         plan = call(self._plan, request).plan
-        markers = self.heard["markers"]
-        self._heard_last = lambda: (
-            bool(markers) and markers[-1].markers[0].header.stamp == plan.header.stamp
-        )
+        self._answers += 1
         return plan
 
     def check_path(self) -> Trigger.Response:
         """Call ~/check_path for the last path."""
-        markers = self.heard["markers"]
-        before = len(markers)
-        self._heard_last = lambda: len(markers) > before
-        return call(self._check, Trigger.Request())
+        response = call(self._check, Trigger.Request())
+        self._answers += 1
+        return response
 
     def check_poses(self, server, poses) -> Trigger.Response:
         """Publish a path of poses (n, 3), wait until the server has it, and check it."""
@@ -137,15 +133,23 @@ class PlannerClient(Node):
     def next_results(self, ask) -> tuple:
         """Call `ask` and return its answer with the results published for it.
 
-        Results are published after an answer. This method therefore first waits for the results
-        of the previous query, of which the markers are the last.
+        Results are published after an answer, and topics have no order. This method therefore
+        first waits for the results of the questions before.
         """
-        wait_until(self._heard_last, "the results of the question before")
+        wait_until(self._has_all, "the results of the questions before")
         for messages in self.heard.values():
             messages.clear()
         answer = ask()
-        wait_until(lambda: all(self.heard.values()), "all results")
+        wait_until(self._has_all, "all results")
         return answer, {topic: messages[-1] for topic, messages in self.heard.items()}
+
+    def _hear(self, topic: str, message) -> None:
+        self.heard[topic].append(message)
+        self._counts[topic] += 1
+
+    def _has_all(self) -> bool:
+        """Return whether each topic has told the same number of answers, and all of this node."""
+        return len(set(self._counts.values())) == 1 and self._counts["plan"] >= self._answers
 
     def wait_for_log(self, text: str) -> None:
         """Wait for a log line of the server with a text in it."""

@@ -75,12 +75,12 @@ def run_in_executor(node: Node, function: Callable[[], Any]) -> Any:
     return task.result()
 
 
-def call(client, request, timeout: float = TIMEOUT):
-    """Call a service and return its response."""
+def call(client, request, timeout: float = TIMEOUT, attempts: int = 2):
+    """Call a service and return its response, which each attempt waits for [s]."""
     assert client.wait_for_service(timeout), f"no service {client.srv_name}"
     # A client may discover a service before the service discovers the client. The service waits
-    # for only 0.1 s then, and its first response may be lost, so a request is sent twice.
-    for _ in range(2):
+    # for only 0.1 s then, and its first response may be lost, so a request is sent again.
+    for _ in range(attempts):
         done = threading.Event()
         future = client.call_async(request)
         future.add_done_callback(lambda _, done=done: done.set())

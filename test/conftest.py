@@ -1,5 +1,6 @@
 """What all tests share: the real maps, and a ROS that stays on this machine."""
 
+import contextlib
 import os
 import signal
 from pathlib import Path
@@ -81,7 +82,10 @@ def client(ros):
 
 @pytest.fixture
 def start_server(ros):
-    """Return a function that starts a traverse server with parameters."""
+    """Return a function that starts a traverse server with parameters.
+
+    Questions have more time than by default, so that a busy machine makes no difference.
+    """
     from rclpy.parameter import Parameter
 
     from rover_physics.warm_up import warm_up
@@ -90,10 +94,41 @@ def start_server(ros):
     warm_up()
 
     def start(**overrides):
-        parameters = [Parameter(name, value=value) for name, value in overrides.items()]
+        values = {"time_budget": 60.0} | overrides
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
         return ros.spin(TraverseServer(context=ros.context, parameter_overrides=parameters))
 
     return start
+
+
+@pytest.fixture
+def endless():
+    """Return a context in which the work on plans goes on until it is stopped."""
+    from rover_planner.planning.answering.situation import Situation
+
+    find = Situation.answer
+
+    def find_for_ever(situation, *asked):
+        while True:
+            find(situation, *asked)
+
+    @contextlib.contextmanager
+    def work_for_ever():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Situation, "answer", find_for_ever)
+            yield
+
+    return work_for_ever
+
+
+@pytest.fixture
+def lasting(monkeypatch):
+    """Let a measurement count as one of now for a minute: a late thread changes nothing."""
+    from rover_planner.planning.answering import measurements
+    from rover_planner.planning.answering.traverse_service import TraverseService
+
+    monkeypatch.setattr(measurements, "MAX_AGE", 60.0)
+    monkeypatch.setattr(TraverseService.fresh_pose, "__defaults__", (60.0,))
 
 
 @pytest.fixture

@@ -78,4 +78,4 @@ def start(checkout: Path, home: Path, prepare: Callable[[], None]) -> Start:
         raise AssertionError(f"the server has ended with {server.wait()}: {line}")
     finally:
         server.terminate()
-        server.wait(10.0)
+        server.wait(60.0)

@@ -56,7 +56,8 @@ class Tally:
 def start_server(stage: Stage, is_paused: bool) -> list[Client]:
     """Start a server, on a simulated time that stands still or not; return two clients."""
     ground = make_terrain(wall_at(WALL))
-    stage.start_ready(ground, use_sim_time=is_paused, candidate_count=1, waypoint_spacing=0.05)
+    few = {"candidate_count": 1, "waypoint_spacing": 0.05}
+    stage.start_ready(ground, use_sim_time=is_paused, time_budget=60.0, **few)
     return [stage.client(errand.name) for errand in ERRANDS]
 
 

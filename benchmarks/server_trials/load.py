@@ -20,6 +20,7 @@ from benchmarks.server_trials.stage import (
     run_together,
     straight_path,
 )
+from msg_adapters.identity import path_hash
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.demo.child_process import ChildProcess
 from rover_planner.ros.qos import topic_qos
@@ -78,9 +79,10 @@ def burst(stage: Stage, count: int, budget: float, half_length: float, spacing: 
     ground = make_terrain(waves, half=half_length + 2.0)
     stage.start_ready(ground, time_budget=budget, waypoint_spacing=spacing)
     clients = [stage.client(f"asker{k}") for k in range(ASKERS)]
-    clients[0].publish(straight_path((-half_length, 0.0, 0.0), (half_length, 0.0, 0.0)))
-    clients[0].cancel()  # the path travels on another topic; it is there after this
-    time.sleep(0.2)
+    path = straight_path((-half_length, 0.0, 0.0), (half_length, 0.0, 0.0))
+    clients[0].publish(path)
+    while clients[0].check()["path_hash"] != path_hash(path):
+        time.sleep(0.05)  # the path travels on another topic
     return ask_at_once(clients, count, budget + 30.0)
 
 
@@ -108,7 +110,7 @@ class Soak:
 
 def soak(stage: Stage, seconds: float, clients: int) -> Soak:
     """Ask without a pause, with maps at 1 Hz and joint states at 100 Hz."""
-    server = stage.start_ready(make_terrain(waves), candidate_count=1)
+    server = stage.start_ready(make_terrain(waves), candidate_count=1, time_budget=30.0)
     askers = [stage.client(f"asker{k}") for k in range(clients)]
     maps, result = MapSource(stage.ros), Soak()
     end = time.monotonic() + seconds
@@ -125,7 +127,7 @@ def _ask_until(end: float, asker: Client, result: Soak) -> None:
     while time.monotonic() < end:
         began = time.perf_counter()
         try:
-            plan = asker.plan(START, GOAL, 10.0)
+            plan = asker.plan(START, GOAL, 40.0)
         except LostAnswerError:
             result.lost += 1
             continue

@@ -30,6 +30,8 @@ from support.waiting import wait_until
 
 SERVER = "/traverse_server"
 ROOT = Path(__file__).resolve().parents[2]
+ATTEMPTS = 15
+"""Times that a response is asked for that may be lost, 2 s each."""
 START_TIME = 300.0
 """Longest wait for a server [s], which may have to compile."""
 HEAVY = {"waypoint_spacing": 0.001, "candidate_count": 99, "candidate_spacing": 0.01}
@@ -66,8 +68,8 @@ class Client:
             assert client.wait_for_service(START_TIME), client.srv_name
         # A response is lost if the server does not know the client yet; there is nothing that a
         # client could wait for.
-        call(self._parameters, SetParameters.Request(), 2.0)
-        call(self._check, Trigger.Request(), 2.0)
+        call(self._parameters, SetParameters.Request(), 2.0, ATTEMPTS)
+        call(self._check, Trigger.Request(), 2.0, ATTEMPTS)
 
     def hear_verdicts(self) -> None:
         """Collect the messages of ~/verdict from now on."""
@@ -75,6 +77,10 @@ class Client:
         self.node.create_subscription(
             DiagnosticArray, f"{SERVER}/verdict", self.verdicts.append, deep
         )
+        # A verdict that nobody hears gives way to the next one. The server knows the subscription
+        # when it knows what this node created after it.
+        after = self.node.create_client(SetParameters, f"{SERVER}/set_parameters")
+        call(after, SetParameters.Request(), 2.0, ATTEMPTS)
 
     def publish(self, path: PathMessage) -> None:
         """Publish a path on ~/path."""
@@ -135,7 +141,9 @@ class MapSource:
         self.node = ros.spin(Node("map_source", context=ros.context))
         self.logs: list[str] = []
         self._cloud = self.node.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self.node.create_subscription(Log, "/rosout", self._hear, 100)
+        # Lines of before the server knows the subscription are heard, too.
+        lines = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.node.create_subscription(Log, "/rosout", self._hear, lines)
 
     def publish(self, terrain: Terrain) -> None:
         """Publish a map."""

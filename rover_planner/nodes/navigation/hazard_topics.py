@@ -74,6 +74,7 @@ class HazardTopics:
         node.create_service(GetMap, "~/get_hazard_map", self._get)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(CATCH_UP, guard.around(self._catch_up), clock=steady)
+        self._withdrawals = 0
         self._enabled = threading.Event()
         self._ending = threading.Event()
         self._patience = 0.0
@@ -93,6 +94,7 @@ class HazardTopics:
 
     def _withdraw(self) -> None:
         """Publish that no class is known: nobody judges what changes from now on."""
+        self._withdrawals += 1
         shown, self._shown = self._shown, None
         if shown is None:
             return
@@ -162,6 +164,7 @@ class HazardTopics:
         """Take the present map, judge what is stale, and publish; newer maps are followed."""
         shown_at, is_done = time.monotonic(), False
         while not is_done and self._enabled.is_set():
+            withdrawals = self._withdrawals
             known, settings = self._service.known_map, self._service.settings
             if known is None or (
                 self._shown is not None and self._done == (known.terrain, settings)
@@ -179,7 +182,7 @@ class HazardTopics:
                 self._done = known.terrain, settings
             if is_done or time.monotonic() - shown_at > SHOW_PERIOD:
                 shown_at = time.monotonic()
-                self._show(hazards, known.fingerprint)
+                self._show(hazards, known.fingerprint, withdrawals)
 
     def _let_questions_go_first(self) -> None:
         """Wait while there are questions, for MAX_PAUSE in each SLICE; called between poses."""
@@ -190,17 +193,17 @@ class HazardTopics:
             self._check_end()
         self._patience -= time.monotonic() - began
 
-    def _show(self, hazards: HazardMap, map_hash: str) -> None:
+    def _show(self, hazards: HazardMap, map_hash: str, withdrawals: int) -> None:
         view = hazards.view()
         if view is None:
             return
         stamp = self._node.get_clock().now().to_msg()
         shown = _Shown(view, map_hash, hazards.stale_count, self._frame, stamp)
-        self._handover.call(partial(self._publish, shown))
+        self._handover.call(partial(self._publish, shown, withdrawals))
 
-    def _publish(self, shown: "_Shown") -> None:
-        """Publish a view; called in the executor's thread."""
-        if not self._enabled.is_set():
+    def _publish(self, shown: "_Shown", withdrawals: int) -> None:
+        """Publish a view, but none of before a withdrawal; called in the executor's thread."""
+        if not self._enabled.is_set() or withdrawals != self._withdrawals:
             return
         self._shown = shown
         for name, topic in self._topics.items():

@@ -134,6 +134,7 @@ class PathWatch:
     def _set_path(self, path: WatchedPath | None) -> None:
         with self._changed:
             self._new_path = path
+            self._sight = None  # it knows the map and the pose of before the path was accepted
 
     def _switch(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         """Set the parameter `monitor`, so that there is one place that has its value."""

@@ -14,7 +14,7 @@ from support.rough_grounds import plane
 LSR1 = load_rover("lsr1")
 MAP = plane(0.0, 0.0, half=4.0)
 STEP = 0.02
-SETTINGS = DriveSettings(within=0.1, timeout=60.0, patience=0.3)
+SETTINGS = DriveSettings(within=0.1, patience=0.3)
 
 
 class SimulatedRover:

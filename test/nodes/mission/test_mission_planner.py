@@ -14,6 +14,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.mission_planner import main, spin_until
@@ -169,7 +170,10 @@ def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for():
 @pytest.mark.slow
 def test_a_server_with_another_name_is_found_by_remapping(ros):
     judge = ["--ros-args", "-r", "__node:=judge"]
-    server = ros.spin(TraverseServer(context=ros.context, cli_args=judge))
+    patient = [Parameter("time_budget", value=60.0)]
+    server = ros.spin(
+        TraverseServer(context=ros.context, cli_args=judge, parameter_overrides=patient)
+    )
     server.service.take_terrain(make_terrain(waves))
     names = ("can_traverse", "verdict", "wheel_loads", "slip_ratios")
     words = [f"traverse_server/{name}:=judge/{name}" for name in names]

@@ -34,7 +34,7 @@ def on_map(pose):
 @pytest.fixture
 def in_odom(start_server):
     """Return a server whose map is in odom."""
-    server = start_server(map_frame="odom", transform_timeout=2.0)
+    server = start_server(map_frame="odom", transform_timeout=30.0)
     server.service.take_terrain(make_terrain(rocky))
     return server
 
@@ -68,17 +68,17 @@ def test_a_path_on_the_map_is_judged_in_odom(in_odom, client):
 
 
 def test_a_stale_or_missing_transform_is_refused_with_the_reason(in_odom, client):
-    send(in_odom, ("map", "odom", MAP_ODOM), age=7.5)
+    send(in_odom, ("map", "odom", MAP_ODOM), age=100.0)
     plan, results = client.next_results(lambda: client.plan(on_map(START), on_map(GOAL)))
     verdict = verdict_of(results)
     assert plan.poses == [] and verdict["code"] == "bad_request"
-    assert "the transform from 'odom' to 'map' is stale: it is 7.5" in verdict["reason"]
-    assert "transform_timeout is 2 s" in verdict["reason"]
+    assert "the transform from 'odom' to 'map' is stale: it is 10" in verdict["reason"]
+    assert "transform_timeout is 30 s" in verdict["reason"]
     _, results = client.next_results(lambda: client.can_traverse(START, GOAL, frame="moon"))
     assert "it must be in 'odom'" in verdict_of(results)["reason"]
 
 
-def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client):
+def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, lasting):
     plan, results = client.next_results(
         lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "map"))
     )
@@ -92,7 +92,7 @@ def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client):
     assert "start is without a frame_id" in verdict_of(results)["reason"]
 
 
-def test_an_empty_start_is_where_tf_says_the_rover_is(in_odom, client):
+def test_an_empty_start_is_where_tf_says_the_rover_is(in_odom, client, lasting):
     client.send_odometry((0.5, 0.5, 0.0), "odom")  # less sure than /tf
     wait_until(lambda: in_odom.service.fresh_pose() is not None, "odometry")
     here = Rigid.from_rpy(*START[:2], 0.1, 0.05, 0.02, START[2])
@@ -102,16 +102,17 @@ def test_an_empty_start_is_where_tf_says_the_rover_is(in_odom, client):
 
 
 def test_the_monitor_follows_tf_without_odometry(start_server, client):
-    server = start_server(monitor=True, planner="fan", transform_timeout=5.0)
+    server = start_server(monitor=True, planner="fan", transform_timeout=60.0)
     server.service.take_terrain(make_terrain(rocky))
     send(server, ("map", "base_link", Rigid.from_rpy(*START[:2], 0.0, 0.0, 0.0, START[2])))
     assert client.can_traverse(START, GOAL).poses
     wait_until(lambda: server.watch.finding.place is not None, "the place")
-    assert server.watch.finding.place.index == 0 and server.watch.finding.state == "watching"
+    found = server.watch.finding
+    assert found.place.index == 0 and found.state == "watching"
     assert server.service.fresh_pose() is None
 
 
-def test_odometry_in_another_frame_is_transformed(mapped, client):
+def test_odometry_in_another_frame_is_transformed(mapped, client, lasting):
     send(mapped, ("map", "odom", MAP_ODOM), take="take_static")
     client.send_odometry((1.0, 2.0, 0.5), "odom")
     wait_until(lambda: mapped.service.fresh_pose() is not None, "odometry")
@@ -119,7 +120,7 @@ def test_odometry_in_another_frame_is_transformed(mapped, client):
     np.testing.assert_allclose(mapped.service.fresh_pose(), right, atol=1e-9)
 
 
-def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, client):
+def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, client, lasting):
     offset = [0.3, 0.0, 0.25, 0.0, 0.0, 0.0]
     shifted = start_server(base_offset=offset)
     shifted.service.take_terrain(make_terrain(lambda x, y: 0.0 * x))
@@ -153,7 +154,7 @@ def test_tf_topics_are_heard_where_their_type_is_installed(monkeypatch, start_se
     moving = client.create_publisher(TransformStamped, "/tf", 10)
     stamp = client.get_clock().now().to_msg()
     static.publish(transform_message("base_link", "camera", MAP_ODOM, stamp))
-    server = start_server()
+    server = start_server(transform_timeout=60.0)
     wait_until(lambda: moving.get_subscription_count(), "the subscription")
     here = Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.3)
     moving.publish(transform_message("map", "base_link", here, client.get_clock().now().to_msg()))

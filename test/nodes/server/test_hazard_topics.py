@@ -1,5 +1,7 @@
 """The hazard map over real DDS: latched, followed by changes, and the same as the service's."""
 
+import threading
+
 import numpy as np
 import pytest
 from nav_msgs.msg import OccupancyGrid
@@ -7,6 +9,7 @@ from nav_msgs.srv import GetMap
 from rclpy.node import Node
 
 from msg_adapters.results.hazard_grids import VALUES
+from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import SERVER
@@ -19,6 +22,11 @@ PASSABLE, IMPASSABLE, UNKNOWN = VALUES[0], VALUES[-1], -1
 def slope_and_rock(x, y):
     """Return waves with a rock of 0.5 m at (2, 2)."""
     return waves(x, y) + 0.5 * ((abs(x - 2.0) < 0.3) & (abs(y - 2.0) < 0.3))
+
+
+def rock_in_the_middle(x, y):
+    """Return waves with such a rock at (0, 0)."""
+    return waves(x, y) + 0.5 * ((abs(x) < 0.3) & (abs(y) < 0.3))
 
 
 class Costmap(Node):
@@ -45,8 +53,8 @@ def cells(grid, x=(-1.0, 1.0), y=(-1.0, 1.0)):
     return values[rows, columns]
 
 
-def is_free(grids):
-    return bool(grids) and (cells(grids[-1]) == PASSABLE).all()
+def is_free(grids, *part):
+    return bool(grids) and (cells(grids[-1], *part) == PASSABLE).all()
 
 
 @pytest.fixture
@@ -74,8 +82,9 @@ def test_a_late_subscriber_gets_worst_best_and_one_heading(mapping, client, ros)
 def test_a_change_of_the_map_changes_the_grid_around_it(mapping, client, ros):
     costmap = ros.spin(Costmap(ros, ("worst", "best")))
     worst, best = costmap.grids["worst"], costmap.grids["best"]
-    wait_until(lambda: is_free(worst) and is_free(best), "the map", 60.0)
     there, away = ((1.5, 2.5), (1.5, 2.5)), ((-2.0, 0.5), (-2.0, 0.5))
+    # A grid may be published before all its cells are judged.
+    wait_until(lambda: is_free(worst, *away) and is_free(best, *away), "the map", 60.0)
     before = cells(worst[-1], *away)
     client.send_terrain(make_terrain(slope_and_rock, half=3.0))
     wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
@@ -105,6 +114,32 @@ def test_switched_off_no_cell_is_free_and_switched_on_it_is_that_of_the_newest_m
     there = (1.5, 2.5), (1.5, 2.5)
     assert all((cells(grid, *there) != PASSABLE).any() for grid in asked if grid.data)
     wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
+
+
+def test_what_was_judged_before_a_withdrawal_is_not_shown_after_it(
+    mapping, client, ros, monkeypatch
+):
+    costmap = ros.spin(Costmap(ros, ("worst",)))
+    worst, judged, go_on = costmap.grids["worst"], threading.Event(), threading.Event()
+    wait_until(lambda: is_free(worst), "the map", 60.0)
+    show = HazardTopics._show
+
+    def show_late(*given):
+        judged.set()
+        assert go_on.wait(60.0)
+        show(*given)
+
+    monkeypatch.setattr(HazardTopics, "_show", show_late)
+    client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.001, half=3.0))
+    assert judged.wait(60.0), "the classes on the second map"
+    assert client.set_parameter("hazard_map", False)[0]
+    wait_until(lambda: set(worst[-1].data) == {UNKNOWN}, "the withdrawal")
+    client.send_terrain(make_terrain(rock_in_the_middle, half=3.0))
+    assert client.set_parameter("hazard_map", True)[0]
+    before = len(worst)
+    go_on.set()
+    wait_until(lambda: len(worst) > before, "the third map", 60.0)
+    assert not any(is_free([grid]) for grid in worst[before:])
 
 
 def test_switched_off_and_on_the_same_map_is_published_again(mapping, client, ros):

@@ -91,7 +91,7 @@ def compute(server, start, goal):
     return handle
 
 
-def test_a_path_to_a_pose_is_the_plan_of_can_traverse(server, client):
+def test_a_path_to_a_pose_is_the_plan_of_can_traverse(server, client, lasting):
     server.service.take_terrain(make_terrain(waves))
     plan = path_to_poses(client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)), "map")
     handle = compute(server, (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0))

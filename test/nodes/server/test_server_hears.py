@@ -1,6 +1,7 @@
 """A traverse server hears parameters, maps, cancels and signals while it works on a question."""
 
 import json
+import threading
 import time
 from dataclasses import replace
 
@@ -22,8 +23,6 @@ from support.planner_client import GOAL, SERVER, START, verdict_of
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
-LONG_WORK = {"waypoint_spacing": 0.001, "candidate_count": 99, "candidate_spacing": 0.01}
-"""Parameters with which a question takes some seconds."""
 FAR = (3.0, 0.5, 0.0)
 
 
@@ -37,13 +36,14 @@ def begin(ros, start=START, goal=FAR):
 
 
 @pytest.fixture
-def working(start_server, client, ros):
+def working(start_server, client, ros, endless):
     """Return a mapped server at work on a long question, and the question's future."""
-    server = start_server(time_budget=60.0, **LONG_WORK)
+    server = start_server(time_budget=600.0)
     client.send_terrain(make_terrain(waves))
-    _, future = begin(ros)
-    wait_until(lambda: server.desk.open_count == 1, "the question")
-    return server, future
+    with endless():
+        _, future = begin(ros)
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        yield server, future
 
 
 def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(working, client, ros):
@@ -66,17 +66,18 @@ def test_a_question_keeps_the_map_it_was_asked_about(start_server, client, ros, 
     server = start_server()
     client.send_terrain(make_terrain(waves))
     first = server.service.known_map.fingerprint
-    find = Situation.answer
+    find, begun, go_on = Situation.answer, threading.Event(), threading.Event()
 
-    def find_slowly(situation, *asked):
-        time.sleep(0.5)
+    def find_later(situation, *asked):
+        begun.set()
+        assert go_on.wait(60.0)
         return find(situation, *asked)
 
-    monkeypatch.setattr(Situation, "answer", find_slowly)
+    monkeypatch.setattr(Situation, "answer", find_later)
     _, future = begin(ros)
-    wait_until(lambda: server.desk.open_count == 1, "the question")
-    time.sleep(0.1)
+    assert begun.wait(20.0), "the work on the question"
     client.send_terrain(make_terrain(wall_at(0.5)))
+    go_on.set()
     wait_until(future.done, "the answer")
     assert len(future.result().plan.poses) > 2
     wait_until(lambda: client.heard["verdict"], "the verdict")
@@ -99,28 +100,36 @@ def test_a_question_waits_for_the_maps_that_came_before_it(server, client):
         assert bool(client.can_traverse(START, GOAL).poses) == (ground is waves)
 
 
-def test_a_question_without_time_is_too_long_and_the_next_is_answered(start_server, client):
-    start_server(time_budget=0.2, **LONG_WORK)
+def test_a_question_without_time_is_too_long_and_the_next_is_answered(
+    start_server, client, endless
+):
+    start_server(time_budget=0.2)
     client.send_terrain(make_terrain(waves))
-    _, results = client.next_results(lambda: client.can_traverse(START, FAR))
-    verdict = verdict_of(results)
+
+    def ask_in_time():
+        _, results = client.next_results(lambda: client.can_traverse(START, FAR))
+        verdict = verdict_of(results)
+        # What a busy machine has not begun in time is busy, and to be asked again.
+        return verdict["code"] != "busy" and verdict
+
+    with endless():
+        verdict = wait_until(ask_in_time, "a question that was begun")
     assert verdict["code"] == "too_long" and "time budget of 0.2 s" in verdict["reason"]
-    assert client.set_parameter("waypoint_spacing", 0.05)[0]
-    assert client.set_parameter("candidate_count", 1)[0]
-    assert client.set_parameter("time_budget", 5.0)[0]
+    assert client.set_parameter("time_budget", 60.0)[0]
     assert client.can_traverse(START, GOAL).poses
 
 
-def test_questions_beyond_the_queue_are_busy_at_once(start_server, client, ros):
-    server = start_server(time_budget=60.0, max_waiting=0, **LONG_WORK)
+def test_questions_beyond_the_queue_are_busy_at_once(start_server, client, ros, endless):
+    server = start_server(time_budget=600.0, max_waiting=0)
     client.send_terrain(make_terrain(waves))
-    _, first = begin(ros)
-    wait_until(lambda: server.desk.open_count == 1, "the question")
-    assert client.can_traverse(START, FAR).poses == [] and not first.done()
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
-    assert verdict["code"] == "busy" and verdict["request"] == "2"
-    server.desk.cancel("cancelled", "the end of the test")
+    with endless():
+        _, first = begin(ros)
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        assert client.can_traverse(START, FAR).poses == [] and not first.done()
+        wait_until(lambda: client.heard["verdict"], "the verdict")
+        verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+        assert verdict["code"] == "busy" and verdict["request"] == "2"
+        server.desk.cancel("cancelled", "the end of the test")
 
 
 def test_each_of_two_clients_can_tell_its_own_verdict(mapped, client, ros):
@@ -228,25 +237,29 @@ def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(server, client,
     def last() -> DiagnosticStatus:
         return heard[-1].status[0]
 
-    wait_until(lambda: heard and last().level == DiagnosticStatus.WARN, "the warning")
-    assert "no map" in last().message
+    def wait_for(level) -> DiagnosticStatus:
+        def is_told():
+            now = last() if heard else None
+            return now is not None and now.level == level and now
+
+        return wait_until(is_told, f"a status of level {level}")
+
+    assert "no map" in wait_for(DiagnosticStatus.WARN).message
     client.send_terrain(make_terrain(wall_at(0.5)))
     assert client.can_traverse(START, GOAL).poses == []
-    wait_until(lambda: last().message == "ready", "the map")
-    assert last().level == DiagnosticStatus.OK
+    assert wait_for(DiagnosticStatus.OK).message == "ready"
 
-    def told() -> dict[str, str]:
-        return {value.key: value.value for value in last().values}
+    def told() -> dict[str, str] | None:
+        values = {value.key: value.value for value in last().values}
+        return values if values["last question"] == "1, can_traverse" else None
 
-    wait_until(lambda: told()["last question"] == "1, can_traverse", "the question")
-    values = told()
+    values = wait_until(told, "the question")
     assert values["map"] == "elevation_cloud" and values["map coverage [%]"] == "100.0"
     assert 0.0 <= float(values["map age [s]"]) < 60.0
     assert values["last answer"] != "traversable"
     assert float(values["last latency [ms]"]) > 0.0
     server.guard.report("a test", ZeroDivisionError("made up"))
-    wait_until(lambda: last().level == DiagnosticStatus.ERROR, "the error")
-    assert "ZeroDivisionError" in last().message
+    assert "ZeroDivisionError" in wait_for(DiagnosticStatus.ERROR).message
 
 
 def test_two_servers_in_two_namespaces_share_no_name(ros, client):

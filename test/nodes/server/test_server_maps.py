@@ -1,5 +1,6 @@
 """A traverse server merges maps of both kinds, and fills the ground on which the rover stands."""
 
+import threading
 import time
 
 import numpy as np
@@ -90,14 +91,14 @@ def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
     save_terrain(file, PRIOR)
     server = start_server(terrain_file=str(file))
     before = server.service.known_map.fingerprint
-    merge, began = MapKeeper.take, []
+    merge, began, go_on = MapKeeper.take, threading.Event(), threading.Event()
 
-    def take_slowly(keeper, *given):
-        began.append(time.monotonic())
-        time.sleep(1.0)
+    def take_later(keeper, *given):
+        began.set()
+        assert go_on.wait(60.0)
         return merge(keeper, *given)
 
-    monkeypatch.setattr(MapKeeper, "take", take_slowly)
+    monkeypatch.setattr(MapKeeper, "take", take_later)
     waits = []
     wait = server.desk._maps.wait
 
@@ -108,10 +109,11 @@ def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
 
     monkeypatch.setattr(server.desk._maps, "wait", timed_wait)
     client.send_cloud(terrain_to_point_cloud(make_terrain(wall_at(0.5)), "map"))
-    wait_until(lambda: began, "the map")
+    assert began.wait(20.0), "the map"
     _, results = client.next_results(lambda: client.can_traverse(START, GOAL))
     assert verdict_of(results)["map_hash"] == before
     assert 0.004 < waits[0] < 0.3  # 5 ms by the clock; a busy machine wakes threads late
+    go_on.set()
     wait_until(lambda: server.service.known_map.fingerprint != before, "the merged map")
     assert client.can_traverse(START, GOAL).poses == []
 
@@ -155,8 +157,13 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
 def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu(start_server, client):
     server = start_server(imu_attitude=True)
     publisher = client.create_publisher(Imu, "imu", 1)
-    send_standing(client, (0.0, 0.0, 0.3))
-    wait_until(lambda: server.service.standing() is not None, "the odometry")
+
+    def is_standing():
+        send_standing(client, (0.0, 0.0, 0.3))
+        time.sleep(0.05)
+        return server.service.standing() is not None
+
+    wait_until(is_standing, "the odometry")
     turned = xyzw_from_rpy(0.1, -0.2, 1.0)
     x, y, z, w = turned.tolist()
     message = Imu(orientation=Quaternion(x=x, y=y, z=z, w=w))

@@ -258,7 +258,7 @@ def test_the_server_starts_with_a_terrain_file(start_server, client, tmp_path):
     assert len(client.can_traverse(START, GOAL).poses) > 2
 
 
-def test_the_measured_suspension_raises_a_warning_where_it_disagrees(mapped, client):
+def test_the_measured_suspension_raises_a_warning_where_it_disagrees(mapped, client, lasting):
     poses = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
     client.send_joints(["camera", "rocker_left"], [math.nan, 0.5])
     wait_until(lambda: mapped.service.joints, "the joints")

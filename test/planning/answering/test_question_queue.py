@@ -22,6 +22,25 @@ from support.grounds import make_terrain, waves
 from support.waiting import wait_until
 
 
+class Work:
+    """Work that takes all the time of its question, which begins when the work does.
+
+    A thread that is late makes no difference: a question that has not begun in time is busy.
+    """
+
+    def __init__(self, answer):
+        self.begun, self._answer, self._began = threading.Event(), answer, 0.0
+
+    def __call__(self, budget: Budget) -> object:
+        self._began = time.monotonic()
+        self.begun.set()
+        return self._answer(budget)
+
+    def clock(self) -> float:
+        """Return the time since the work began [s]; 0 before."""
+        return time.monotonic() - self._began if self.begun.is_set() else 0.0
+
+
 class Desk:
     """A queue whose answers are collected as (name, answer)."""
 
@@ -29,16 +48,22 @@ class Desk:
         self.told: list[tuple[str, object]] = []
         self.queue = QuestionQueue(max_waiting, lambda: None)
 
-    def ask(self, name, answer, seconds: float = 20.0) -> Question:
+    def ask(self, name, answer, seconds: float = 20.0, clock=time.monotonic) -> Question:
         question = Question(
             answer,
             lambda code, _reason: code,
             lambda error: type(error).__name__,
             lambda given: self.told.append((name, given)),
-            Budget(seconds),
+            Budget(seconds, clock),
         )
         self.queue.ask(question)
         return question
+
+    def work(self, name, answer, seconds: float) -> Work:
+        """Ask a question whose time begins with the work on it."""
+        work = Work(answer)
+        self.ask(name, work, seconds, work.clock)
+        return work
 
     def wait(self, count: int) -> list[tuple[str, object]]:
         def enough() -> bool:
@@ -76,33 +101,26 @@ def test_an_error_is_an_answer_and_the_next_question_is_answered(desk):
 
 
 def test_work_beyond_the_budget_is_too_long(desk):
-    desk.ask("long", work_on, seconds=0.05)
+    desk.work("long", work_on, seconds=0.05)
     assert desk.wait(1) == [("long", TOO_LONG)]
 
 
 def test_a_sweep_stops_at_the_deadline_of_its_question(desk):
     rover, ground = load_rover("lsr1"), make_terrain(waves)
     poses = np.zeros((2_000_000, 3))
-    desk.ask("sweep", lambda _: sweep_path(rover, ground, poses), seconds=0.3)
+    desk.work("sweep", lambda _: sweep_path(rover, ground, poses), seconds=0.3)
     assert desk.wait(1) == [("sweep", TOO_LONG)]
 
 
 def test_a_question_that_never_began_is_busy(desk):
-    desk.ask("first", work_on, seconds=0.2)
-    desk.ask("second", lambda _: 5, seconds=0.1)
+    first = desk.work("first", work_on, seconds=0.2)
+    desk.ask("second", lambda _: 5, seconds=0.1, clock=first.clock)
     assert desk.wait(2) == [("first", TOO_LONG), ("second", BUSY)]
 
 
 def test_beyond_the_queue_the_answer_is_busy_at_once():
     desk = Desk(max_waiting=1)
-    begun = threading.Event()
-
-    def block(budget: Budget) -> None:
-        begun.set()
-        work_on(budget)
-
-    desk.ask("works", block, seconds=0.5)
-    assert begun.wait(10.0)
+    assert desk.work("works", work_on, seconds=0.5).begun.wait(20.0)
     desk.ask("waits", lambda _: 5, seconds=20.0)
     desk.ask("too many", lambda _: 6)
     assert desk.told == [("too many", BUSY)]
@@ -112,7 +130,7 @@ def test_beyond_the_queue_the_answer_is_busy_at_once():
 
 def test_work_that_checks_nothing_is_refused_all_the_same_and_its_answer_is_dropped(desk):
     go_on = threading.Event()
-    desk.ask("deaf", lambda _: go_on.wait(20.0), seconds=0.05)
+    desk.work("deaf", lambda _: go_on.wait(60.0), seconds=0.05)
 
     def overdue() -> bool:
         desk.queue.refuse_overdue(0.02)
@@ -128,7 +146,8 @@ def test_work_that_checks_nothing_is_refused_all_the_same_and_its_answer_is_drop
 
 def test_a_waiting_question_is_refused_at_its_deadline_without_the_grace_of_one_in_work(desk):
     go_on = threading.Event()
-    desk.ask("deaf", lambda _: go_on.wait(20.0), seconds=0.05)
+    deaf = desk.work("deaf", lambda _: go_on.wait(60.0), seconds=0.05)
+    assert deaf.begun.wait(20.0)
     desk.ask("waiting", work_on, seconds=0.05)
     time.sleep(0.1)
     desk.queue.refuse_overdue(10.0)
@@ -151,7 +170,7 @@ def test_closing_answers_what_is_open_and_ends_the_thread():
     desk.ask("one", work_on)
     desk.queue.close()
     assert desk.told == [("one", STOPPING)]
-    assert not any(thread.name == "questions" for thread in threading.enumerate())
+    wait_until(lambda: not desk.queue._thread.is_alive(), "the end of the thread")
 
 
 def test_a_budget_tells_why_it_stopped_and_the_first_reason_counts():

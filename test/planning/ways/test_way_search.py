@@ -234,8 +234,7 @@ def test_only_the_heights_around_the_window_are_looked_at():
     assert part.elevation.size < 0.05 * wide.elevation.size
     estimate = estimate_ground(LSR1, part, nodes)
     assert not estimate.groundless.any() and not estimate.doubt.any()
-    answer = find_way(question, LatticeSettings(budget=5.0))
-    assert answer.outcome == FOUND
+    assert find_way(question, LONG).outcome == FOUND
     wall = np.array(wide.elevation)
     wall[:, 2550] = 3.0
     enclosed = replace(wide, elevation=wall)
