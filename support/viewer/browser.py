@@ -66,6 +66,14 @@ FIND_THUMB = """thumb => {
 }"""
 """Scrolls to the thumb of a slider; returns where it is, and left edge and width of its track."""
 
+HAS_GROUND = """() => {
+    const ground = window.__viserMutable && window.__viserMutable.nodeRefFromName['/ground'];
+    let meshes = 0;
+    if (ground) ground.traverse((part) => { meshes += part.isMesh ? 1 : 0; });
+    return meshes > 0;
+}"""
+"""Whether the ground is in the scene."""
+
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
 )
@@ -175,6 +183,22 @@ class Visitor:
     def picture(self) -> bytes:
         """Return the pixels of the scene."""
         return self.tab.locator("canvas").first.screenshot()
+
+    def wait_for_ground(self) -> None:
+        """Wait until the ground is in the scene, where it can be clicked and seen."""
+        self.tab.wait_for_function(HAS_GROUND)
+
+    def steady_picture(self) -> bytes:
+        """Return the pixels of the scene once they do not change any more."""
+        pictures = [self.picture()]
+
+        def is_steady() -> bool:
+            self.tab.wait_for_timeout(300)
+            pictures.append(self.picture())
+            return len(pictures) > 2 and pictures[-1] == pictures[-2] == pictures[-3]
+
+        wait_until(is_steady, "a picture that does not change")
+        return pictures[-1]
 
     def click_scene(self, x: float, y: float, *, shift: bool = False) -> None:
         """Click at a point of the screen [px]."""
