@@ -44,6 +44,16 @@ RECORD = """text => {
 }"""
 """Notes in the page when a text has appeared."""
 
+RECORD_NOTE = """() => {
+    const note = document.getElementById('limited');
+    new MutationObserver(() => {
+        if (note.style.display !== 'block' || window.shownNote) return;
+        const box = document.activeElement.getBoundingClientRect();
+        window.shownNote = [note.textContent, note.getBoundingClientRect().top - box.bottom];
+    }).observe(note, { attributes: true });
+}"""
+"""Keeps what the note at a box says, and how far it is below the box [px]."""
+
 SMALL_SCENE = (
     'div[style*="touch-action: none"] > div {width: 16px !important; height: 16px !important}'
 )
@@ -136,6 +146,15 @@ class Visitor:
         box.press_sequentially(value)
         box.press("Enter")
 
+    def type_keys(self, label: str, text: str, end: str = "") -> None:
+        """Type into the box beside a slider, slowly and key by key, and press a last key."""
+        box = self._row(label).locator("input").last
+        box.click()
+        box.press("Control+a")
+        box.press_sequentially(text, delay=30)
+        if end:
+            box.press(end)
+
     def place_of(self, label: str) -> float:
         """Return the height of a slider below the upper edge of the window [px]."""
         return float(self._row(label).bounding_box()["y"])
@@ -169,6 +188,14 @@ class Visitor:
         """
         self.tab.evaluate(RECORD, text)
         return lambda: bool(self.tab.evaluate("text => window.shownTexts[text]", text))
+
+    def record_note(self) -> Callable[[], tuple[str, float]]:
+        """Record the first note at a box from now on; return what tells it and how far it is.
+
+        It stays for 6 s only.
+        """
+        self.tab.evaluate(RECORD_NOTE)
+        return lambda: self.tab.evaluate("() => window.shownNote")
 
     def wait_for(self, text: str) -> None:
         """Wait until the page shows a text."""

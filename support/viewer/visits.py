@@ -1,5 +1,6 @@
 """A page with a browser for the tests of a module, and grounds far from the origin."""
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.terrain.grid import Terrain
+from rover_planner.viewer.browser.channel import run_script
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.pages.page_base import PageBase
 from support.viewer.browser import (
@@ -18,6 +20,7 @@ from support.viewer.browser import (
     wait_until,
 )
 
+NUMBERS = itertools.count(1)
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
 
@@ -73,6 +76,20 @@ def wait_for_rest(page: Page) -> None:
         return done and not page.is_busy and page._changed_at is None
 
     wait_until(lambda: at_rest() or session.refusal, "all judgements")
+
+
+def wait_for_browser(page: PageBase, visitor: Visitor) -> None:
+    """Wait until the visitor's browser shows all that the page has sent so far.
+
+    The page is at rest before its visitors have seen it.
+    """
+    number = next(NUMBERS)
+    run_script(page.server, f"window.heardFromTest = {number};")
+    visitor.tab.wait_for_function(
+        "number => window.heardFromTest === number && new Promise((tell) =>"
+        "requestAnimationFrame(() => requestAnimationFrame(() => tell(true))))",
+        arg=number,
+    )
 
 
 def find_camera(page: PageBase) -> Any:
