@@ -44,6 +44,16 @@ RECORD = """text => {
 }"""
 """Notes in the page when a text has appeared."""
 
+RECORD_NOTE = """() => {
+    const note = document.getElementById('limited');
+    new MutationObserver(() => {
+        if (note.style.display !== 'block' || window.shownNote) return;
+        const box = document.activeElement.getBoundingClientRect();
+        window.shownNote = [note.textContent, note.getBoundingClientRect().top - box.bottom];
+    }).observe(note, { attributes: true });
+}"""
+"""Keeps what the note at a box says, and how far it is below the box [px]."""
+
 SMALL_SCENE = (
     'div[style*="touch-action: none"] > div {width: 16px !important; height: 16px !important}'
 )
@@ -65,6 +75,14 @@ FIND_THUMB = """thumb => {
     return [at.x + at.width / 2, at.y + at.height / 2, track.x, track.width];
 }"""
 """Scrolls to the thumb of a slider; returns where it is, and left edge and width of its track."""
+
+HAS_GROUND = """() => {
+    const ground = window.__viserMutable && window.__viserMutable.nodeRefFromName['/ground'];
+    let meshes = 0;
+    if (ground) ground.traverse((part) => { meshes += part.isMesh ? 1 : 0; });
+    return meshes > 0;
+}"""
+"""Whether the ground is in the scene."""
 
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
@@ -128,6 +146,15 @@ class Visitor:
         box.press_sequentially(value)
         box.press("Enter")
 
+    def type_keys(self, label: str, text: str, end: str = "") -> None:
+        """Type into the box beside a slider, slowly and key by key, and press a last key."""
+        box = self._row(label).locator("input").last
+        box.click()
+        box.press("Control+a")
+        box.press_sequentially(text, delay=30)
+        if end:
+            box.press(end)
+
     def place_of(self, label: str) -> float:
         """Return the height of a slider below the upper edge of the window [px]."""
         return float(self._row(label).bounding_box()["y"])
@@ -162,6 +189,14 @@ class Visitor:
         self.tab.evaluate(RECORD, text)
         return lambda: bool(self.tab.evaluate("text => window.shownTexts[text]", text))
 
+    def record_note(self) -> Callable[[], tuple[str, float]]:
+        """Record the first note at a box from now on; return what tells it and how far it is.
+
+        It stays for 6 s only.
+        """
+        self.tab.evaluate(RECORD_NOTE)
+        return lambda: self.tab.evaluate("() => window.shownNote")
+
     def wait_for(self, text: str) -> None:
         """Wait until the page shows a text."""
         self.tab.wait_for_function("text => document.body.innerText.includes(text)", arg=text)
@@ -175,6 +210,22 @@ class Visitor:
     def picture(self) -> bytes:
         """Return the pixels of the scene."""
         return self.tab.locator("canvas").first.screenshot()
+
+    def wait_for_ground(self) -> None:
+        """Wait until the ground is in the scene, where it can be clicked and seen."""
+        self.tab.wait_for_function(HAS_GROUND)
+
+    def steady_picture(self) -> bytes:
+        """Return the pixels of the scene once they do not change any more."""
+        pictures = [self.picture()]
+
+        def is_steady() -> bool:
+            self.tab.wait_for_timeout(300)
+            pictures.append(self.picture())
+            return len(pictures) > 2 and pictures[-1] == pictures[-2] == pictures[-3]
+
+        wait_until(is_steady, "a picture that does not change")
+        return pictures[-1]
 
     def click_scene(self, x: float, y: float, *, shift: bool = False) -> None:
         """Click at a point of the screen [px]."""

@@ -1,6 +1,10 @@
 """Paths, grounds, sessions and slow scenarios for tests of the viewer."""
 
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -69,3 +73,32 @@ def walled_session(height, goal=(-1.1, 0.0, 0.0), rover=LSR1) -> ViewSession:
     """Return a session on 5 m x 5 m with a wall at x = 0; searches may take long."""
     patient, ground = LatticeSettings(budget=60.0), make_terrain(height, half=2.5)
     return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=patient)
+
+
+@contextmanager
+def held(background: Any, at: str = "") -> Iterator[None]:
+    """Hold work in the background where it reports that it begins with something.
+
+    What is held can be cancelled, and gives way to newer requests, which are held, too. It goes on
+    at the end of the context. So a test can look at work that is under way as long as it takes.
+
+    Args:
+        background: The `BackgroundWork`, whose work begins within the context.
+        at: What is held, such as "searching a way"; empty: all.
+    """
+    work, go_on = background._work, threading.Event()
+
+    def work_and_wait(request, report):
+        def tell(what: str, step: int, steps: int) -> None:
+            report(what, step, steps)
+            while at in ("", what) and not go_on.wait(0.01):
+                report(what, step, steps)  # which ends work that was stopped
+
+        return work(request, tell)
+
+    background._work = work_and_wait
+    try:
+        yield
+    finally:
+        go_on.set()
+        background._work = work

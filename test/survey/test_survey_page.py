@@ -31,14 +31,8 @@ from rover_planner.viewer.state.survey_layers import (
     open_survey,
 )
 from support.survey_maps import make_request, survey_here
-from support.viewer.browser import (
-    ARGUMENTS,
-    PROGRAM,
-    Visitor,
-    needs_browser,
-    sync_api,
-    wait_until,
-)
+from support.viewer.browser import needs_browser, wait_until
+from support.viewer.visits import open_browser, visit
 
 LSR1 = load_rover("lsr1")
 PASSABLE, WALL, HOLE = (1.5, 1.5), (4.55, 3.0), (1.5, 4.5)
@@ -160,12 +154,10 @@ def test_the_command_refuses_what_is_no_survey(words, said, tmp_path, monkeypatc
 def test_the_page_shows_the_survey_and_says_when_the_policy_is_another(shown, surveyed):
     session = ViewSession(LSR1, load_map(surveyed, 10_000), (1.5, 1.5, 0.0), (2.5, 1.5, 0.0))
     page = Page(session, port=0, survey=shown)
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
-        visitor = Visitor(chromium, page.url)
+    with open_browser() as browser, visit(page, browser) as visitor:
         visitor.open_tab("Ground and path")
         visitor.wait_for("impassable")
-        assert "survey: class" in visitor.text("#scale")
+        wait_until(lambda: "survey: class" in visitor.text("#scale"), "the legend")
         before = visitor.picture()
         visitor.choose("Colour by", REACHABLE)
         visitor.wait_for("can go and return")
@@ -175,5 +167,3 @@ def test_the_page_shows_the_survey_and_says_when_the_policy_is_another(shown, su
         visitor.choose("Colour by", "height")
         visitor.wait_for("a line every metre")
         assert not visitor.page_errors
-        chromium.close()
-    page.close()

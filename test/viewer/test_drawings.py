@@ -11,6 +11,7 @@ from support.waiting import wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
+from rover_planner.viewer.pages import page as page_module
 from rover_planner.viewer.pages.drawings import Drawings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
@@ -19,7 +20,7 @@ from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.judging import POLICY
 from rover_planner.viewer.state.reasons.explanation import explain
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 """Longest wait for the page [s]."""
 
 
@@ -34,12 +35,16 @@ def page():
 @pytest.fixture(autouse=True)
 def at_rest(page):
     """Begin each test with the rover as it was loaded, and nothing to draw."""
-    page.requests.add(lambda: page.session.take_rover(LSR1))
-    session = page.session
+    session, asked = page.session, []
+
+    def ask() -> None:
+        session.take_rover(LSR1)
+        asked.append(session.wanted)
 
     def is_shown() -> bool:
-        return session.finished.answered.rover == LSR1 and not page.is_busy
+        return asked and session.finished.answered is asked[0] and not page.is_busy
 
+    page.requests.add(ask)
     wait_until(is_shown, "the rover as it was loaded", PATIENCE)
 
 
@@ -79,6 +84,7 @@ def test_other_policies_are_judged_after_the_drawings(page, monkeypatch):
         show(*arguments)
         drawn.append(True)
 
+    monkeypatch.setattr(page_module, "DRAWING_TIME", PATIENCE)  # or it would give up the wait
     monkeypatch.setattr(page.scene.paths, "show", draw_slowly)
     change_friction(page, 0.4)
     wait_until(lambda: drawn, "the paths", PATIENCE)

@@ -1,6 +1,5 @@
 """The page in a real browser: alive while it judges, right after sliders are dragged."""
 
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -10,14 +9,17 @@ from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession
 from support.project.long_tests import on_demand
-from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
+from support.viewer.browser import Visitor, needs_browser, wait_until
 from support.viewer.sessions import (
     GOAL,
     START,
+    held,
     lowered_reef,
     slow_options,
     tolerant_rover,
 )
+from support.viewer.visits import open_browser, wait_for_rest
+from support.waiting import start_watch
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -28,10 +30,8 @@ MAX_PAUSE = 1.0
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[object]:
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+    with open_browser() as chromium:
         yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")
@@ -61,31 +61,28 @@ def visitor(opened, slow_page) -> Visitor:
     return opened
 
 
-def wait_for_rest(page: Page) -> None:
-    """Wait until everything that is wanted is judged and shown."""
-    session = page.session
-
-    def at_rest() -> bool:
-        done = session.finished.answered is session.finished.scenario is session.wanted
-        return done and not page.is_busy and page._changed_at is None
-
-    wait_until(lambda: at_rest() or session.refusal, "all judgements")
-
-
 def longest_pause(page: Page, until) -> float:
-    """Return the longest time for which the playback stood still before a condition held [s]."""
-    longest, last, moved_at = 0.0, page.playback.time, time.monotonic()
+    """Return the longest time for which the playback stood still before a condition held [s].
+
+    A time in which the machine stood still does not count.
+    """
+    longest, last, paused = 0.0, page.playback.time, start_watch()
 
     def watch() -> bool:
-        nonlocal longest, last, moved_at
-        now = time.monotonic()
+        nonlocal longest, last, paused
         if page.playback.time != last:
-            last, moved_at = page.playback.time, now
-        longest = max(longest, now - moved_at)
+            last, paused = page.playback.time, start_watch()
+        longest = max(longest, paused())
         return until()
 
     wait_until(watch, "the condition")
     return longest
+
+
+def is_judged(page: Page) -> bool:
+    """Return whether all that is wanted is judged, the path by itself and then all candidates."""
+    session = page.session
+    return session.finished.answered is session.wanted and session.progress is None
 
 
 def test_while_a_change_is_judged_the_page_says_so_and_the_rover_drives_on(visitor, slow_page):
@@ -93,11 +90,15 @@ def test_while_a_change_is_judged_the_page_says_so_and_the_rover_drives_on(visit
     before, shown = session.wanted, session.shown
     slow_page.playback.speed = 1.0
     slow_page.requests.add(slow_page.playback.play)
-    tells = visitor.record("judging")
-    visitor.set_slider(FRICTION, "1.9")
-    wait_until(tells, "the notice")
-    assert session.wanted is not before and session.progress is not None
-    pause = longest_pause(slow_page, lambda: session.progress is None)
+    with held(session._background):
+        visitor.set_slider(FRICTION, "1.9")
+        visitor.tab.wait_for_selector("#judging")
+        visitor.wait_for("judging path")
+        assert session.wanted is not before and session.progress is not None
+        assert session.shown is shown
+        then = slow_page.playback.time
+        wait_until(lambda: slow_page.playback.time > then, "the rover to drive on")
+    pause = longest_pause(slow_page, lambda: is_judged(slow_page))
     assert session.rover.friction == 1.9 and session.shown is not shown
     assert pause < MAX_PAUSE
     slow_page.requests.add(slow_page.playback.pause)
@@ -105,14 +106,14 @@ def test_while_a_change_is_judged_the_page_says_so_and_the_rover_drives_on(visit
 
 
 def test_the_old_verdict_is_greyed_until_the_new_one_is_there(visitor, slow_page):
-    tells = visitor.record("old values: judging")
-    visitor.set_slider(FRICTION, "1.8")
-    grey = set(range(len(slow_page.session.candidates)))
-    wait_until(lambda: slow_page.scene.paths._old == grey, "grey paths")
-    wait_until(tells, "the grey verdict")
+    with held(slow_page.session._background):
+        visitor.set_slider(FRICTION, "1.8")
+        grey = set(range(len(slow_page.session.candidates)))
+        wait_until(lambda: slow_page.scene.paths._old == grey, "grey paths")
+        visitor.wait_for("old values: judging")
     wait_for_rest(slow_page)
     visitor.tab.locator("#old").first.wait_for(state="detached")
-    assert slow_page.scene.paths._old == set()
+    wait_until(lambda: slow_page.scene.paths._old == set(), "coloured paths")
 
 
 @on_demand
@@ -120,16 +121,16 @@ def test_camera_and_second_visitor_are_served_while_a_change_is_judged(
     visitor, slow_page, browser
 ):
     second = Visitor(browser, slow_page.url)
-    tells_first, tells_second = visitor.record("judging"), second.record("judging")
     picture = visitor.picture()
-    visitor.set_slider(FRICTION, "1.7")
-    visitor.tab.mouse.move(600, 420)
-    visitor.tab.mouse.down()
-    visitor.tab.mouse.move(700, 420, steps=4)
-    visitor.tab.mouse.up()
-    wait_until(lambda: visitor.picture() != picture, "the camera to turn")
-    wait_until(tells_first, "the first visitor to be told")
-    wait_until(tells_second, "the second visitor to be told")
+    with held(slow_page.session._background):
+        visitor.set_slider(FRICTION, "1.7")
+        visitor.tab.mouse.move(600, 420)
+        visitor.tab.mouse.down()
+        visitor.tab.mouse.move(700, 420, steps=4)
+        visitor.tab.mouse.up()
+        wait_until(lambda: visitor.picture() != picture, "the camera to turn")
+        for told in (visitor, second):
+            told.wait_for("judging path")
     wait_for_rest(slow_page)
     second.tab.wait_for_selector("#judging", state="hidden")
     assert second.page_errors == visitor.page_errors == []
@@ -139,13 +140,13 @@ def test_camera_and_second_visitor_are_served_while_a_change_is_judged(
 def test_a_cancelled_judgement_leaves_the_old_verdict_and_can_be_begun_again(visitor, slow_page):
     session = slow_page.session
     friction, shown = session.rover.friction, session.shown
-    visitor.set_slider(FRICTION, "1.6")
-    visitor.press("Cancel")
-    wait_until(lambda: session.is_stopped, "the end of the work")
+    with held(session._background):
+        visitor.set_slider(FRICTION, "1.6")
+        visitor.press("Cancel")
+        wait_until(lambda: session.is_stopped, "the end of the work")
     visitor.wait_for("Judge again")
-    if session.is_outdated:  # else it was so late that the path itself had been judged
-        assert session.rover.friction == friction and session.shown is shown
-        visitor.wait_for("old values: the judgement was stopped")
+    assert session.rover.friction == friction and session.shown is shown
+    visitor.wait_for("old values: the judgement was stopped")
     assert visitor.slider_value(FRICTION) == session.wanted.rover.friction == 1.6
     visitor.press("Judge again")
     wait_for_rest(slow_page)

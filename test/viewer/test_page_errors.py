@@ -45,6 +45,7 @@ def do(page, work) -> None:
 
     page.requests.add(work_and_signal)
     assert done.wait(20.0), "the page's thread does nothing"
+    wait_until(lambda: not page._fulfils, "what an error of the work makes it say")
 
 
 def shown_errors(page) -> str:
@@ -178,7 +179,7 @@ def test_a_closed_page_leaves_no_thread_behind():
     page.requests.add(lambda: page.session.plan_again())
     page.close()
     left = {thread.name for thread in set(threading.enumerate()) - before}
-    assert not left & {"page", "judge", "ground"}
+    assert not left & {"page", "judge", "ground", "study"}
 
 
 def test_a_path_that_does_not_exist_is_refused_by_its_number(page):

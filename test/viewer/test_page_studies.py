@@ -8,8 +8,9 @@ from rover_planner.studies.example_studies import find_examples
 from rover_planner.studies.runner import find_rover, run_study
 from rover_planner.studies.study_file import load_study
 from rover_planner.viewer.pages.page import Page
-from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
-from support.viewer.sessions import session_on
+from support.viewer.browser import Visitor, needs_browser, wait_until
+from support.viewer.sessions import held, session_on
+from support.viewer.visits import open_browser
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -23,23 +24,21 @@ def page() -> Iterator[Page]:
 
 @pytest.fixture(scope="module")
 def visitor(page) -> Iterator[Visitor]:
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+    with open_browser() as chromium:
         visitor = Visitor(chromium, page.url)
         visitor.open_tab("Studies")
         yield visitor
-        chromium.close()
 
 
 def test_a_study_that_runs_tells_its_progress_and_is_cancelled(visitor, page):
     visitor.choose("Study", "tallest_step")
     visitor.wait_for("rovers like lsr1 for the largest")
-    progress = visitor.record("trying rover")
-    visitor.press("Run the study")
-    wait_until(progress, "the progress")
-    visitor.press("Cancel the study")
-    visitor.wait_for("cancelled")
-    assert page.studies.work.progress is None
+    with held(page.studies.work):
+        visitor.press("Run the study")
+        visitor.wait_for("trying rover")
+        visitor.press("Cancel the study")
+        visitor.wait_for("cancelled")
+        assert page.studies.work.progress is None
 
 
 def test_the_best_rover_of_a_study_is_taken_over(visitor, page):
@@ -48,7 +47,7 @@ def test_the_best_rover_of_a_study_is_taken_over(visitor, page):
     visitor.press("Run the study")
     visitor.wait_for("finished")
     visitor.wait_for("best:")
-    assert visitor.tab.locator("#study-answer").is_visible()
+    visitor.tab.locator("#study-answer").wait_for()
     study = load_study(find_examples()["level_load_shares"])
     result = run_study(study)
     best = find_rover(study, result.best)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
@@ -21,7 +22,7 @@ from rover_planner.viewer.state.judging import (
 )
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
-from support.viewer.sessions import LSR1, walled_session
+from support.viewer.sessions import LSR1, held, walled_session
 from support.waiting import wait_until
 
 GOAL = (1.6, 0.0, 0.0)
@@ -191,37 +192,40 @@ def finish(session: ViewSession) -> None:
     session.take_finished()
 
 
-def begin_search(session: ViewSession) -> None:
-    """Plan beyond the wall, wait for the search, and take what was finished before."""
-    assert session.plan_to(BEYOND)
-    wait_until(lambda: session.progress.what == WAY, "the search", 60.0)
-    assert session.progress.describe() == "searching a way"
-    session.take_finished()
+@contextmanager
+def searching(session: ViewSession) -> Iterator[None]:
+    """Plan beyond the wall, take what is finished before the search, and let that go on later."""
+    with held(session._background, WAY):
+        assert session.plan_to(BEYOND)
+        wait_until(lambda: session.progress.what == WAY, "the search", 60.0)
+        assert session.progress.describe() == "searching a way"
+        session.take_finished()
+        yield
 
 
 def test_while_a_way_is_searched_the_verdict_on_the_candidates_is_there(session):
-    begin_search(session)
-    assert not session.is_outdated and len(session.candidates) == 5
-    assert not session.shown.verdict.traversable
+    with searching(session):
+        assert not session.is_outdated and len(session.candidates) == 5
+        assert not session.shown.verdict.traversable
     finish(session)
     assert session.shown.index == 5 and session.shown.verdict.traversable
 
 
 def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begun_again(session):
-    begin_search(session)
-    shown = session.shown
-    session.cancel()
-    session.take_finished()
-    assert session.is_stopped and session.shown is shown and session.finished.way is None
+    with searching(session):
+        shown = session.shown
+        session.cancel()
+        session.take_finished()
+        assert session.is_stopped and session.shown is shown and session.finished.way is None
     assert session.plan_again()
     finish(session)
     assert session.finished.way.outcome == FOUND
 
 
 def test_a_path_that_is_chosen_during_the_search_stays_and_the_way_is_listed(session):
-    begin_search(session)
-    other = 1 if session.shown.index != 1 else 2
-    assert session.show_candidate(other)
+    with searching(session):
+        other = 1 if session.shown.index != 1 else 2
+        assert session.show_candidate(other)
     finish(session)
     assert session.shown.index == other and len(session.candidates) == 6
     assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
@@ -240,7 +244,7 @@ def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wal
         session.change_rover(FRICTION, 1.5)
         finish(session)
         session.plan_again()
-        wait_until(lambda: session.progress is None, "all candidates")  # and not taken yet
+        wait_until(lambda: session.progress is None, "all candidates", 60.0)  # and not taken yet
         session.change_rover(FRICTION, 1.4)
         session.take_finished()
         session.change_rover(FRICTION, 1.3)

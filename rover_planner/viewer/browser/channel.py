@@ -10,7 +10,7 @@ from typing import Any
 
 STORAGE_PREFIX = "viser-user:"
 """What viser's browser part puts before each key of the local storage."""
-TIMEOUT = 10.0
+TIMEOUT = 60.0
 """Longest wait for an answer [s]."""
 FLOAT_GAP = 4
 """Distance of a floating panel from the edges of the scene [px]."""

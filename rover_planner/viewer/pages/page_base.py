@@ -66,8 +66,7 @@ class PageBase(ABC):
         self._add_panels()
         for script in (SCRIPT, words.SCRIPT, label_script.SCRIPT, path_script.SCRIPT):
             run_script(self.server, script)
-        self.server.on_client_connect(self._aim_camera)
-        self.server.on_client_connect(self._visitors.greet)
+        self.server.on_client_connect(self._welcome)
         self.server.on_client_disconnect(self._forget)
         self.server.scene.on_click()(lambda event: self._request_click(event, False))
         self.server.scene.on_click(modifier="shift")(
@@ -159,6 +158,11 @@ class PageBase(ABC):
     def _aim_camera(self, client: Any) -> None:
         session = self.session
         self.scene.aim_camera(client, session.rover, session.terrain, session.start, session.goal)
+
+    def _welcome(self, client: Any) -> None:
+        """Aim the camera of a new visitor, then fit the panels; it waits for the browser."""
+        self._aim_camera(client)
+        self._visitors.greet(client)
 
     def _forget(self, client: Any) -> None:
         self._visitors.forget(client)

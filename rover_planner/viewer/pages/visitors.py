@@ -1,5 +1,6 @@
 """What a visitor's browser needs when it connects: its link, and panels that fit in."""
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -29,22 +30,25 @@ class Visitors:
         self._floats: dict[int, float] = {}
         """Widths of the floating panel of visitors with narrow windows [px]."""
         self._sizes: dict[int, tuple[int, int]] = {}
+        self._locks: dict[int, threading.Lock] = {}
+        """One for each visitor: of two answers the later one is acted on last."""
+        self.greeted: set[int] = set()
+        """Numbers of the visitors' clients whose panels fit and whose links are opened."""
 
     def greet(self, client: Any) -> None:
         """Read a new visitor's address and fit the panels; it waits for the browser."""
-        answer = ask_browser(client, QUESTION)
-        if answer is None:
-            return
-        query, width = answer
-        self._fit(client, width)
+        self._locks[client.client_id] = threading.Lock()
+        client.camera.on_update(lambda _camera: self._resize(client))  # also while it waits
+        query = self._ask_and_fit(client)
         if query:
             self._open_link(query)
-        client.camera.on_update(lambda _camera: self._resize(client))
+        self.greeted.add(client.client_id)
 
     def forget(self, client: Any) -> None:
         """Forget a visitor who has left."""
-        self._floats.pop(client.client_id, None)
-        self._sizes.pop(client.client_id, None)
+        for known in (self._floats, self._sizes, self._locks):
+            known.pop(client.client_id, None)
+        self.greeted.discard(client.client_id)
 
     def _resize(self, client: Any) -> None:
         """Fit the panels again if the size of the picture has changed."""
@@ -52,9 +56,17 @@ class Visitors:
         if self._sizes.get(client.client_id) == size:
             return
         self._sizes[client.client_id] = size
-        answer = ask_browser(client, QUESTION)
-        if answer is not None:
-            self._fit(client, answer[1])
+        self._ask_and_fit(client)
+
+    def _ask_and_fit(self, client: Any) -> str:
+        """Place the panels for the window as it is now; return the query of its address."""
+        with self._locks.get(client.client_id, threading.Lock()):
+            answer = ask_browser(client, QUESTION)
+            if answer is None:
+                return ""
+            query, width = answer
+            self._fit(client, width)
+            return str(query)
 
     def _fit(self, client: Any, width: float) -> None:
         """Place the panel for a window's width [px] unless it is placed for it already."""

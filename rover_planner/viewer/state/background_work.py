@@ -13,7 +13,7 @@ from rover_planner.errors import PlanningError
 PATIENCE = 0.2
 """Time for which work may go on to its first result although a newer request waits [s]: a slider
 that is dragged still gets results where they take less."""
-END_TIME = 5.0
+END_TIME = 20.0
 """Longest wait for the thread when the work is closed [s]."""
 
 Request = TypeVar("Request")

@@ -141,12 +141,16 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
     loads = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
     talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
     talker.odometry.publish(odometry())
+    received = []
+
+    def is_estimated() -> bool:
+        received.append(listener.latest().values)
+        return "controller" in received[-1].forces_from
+
     send_until(
-        lambda: talker.estimated.publish(wheel_values(loads)),
-        lambda: "controller" in listener.latest().values.forces_from,
-        "the controller",
+        lambda: talker.estimated.publish(wheel_values(loads)), is_estimated, "the controller"
     )
-    np.testing.assert_allclose(listener.latest().values.wheel_loads, loads)
+    np.testing.assert_allclose(received[-1].wheel_loads, loads)
 
 
 def test_a_refusal_of_the_server_comes_with_its_reason(listener, talker):
@@ -191,7 +195,7 @@ def test_a_closed_link_leaves_no_thread_and_no_context():
     before = set(threading.enumerate())
     link = LiveLink()
     assert link.listener.context.ok()
-    assert set(threading.enumerate()) > before
+    assert set(threading.enumerate()) - before
     link.close()
     assert not link.listener.context.ok()
     wait_until(lambda: set(threading.enumerate()) <= before, "the threads to end")
@@ -218,9 +222,11 @@ def test_the_state_has_the_rovers_pose_and_the_forces_predicted_there(ros, liste
     wait_until(lambda: listener.latest().plan is not None, "the plan")
     wait_until(lambda: listener.latest().verdict is not None, "the verdict")
     wait_until(lambda: np.isfinite(listener.latest().values.wheel_loads).all(), "the loads")
+    wait_until(lambda: listener.latest().terrain is not None, "the map of the listener")
+    joints = set(SUSPENSION_JOINTS)
+    wait_until(lambda: joints <= set(listener.latest().values.joints), "the joints")
     data = listener.latest()
-    assert data.terrain is not None and len(data.plan) > 5 and data.verdict.traversable
-    assert set(SUSPENSION_JOINTS) <= set(data.values.joints)
+    assert len(data.plan) > 5 and data.verdict.traversable
     state = StateBuilder(LSR1).build(data.values)
     assert state is not None
     plant = simulator.simulation.plant
@@ -241,4 +247,4 @@ def test_the_server_plans_to_a_requested_goal(ros, listener, tmp_path):
         lambda: listener.latest().verdict and not listener.latest().verdict.traversable,
         "the refusal",
     )
-    assert listener.latest().plan is None
+    wait_until(lambda: listener.latest().plan is None, "no plan")  # it is another topic

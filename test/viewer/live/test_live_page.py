@@ -15,7 +15,8 @@ from rover_planner.viewer.live.listener import LiveLink
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
-from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, needs_browser, sync_api, wait_until
+from support.viewer.browser import Visitor, needs_browser, wait_until
+from support.viewer.visits import open_browser
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -41,16 +42,14 @@ def page(ros):
 
 @pytest.fixture
 def visitor(page):
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+    with open_browser() as chromium:
         yield Visitor(chromium, page.url)
-        chromium.close()
 
 
 def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, visitor, tmp_path):
     visitor.wait_for("waiting for odometry")
-    assert "no verdict" in visitor.text("#verdict")
-    assert "map not known yet" in visitor.text("#header")
+    wait_until(lambda: "no verdict" in visitor.text("#verdict"), "the missing verdict")
+    wait_until(lambda: "map not known yet" in visitor.text("#header"), "the missing map")
     given = LivePage(page.session, page._listener, port=0, has_ground=True)
     try:
         assert given.describe_context()[0].ground == page.session.ground_name == "7.95 x 7.95 m"
@@ -67,23 +66,31 @@ def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, vis
     wait_until(lambda: visitor.picture() != empty, "rover and ground in the scene")
 
     def ask() -> bool:
-        """Click again every few seconds: before the server is found a click is refused."""
+        """Click again every few seconds: before the server is found a click is refused.
+
+        One that comes before the camera looks at the rover may ask for another place.
+        """
         if time.monotonic() - asked[-1] > ASK_AGAIN:
             asked.append(time.monotonic())
             visitor.click_scene(*AHEAD)
-        return "traversable" in visitor.text("#verdict")
+        is_answered = visitor.text("#verdict").startswith("traversable")
+        return is_answered and "forces predicted by the server" in visitor.text("#dashboard")
 
     asked = [-ASK_AGAIN]
-    wait_until(ask, "the server's verdict")
+    wait_until(ask, "the server's verdict and forces")
     visitor.wait_for("live; forces predicted by the server")
-    wait_until(lambda: "? N" not in visitor.text("#dashboard"), "the loads on the dashboard")
-    lines = visitor.text("#dashboard").splitlines()
-    loads = [float(line.removesuffix(" N")) for line in lines if line.endswith(" N")]
-    assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
-    assert age_of(visitor, "odometry")[1] == "false"
 
-    for timer in list(simulator.timers):  # the simulator falls silent, as if it was killed
-        simulator.destroy_timer(timer)
+    def read_loads() -> list[float] | None:
+        text = visitor.text("#dashboard")
+        lines = [line for line in text.splitlines() if line.endswith(" N")]
+        return None if "? N" in text else [float(line.removesuffix(" N")) for line in lines]
+
+    loads = wait_until(read_loads, "the loads on the dashboard")
+    assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
+    wait_until(lambda: age_of(visitor, "odometry")[1] == "false", "the fresh topic")
+
+    for timer in simulator.timers:  # the simulator falls silent, as if it was killed
+        timer.cancel()
     visitor.wait_for("not live: odometry is ")
     wait_until(lambda: age_of(visitor, "odometry")[1] == "true", "the stale topic")
     assert "stale, " in age_of(visitor, "odometry")[0]

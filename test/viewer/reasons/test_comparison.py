@@ -1,6 +1,5 @@
 """Tests of the verdicts under all torque policies, side by side."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +10,7 @@ from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain
 from support.viewer.sessions import LSR1, ramp, session_on
+from support.waiting import wait_until
 
 
 def verdicts(session) -> dict[str, bool | None]:
@@ -61,10 +61,7 @@ def test_with_speed_servos_the_plot_of_friction_has_no_limit_that_a_passing_path
     page = Page(session, port=0)
     try:
         assert page.plots.limits["friction_utilisation"] == LSR1.limits.friction_utilisation
-        session.change_options(policy="servo")
-        deadline = time.monotonic() + 30.0
-        while page.plots.limits["friction_utilisation"] and time.monotonic() < deadline:
-            time.sleep(0.02)
-        assert page.plots.limits["friction_utilisation"] == 0.0
+        page.requests.add(lambda: session.change_options(policy="servo"))
+        wait_until(lambda: page.plots.limits["friction_utilisation"] == 0.0, "no limit", 60.0)
     finally:
         page.close()

@@ -13,17 +13,9 @@ from rover_planner.viewer.state import colours
 from rover_planner.viewer.state.reasons.explanation import explain
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
-from support.viewer.browser import (
-    ARGUMENTS,
-    OVERLAPS,
-    PROGRAM,
-    Visitor,
-    needs_browser,
-    sync_api,
-    wait_until,
-)
+from support.viewer.browser import OVERLAPS, Visitor, needs_browser, wait_until
 from support.viewer.sessions import LSR1
-from support.viewer.visits import wait_for_rest
+from support.viewer.visits import find_camera, look_from, open_browser, wait_for_rest
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -42,15 +34,15 @@ def page() -> Iterator[Page]:
 
 @pytest.fixture(scope="module")
 def visitor(page) -> Iterator[Visitor]:
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+    with open_browser() as browser:
         yield Visitor(browser, page.url)
-        browser.close()
 
 
 def show(page: Page, index: int) -> None:
     """Show a candidate and wait until it is judged."""
-    page.requests.add(lambda: page.session.show_candidate(index))
+    asked: list[bool] = []
+    page.requests.add(lambda: asked.append(page.session.show_candidate(index)))
+    wait_until(lambda: asked, "the request")
     wait_until(lambda: page.session.shown.index == index and not page.is_busy, "the path")
 
 
@@ -63,18 +55,19 @@ def test_a_refused_path_says_which_limit_by_how_much_where_and_a_button_goes_the
     show(page, refused_index(page))
     failure = explain(page.session.finished).failure
     visitor.wait_for(failure.headline)
-    assert f"after {failure.distance:.2f} m" in visitor.text("#failure")
+    place = f"after {failure.distance:.2f} m"
+    wait_until(lambda: place in visitor.text("#failure"), "its place")
     mark = visitor.tab.get_by_text(FAILS, exact=True)
-    assert mark.count() == 1
+    wait_until(lambda: mark.count() == 1, "its mark")
     assert mark.evaluate("e => getComputedStyle(e).color") == f"rgb{colours.REFUSED}"
     visitor.press("Go to the failure")
     wait_until(lambda: abs(page.playback.time - failure.time) < 0.05, "the failure")
     wait_until(lambda: visitor.number("Distance") == pytest.approx(
         100.0 * failure.distance, abs=0.2), "the board to show it")  # fmt: skip
     assert visitor.tab.locator('#board [data-failing="true"]').count() == (failure.link != "")
-    (client,) = page.server.get_clients().values()
+    camera = find_camera(page)
     wait_until(
-        lambda: np.allclose(client.camera.look_at, failure.state.position, atol=1e-3),
+        lambda: np.allclose(camera.look_at, failure.state.position, atol=1e-3),
         "the camera to look there",
     )
 
@@ -98,23 +91,30 @@ def test_beside_the_sliders_a_long_reason_hides_no_policy(page, visitor, monkeyp
 
 
 def test_the_lanes_are_over_the_plots_with_the_same_scale(page, visitor):
-    lanes = visitor.tab.locator("#lanes svg").bounding_box()
-    for k in range(3):
-        plot = visitor.tab.locator(".uplot .u-over").nth(k).bounding_box()
-        assert plot["x"] == pytest.approx(lanes["x"], abs=2.5)
-        assert plot["x"] + plot["width"] == pytest.approx(lanes["x"] + lanes["width"], abs=2.5)
+    def ends_of(selector: str, k: int) -> np.ndarray:
+        box = visitor.tab.locator(selector).nth(k).bounding_box()
+        return np.array([box["x"], box["x"] + box["width"]])
+
+    def differences() -> np.ndarray:
+        lanes = ends_of("#lanes svg", 0)
+        return np.abs([ends_of(".uplot .u-over", k) - lanes for k in range(3)])
+
+    wait_until(lambda: differences().max() < 2.5, "the same scale")
     titles = visitor.text("#lanes")
     for lane in explain(page.session.finished).limits.lanes:
         assert lane.limit.title in titles
 
 
 def test_the_letters_of_board_and_lanes_are_at_least_12_px_high(visitor):
-    sizes = visitor.tab.evaluate(
-        """() => [...document.querySelectorAll('#board text, #lanes div, #candidates td')].map(
-            e => parseFloat(getComputedStyle(e).fontSize) *
-                (e.getCTM ? e.getScreenCTM().d : 1))"""
-    )
-    assert len(sizes) > 30 and min(sizes) >= 11.95
+    def measure() -> list[float]:
+        return visitor.tab.evaluate(
+            """() => [...document.querySelectorAll('#board text, #lanes div, #candidates td')].map(
+                e => parseFloat(getComputedStyle(e).fontSize) *
+                    (e.getCTM ? e.getScreenCTM().d : 1))"""
+        )
+
+    wait_until(lambda: len(measure()) > 30, "the letters")
+    assert min(measure()) >= 11.95
 
 
 @pytest.mark.parametrize(
@@ -129,14 +129,8 @@ def test_the_letters_of_board_and_lanes_are_at_least_12_px_high(visitor):
 )
 def test_labels_do_not_overlap_on_the_screen(page, visitor, camera):
     show(page, refused_index(page))
-    (client,) = page.server.get_clients().values()
     count = len(page.session.candidates) + 3  # start, goal and the failure
-    before = visitor.tab.locator("#label-layer").inner_html()
-    client.camera.position = camera[0]
-    client.camera.look_at = (0.0, 0.0, 0.2)
-    wait_until(
-        lambda: visitor.tab.locator("#label-layer").inner_html() != before, "the labels to move"
-    )
+    look_from(page, visitor, camera[0], (0.0, 0.0, 0.2))
     wait_until(lambda: visitor.tab.evaluate(OVERLAPS) == [count, []], "labels that are apart")
 
 
@@ -150,7 +144,8 @@ def wait_for_highlight(page: Page, visitor: Visitor, index: int | None) -> None:
 
 LINE_WIDTHS = """names => names.map((name) => {
     const widths = [];
-    window.__viserMutable.nodeRefFromName[name].traverse((part) => {
+    const node = window.__viserMutable.nodeRefFromName[name];  // not while it is drawn anew
+    if (node) node.traverse((part) => {
         if (part.material && part.material.linewidth > 1) widths.push(part.material.linewidth);
     });
     return widths[0];
@@ -185,7 +180,7 @@ def test_a_row_under_the_mouse_highlights_its_path_and_a_click_selects_it(page, 
     show(page, refused_index(page))
     visitor.open_tab("Ground and path")
     rows = visitor.tab.locator("#candidates tr[data-path]")
-    assert rows.count() == len(page.session.candidates)
+    wait_until(lambda: rows.count() == len(page.session.candidates), "the table")
     wait_for_highlight(page, visitor, None)
     other = (page.session.answer.nearest + 1) % rows.count()
     drawn = [ribbon._core for ribbon in page.scene.paths.ribbons.values()]
@@ -210,7 +205,8 @@ def test_a_row_under_the_mouse_highlights_its_path_and_a_click_selects_it(page, 
     assert "refused" in visitor.text("#candidates")
     visitor.open_tab("Drive")
     wait_until(lambda: visitor.tab.locator("#failure").count() == 0, "the notice to go")
-    assert visitor.tab.get_by_text(FAILS, exact=True).count() == 0
+    mark = visitor.tab.get_by_text(FAILS, exact=True)
+    wait_until(lambda: mark.count() == 0, "the old slider to go")
     visitor.set_slider("Time [s]", "3")
     wait_until(lambda: page.playback.time == 3.0, "the new slider to move the drive")
 
@@ -250,16 +246,18 @@ def test_rows_are_reached_and_selected_by_keys(page, visitor):
 def test_a_changed_slider_is_marked_with_differences_and_can_be_undone_and_reset(page, visitor):
     show(page, page.session.answer.nearest)
     visitor.open_tab("Rover")
+    visitor.tab.wait_for_selector("#judging", state="hidden")
     place = visitor.place_of("speed [m/s]")
     for friction in ("0.7", "0.6"):
         visitor.set_slider("friction [-]", friction)
         wait_until(lambda f=friction: page.session.rover.friction == float(f), "the friction")
-        wait_until(lambda: not page.session.has_old_candidates, "all candidates")
+        wait_for_rest(page)
     visitor.wait_for(f"{CHANGED}friction [-]")
     wait_until(
         lambda: re.search(r"friction\s+0.8\s+0.6\s+-0.2", visitor.text("#changes")), "its change"
     )
     assert "friction, largest" in visitor.text("#changes")
+    visitor.tab.wait_for_selector("#judging", state="hidden")
     assert visitor.place_of("speed [m/s]") == place  # a slider never moves under the mouse
     before = page.plots.curves["friction_utilisation"][1]
     assert (before[:, :6] != before[:, 6:]).any()

@@ -31,11 +31,10 @@ def picture_of(page: Page, visitor: Visitor, by: tuple[float, float]) -> np.ndar
     visitor.wait_for("paused")
     hidden = ".over-scene, .mantine-Notifications-root { display: none !important; }"
     visitor.tab.add_style_tag(content=hidden)
-    before = visitor.picture()
-    look_down_at(page, np.array([by[0] - 1.0, by[1], 0.0]))
-    wait_until(lambda: visitor.picture() != before, "the view from above")
-    visitor.tab.wait_for_timeout(1500)
-    return np.asarray(Image.open(BytesIO(visitor.picture())).convert("RGB"), dtype=float)
+    look_down_at(page, visitor, np.array([by[0] - 1.0, by[1], 0.0]))
+    visitor.wait_for_ground()
+    picture = visitor.steady_picture()
+    return np.asarray(Image.open(BytesIO(picture)).convert("RGB"), dtype=float)
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +61,7 @@ def test_a_far_map_looks_like_a_near_one_and_a_click_lands_where_it_is_aimed(bro
 
         aim = np.array([FAR[0] + 1.5, FAR[1] + 0.5])
         height = float(page.session.terrain.elevation_at(*aim))
-        before = visitor.picture()
-        look_down_at(page, np.array([*aim, height]), 3.0)
-        wait_until(lambda: visitor.picture() != before, "the view of the goal")
+        look_down_at(page, visitor, np.array([*aim, height]), 3.0)
         box = visitor.tab.locator("canvas").first.bounding_box()
         visitor.click_scene(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         wait_until(lambda: page.session.goal[0] != FAR[0] + 1.0, "another goal")

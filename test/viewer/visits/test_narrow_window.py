@@ -13,7 +13,7 @@ from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain
 from support.viewer.browser import LAPTOP, Visitor, needs_browser, wait_until
 from support.viewer.sessions import LSR1, ramp
-from support.viewer.visits import open_browser, visit, wait_for_rest
+from support.viewer.visits import look_from, open_browser, visit, wait_for_rest
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -38,8 +38,6 @@ HIDDEN = """() => {
     }).map(box => box.textContent)];
 }"""
 """How many labels there are, and which are behind the header or the hint, or above the window."""
-PLACES = "() => [...document.querySelectorAll('.leader')].map(e => e.style.transform)"
-"""Where on the screen the places of the labels are."""
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +70,13 @@ def test_header_board_and_lanes_are_seen_beside_a_wide_scene(visitor, size):
     for name in ("#board", "#lanes"):
         part = visitor.tab.locator(name)
         wait_until(lambda part=part: part.evaluate(IN_SIGHT), f"all of {name}")
-    header = visitor.tab.locator("#header").bounding_box()
-    assert header["x"] >= 0.0 and header["x"] + header["width"] <= width
+    header = visitor.tab.locator("#header")
+
+    def is_inside() -> bool:
+        box = header.bounding_box()
+        return box["x"] >= 0.0 and box["x"] + box["width"] <= width
+
+    wait_until(is_inside, "all of the header")
 
 
 def test_a_window_that_grows_wide_has_its_panels_side_by_side_again(visitor):
@@ -88,10 +91,7 @@ def test_a_window_that_grows_wide_has_its_panels_side_by_side_again(visitor):
 def test_no_label_stands_behind_the_header(page, visitor, down):
     visitor.tab.set_viewport_size(LAPTOP)
     failure = page.scene.frame.to_scene(page.judged.path.why.failure.state.position)
-    [client] = page.server.get_clients().values()
-    before = visitor.tab.evaluate(PLACES)
-    client.camera.look_at = failure - [0.0, 0.0, down]
-    client.camera.position = np.add(failure, [-2.5, 0.3, 0.6])  # the failure is at the upper edge
-    wait_until(lambda: visitor.tab.evaluate(PLACES) != before, "the view from there")
+    place = np.add(failure, [-2.5, 0.3, 0.6])  # the failure is at the upper edge
+    look_from(page, visitor, place, failure - [0.0, 0.0, down])
     wait_until(lambda: visitor.tab.evaluate(HIDDEN)[0] >= 3, "the labels")
     wait_until(lambda: visitor.tab.evaluate(HIDDEN)[1] == [], "labels beside the header")

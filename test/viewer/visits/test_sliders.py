@@ -34,7 +34,7 @@ MOVES = 2
 """Moves of the mouse from one end of a slider to the other; each is a value of its own."""
 BEYOND = 0.05
 """Distance of the mouse beyond the end at last, as a share of the slider's length."""
-TRIES, PATIENCE = 5, 5.0
+TRIES, PATIENCE = 20, 5.0
 """How often something is tried until the page hears of it, and for how long after each [s]."""
 
 
@@ -189,7 +189,12 @@ def test_every_slider_at_both_ends_leaves_the_page_alive_and_right(name, browser
         check_page(page, visitor)
         assert page.session.rover == LSR1 and not page.session.arm_angles
         for slider in sliders:
-            assert visitor.slider_value(slider.label) == pytest.approx(slider.wanted())
+            wait_until(
+                lambda slider=slider: (
+                    visitor.slider_value(slider.label) == pytest.approx(slider.wanted())
+                ),
+                f"{slider.label} as it was",
+            )
         visitor.open_tab("Drive")
         visitor.press("Play")
         wait_until(lambda: page.playback.time > 0.0, "the rover to drive")

@@ -1,7 +1,7 @@
 """A visit in a real browser: banner, boxes, arm, header, keys, camera, narrow windows, files."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from io import BytesIO
 
@@ -18,9 +18,9 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.scene import find_radius
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain
-from support.viewer.browser import LAPTOP, OVERLAPS, Visitor, needs_browser, wait_until
+from support.viewer.browser import LAPTOP, OVERLAPS, WAIT, Visitor, needs_browser, wait_until
 from support.viewer.sessions import LSR1, ramp
-from support.viewer.visits import open_browser, wait_for_rest
+from support.viewer.visits import find_camera, open_browser, wait_for_browser, wait_for_rest
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -65,19 +65,10 @@ def visitor(opened, page) -> Visitor:
     page.requests.add(reset)
     wait_until(lambda: done, "the reset")
     wait_for_rest(page)
+    wait_for_browser(page, opened)
     opened.open_tab("Drive")
     opened.wait_for("paused")
     return opened
-
-
-def type_keys(visitor: Visitor, label: str, text: str, end: str = "") -> None:
-    """Type into the box beside a slider, key by key, and press a last key."""
-    box = visitor._row(label).locator("input").last
-    box.click()
-    box.press("Control+a")
-    box.press_sequentially(text, delay=30)
-    if end:
-        box.press(end)
 
 
 def follow_values(page: Page, monkeypatch) -> list[float]:
@@ -96,7 +87,7 @@ def follow_values(page: Page, monkeypatch) -> list[float]:
 def test_a_typed_number_counts_on_enter_and_not_at_each_key(visitor, page, monkeypatch):
     applied = follow_values(page, monkeypatch)
     visitor.open_tab("Rover")
-    type_keys(visitor, FRICTION, "0.55")
+    visitor.type_keys(FRICTION, "0.55")
     visitor.tab.wait_for_timeout(400)
     assert applied == [] and page.session.wanted.rover.friction == LSR1.friction
     visitor.tab.keyboard.press("Enter")
@@ -108,8 +99,8 @@ def test_a_typed_number_counts_on_enter_and_not_at_each_key(visitor, page, monke
 def test_negative_decimals_can_be_typed_and_count_when_the_box_is_left(visitor, page, monkeypatch):
     applied = follow_values(page, monkeypatch)
     visitor.open_tab("Rover")
-    visitor.press("Masses") if not visitor.tab.get_by_text(COM).is_visible() else None
-    type_keys(visitor, COM, "-0.05", "Tab")
+    visitor.press("Masses")
+    visitor.type_keys(COM, "-0.05", "Tab")
     wait_until(lambda: applied, "the value")
     wait_for_rest(page)
     assert applied == [-0.05]
@@ -121,21 +112,21 @@ def test_escape_an_empty_box_and_numbers_beyond_the_slider(visitor, page, monkey
     applied = follow_values(page, monkeypatch)
     visitor.open_tab("Rover")
     for text, end in (("0.3", "Escape"), ("", "Enter")):
-        type_keys(visitor, FRICTION, text, end)
+        visitor.type_keys(FRICTION, text, end)
         visitor.tab.wait_for_timeout(300)
         assert applied == [] and visitor.slider_value(FRICTION) == LSR1.friction
-    type_keys(visitor, FRICTION, "99", "Enter")
+    note_shown = visitor.record_note()
+    visitor.type_keys(FRICTION, "99", "Enter")
     wait_until(lambda: applied, "the value")
     assert applied == [2.0]  # the end of the slider
     wait_until(lambda: visitor.slider_value(FRICTION) == 2.0, "the box to show it")
     note = visitor.tab.locator("#limited")
-    assert note.inner_text() == "limited to 2, the slider's largest value"
-    at, box = note.bounding_box(), visitor._row(FRICTION).locator("input").last.bounding_box()
-    assert abs(at["y"] - box["y"] - box["height"]) < 20.0  # beside its box
-    type_keys(visitor, FRICTION, "0.5", "Enter")
+    text, away = note_shown()  # it is at its box
+    assert text == "limited to 2, the slider's largest value" and abs(away) < 20.0
+    visitor.type_keys(FRICTION, "0.5", "Enter")
     wait_until(lambda: applied[-1] == 0.5, "a value within the range")
     note.wait_for(state="hidden")
-    type_keys(visitor, FRICTION, "-1", "Enter")
+    visitor.type_keys(FRICTION, "-1", "Enter")
     wait_until(lambda: applied[-1] == 0.16, "the smallest value")
     assert note.inner_text() == "limited to 0.16, the slider's smallest value"
     assert note.count() == 1
@@ -145,7 +136,8 @@ def test_the_arm_goes_with_its_rover_and_the_box_of_presets_follows_a_file(
     visitor, page, tmp_path
 ):
     visitor.open_tab("Rover")
-    assert visitor._row("Preset").locator("input").first.input_value() == "lsr1"
+    box = visitor._row("Preset").locator("input").first
+    wait_until(lambda: box.input_value() == "lsr1", "the preset")
     armless = replace(load_rover("lsr1"), name="bare", manipulator=None)
     file = tmp_path / "bare.yaml"
     file.write_text(write_rover(armless))
@@ -154,15 +146,14 @@ def test_the_arm_goes_with_its_rover_and_the_box_of_presets_follows_a_file(
         visitor.press("Load a rover file")
     chooser.value.set_files(file)
     wait_until(lambda: page.session.rover.name == "bare", "the loaded rover")
-    box = visitor._row("Preset").locator("input").first
     wait_until(lambda: box.input_value() == "bare (file)", "the box of presets")
     wait_until(lambda: visitor.picture() != before, "the other rover")
-    assert "/rover/body" in page.server.scene._handle_from_node_name
-    assert "/rover/arm" not in page.server.scene._handle_from_node_name
+    nodes = page.server.scene._handle_from_node_name
+    wait_until(lambda: "/rover/arm" not in nodes and "/rover/body" in nodes, "no arm")
     wait_until(lambda: "bare" in visitor.text("#header"), "the header")
     visitor.choose("Preset", "lsr1")
     wait_until(lambda: page.session.rover == LSR1, "the preset")
-    wait_until(lambda: "/rover/arm" in page.server.scene._handle_from_node_name, "the arm")
+    wait_until(lambda: "/rover/arm" in nodes, "the arm")
 
 
 def test_a_failing_page_shows_a_red_banner_over_the_scene_and_goes_on(visitor, page, monkeypatch):
@@ -193,11 +184,11 @@ def test_a_failing_page_shows_a_red_banner_over_the_scene_and_goes_on(visitor, p
 
 
 def test_the_header_tells_rover_map_soil_policy_mode_verdict_and_playback(visitor, page):
+    chip = visitor.tab.locator('[data-chip="is"]')
+    wait_until(lambda: chip.inner_text() == "traversable", "the verdict")
     header = visitor.text("#header")
     for word in ("lsr1", "ramp.npz", "firm, friction 0.8", "equal torques", "planning"):
         assert word in header
-    chip = visitor.tab.locator('[data-chip="is"]')
-    assert chip.inner_text() == "traversable"
     assert visitor.tab.locator('[data-chip="plays"]').inner_text() == "paused"
     heights = [
         visitor.tab.locator(f'[data-chip="{name}"]').bounding_box()["height"]
@@ -210,7 +201,8 @@ def test_the_header_tells_rover_map_soil_policy_mode_verdict_and_playback(visito
     assert "lsr1 (changed)" in visitor.text("#header")
 
 
-def test_space_plays_and_pauses_and_arrows_step_wherever_the_focus_was(visitor, page):
+def test_space_plays_and_pauses_and_arrows_step_wherever_the_focus_was(visitor, page, monkeypatch):
+    monkeypatch.setattr(page.playback, "speed", 1.0)
     times = page.session.shown.trajectory.times
     visitor.press("Step")  # the button keeps no focus, so that space does not press it again
     wait_until(lambda: page.playback.time == pytest.approx(times[1]), "the first waypoint")
@@ -220,7 +212,7 @@ def test_space_plays_and_pauses_and_arrows_step_wherever_the_focus_was(visitor, 
         keyboard.press(key)
         there = times[row]
         wait_until(lambda there=there: page.playback.time == pytest.approx(there), key)
-    camera = next(iter(page.server.get_clients().values())).camera
+    camera = find_camera(page)
     place = np.array(camera.position)
     keyboard.press("Space")
     wait_until(lambda: page.playback.rate == 1.0, "it to play")
@@ -229,7 +221,7 @@ def test_space_plays_and_pauses_and_arrows_step_wherever_the_focus_was(visitor, 
     wait_until(lambda: page.playback.rate == 0.0, "it to pause")
     np.testing.assert_allclose(camera.position, place)  # the arrows do not turn the camera
     visitor.open_tab("Rover")
-    type_keys(visitor, FRICTION, "0.5", "ArrowLeft")
+    visitor.type_keys(FRICTION, "0.5", "ArrowLeft")
     assert page.playback.rate == 0.0
     keyboard.press("Escape")
 
@@ -248,7 +240,8 @@ def test_a_click_on_lanes_or_plots_goes_there(visitor, page, curves, share):
     wait_until(lambda: distance() == pytest.approx(there, abs=0.03), f"{share} of the way")
 
 
-def test_one_button_plays_and_pauses(visitor, page):
+def test_one_button_plays_and_pauses(visitor, page, monkeypatch):
+    monkeypatch.setattr(page.playback, "speed", 1.0)
     group = visitor._buttons("Playback")
     assert group() == ["Rewind", "Play", "Fast forward"]
     visitor.press("Play")
@@ -259,22 +252,25 @@ def test_one_button_plays_and_pauses(visitor, page):
 
 
 def test_the_camera_looks_from_above_from_the_side_and_goes_along(visitor, page):
-    camera = next(iter(page.server.get_clients().values())).camera
-
-    def look(name: str) -> np.ndarray:
-        visitor.press(name)
-        visitor.tab.wait_for_timeout(400)
-        return np.array(camera.position) - np.array(camera.look_at)
-
-    top = look("Top")
-    assert top[2] > 10.0 * np.hypot(top[0], top[1])
+    camera = find_camera(page)
     path = page.path_to_look_at()
     middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
-    np.testing.assert_allclose(np.array(camera.look_at)[:2], middle, atol=0.05)
-    side = look("Side")
-    assert side[1] < 0.0 and abs(side[1]) > 2.0 * max(abs(side[0]), side[2])
-    fit = look("Fit")
-    assert np.linalg.norm(fit) > np.linalg.norm(side)
+
+    def look(name: str, fits: Callable[[np.ndarray, np.ndarray], bool]) -> np.ndarray:
+        """Press a button, and return the direction of the view that fits."""
+
+        def offset() -> np.ndarray | None:
+            at, away = np.array(camera.look_at), np.subtract(camera.position, camera.look_at)
+            return [away] if fits(at, away) else None
+
+        visitor.press(name)
+        return wait_until(offset, f"the view {name}")[0]
+
+    look("Top", lambda at, away: np.allclose(at[:2], middle, atol=0.05)
+         and away[2] > 10.0 * np.hypot(away[0], away[1]))  # fmt: skip
+    side = look("Side", lambda _, away: away[1] < -2.0 * max(abs(away[0]), away[2]))
+    fit = look("Fit", lambda at, away: np.allclose(at[:2], middle, atol=0.05)
+               and np.linalg.norm(away) > np.linalg.norm(side))  # fmt: skip
     visitor.press("Follow")
     visitor.wait_for("Stay")
     rover = page.scene._last_position
@@ -377,6 +373,7 @@ def test_a_refusal_is_sent_as_one_file_with_scene_pose_numbers_and_versions(
     errors: list[str] = []
     tab.on("pageerror", lambda error: errors.append(str(error)))
     tab.goto(file.as_uri())
+    tab.set_default_timeout(1000.0 * WAIT)
     tab.wait_for_selector("canvas")
     report = tab.inner_text("#report")
     assert reason in report and "not traversable" in report
@@ -384,11 +381,15 @@ def test_a_refusal_is_sent_as_one_file_with_scene_pose_numbers_and_versions(
         assert word in report
     assert re.search(rf"waypoint {verdict.first_failure}\b", report)
     tab.add_style_tag(content=".mantine-Notifications-root, #report { display: none; }")
-    colours = np.asarray(Image.open(BytesIO(tab.locator("canvas").first.screenshot())))
-    assert colours[..., :3].reshape(-1, 3).std(axis=0).max() > 20.0  # a scene, not one colour
+
+    def contrast() -> float:
+        colours = np.asarray(Image.open(BytesIO(tab.locator("canvas").first.screenshot())))
+        return float(colours[..., :3].reshape(-1, 3).std(axis=0).max())
+
+    wait_until(lambda: contrast() > 20.0, "a scene, not one colour")
     labels = page.scene.labels._all()
-    wait_until(lambda: tab.evaluate(OVERLAPS)[0] > 3, "the labels")
-    assert tab.evaluate(OVERLAPS) == [len(labels), []]
+    assert len(labels) > 3
+    wait_until(lambda: tab.evaluate(OVERLAPS) == [len(labels), []], "the labels, apart")
     assert errors == []
     context.close()
 
