@@ -98,6 +98,8 @@ def test_switched_off_no_cell_is_free_and_switched_on_it_is_that_of_the_newest_m
     costmap = ros.spin(Costmap(ros, ("worst", "heading_1")))
     worst, first = costmap.grids["worst"], costmap.grids["heading_1"]
     wait_until(lambda: is_free(worst) and is_free(first), "the map", 60.0)
+    there = (1.5, 2.5), (1.5, 2.5)
+    wait_until(lambda: (cells(worst[-1], *there) == PASSABLE).all(), "where the rock will be")
     assert client.set_parameter("hazard_map", False)[0]
     for grids in (worst, first):
         wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
@@ -111,7 +113,6 @@ def test_switched_off_no_cell_is_free_and_switched_on_it_is_that_of_the_newest_m
         return is_free(worst)  # away from the rock
 
     wait_until(is_shown, "the map", 60.0)
-    there = (1.5, 2.5), (1.5, 2.5)
     assert all((cells(grid, *there) != PASSABLE).any() for grid in asked if grid.data)
     wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
 
