@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -33,6 +34,7 @@ _GROUND = LinearSegmentedColormap.from_list("ground", ["#6E6259", "#B5A99C", "#F
 _COLUMNS = 3
 _UNKNOWN = (0.80, 0.84, 0.90)
 _INK = "#222222"
+_FALL = "#E4E1DC"
 
 
 @dataclass(frozen=True)
@@ -309,6 +311,8 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
         for row, (label, name, limit) in enumerate(rows):
             axes = panels[row, column]
             _draw_quantity(axes, candidate, name)
+            if name != "tip_over_ratio":
+                _shade_falls(axes, candidate)
             if limit is not None:
                 axes.axhline(limit, color=_INK, lw=1.0, ls=":")
             if column == 0:
@@ -320,7 +324,7 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
             highest = max(limit, min(highest, 2 * max(limit, 1.0)))
         panels[row, 0].set_ylim(0, 1.08 * max(highest, 1e-3))
     figure.align_ylabels(panels[:, 0])
-    figure.legend(handles=_wheel_legend(), loc="outside lower center", ncols=4)
+    figure.legend(handles=_wheel_legend(), loc="outside lower center", ncols=5)
 
 
 def _highest(candidate: Candidate, name: str) -> float:
@@ -340,8 +344,7 @@ def _panel_title(labelled: LabelledAnswer) -> str:
 def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     """Draw one predicted quantity along a path: six wheels, or one value."""
     values = np.asarray(getattr(candidate.prediction, name))
-    steps = np.hypot(*np.diff(candidate.poses[:, :2], axis=0).T)
-    whole = np.concatenate([[0.0], np.cumsum(steps)])
+    whole = _measure_distance(candidate)
     distance, columns = whole[: len(values)], values.reshape(len(values), -1)
     if np.allclose(columns, columns[:, :1], equal_nan=True):
         axes.plot(distance, columns[:, 0], color=_INK, lw=1.3)
@@ -357,9 +360,24 @@ def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     axes.set_xlim(0, max(whole[-1], 1e-3))
 
 
-def _wheel_legend() -> list[Line2D]:
+def _measure_distance(candidate: Candidate) -> NDArray[np.float64]:
+    """Return the distance of each waypoint along the path (n,) [m]."""
+    steps = np.hypot(*np.diff(candidate.poses[:, :2], axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _shade_falls(axes: Axes, candidate: Candidate) -> None:
+    """Shade where a wheel rolls off an edge: the verdict does not ask for forces there."""
+    distance, prediction = _measure_distance(candidate), candidate.prediction
+    parts = filter(None, (prediction, prediction.between))
+    falls = [part.waypoint[part.falling.any(axis=1)] for part in parts]
+    for waypoint in np.unique(np.concatenate(falls)):
+        axes.axvspan(distance[max(waypoint - 1, 0)], distance[waypoint], color=_FALL, zorder=0)
+
+
+def _wheel_legend() -> list[Line2D | Patch]:
     """Return the legend handles of the wheels."""
-    handles = [
+    handles: list[Line2D | Patch] = [
         Line2D(
             [],
             [],
@@ -373,4 +391,5 @@ def _wheel_legend() -> list[Line2D]:
     ]
     handles.append(Line2D([], [], color=_INK, lw=1.3, label="rover, or all wheels alike"))
     handles.append(Line2D([], [], color=_INK, lw=1.0, ls=":", label="safety limit"))
+    handles.append(Patch(color=_FALL, label="a wheel rolls off an edge: not asked"))
     return handles

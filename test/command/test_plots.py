@@ -101,6 +101,25 @@ def test_a_single_pose_is_drawn(draw, rover, holed):
     assert {tuple(line.get_xydata()[0]) for line in starts} == {(0.0, 0.0)}
 
 
+def test_forces_that_no_verdict_asks_for_are_shaded(draw, rover):
+    """A wheel that rolls off an edge may use more friction than the verdict tells."""
+    x = 0.05 * np.arange(121) - 4.5
+    ledge = Terrain(np.tile(np.where(x < -2.5, 0.06, 0.0), (81, 1)), 0.05, (-4.5, -2.0))
+    options = dataclasses.replace(COARSE, count=1, waypoint_spacing=0.02)
+    answer = answer_path_query(rover, ledge, (-3.5, 0, 0), (-1.5, 0, 0), options)
+    prediction = answer.chosen.prediction
+    falls = prediction.falling.any(axis=1)
+    assert 0 < falls.sum() < len(falls)
+    _, others = draw(LabelledAnswer("A", "down", answer))
+    shaded = {axes.get_ylabel().split("\n")[0]: len(axes.patches) for axes in others}
+    for name in ("wheel load [N]", "friction", "torque"):
+        assert shaded[name] >= falls.sum()
+    assert shaded["tip-over margin"] == 0
+    before = answer_path_query(rover, ledge, (-3.5, 0, 0), (-3.2, 0, 0), options)
+    assert before.traversable
+    assert not any(axes.patches for axes in draw(LabelledAnswer("B", "level", before))[1])
+
+
 def test_slopes_towards_the_sun_are_brighter():
     x = np.arange(30.0)[None, :] + np.zeros((30, 1))
     level = hill_shade(np.zeros((30, 30)), 0.1)
