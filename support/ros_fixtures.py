@@ -17,6 +17,15 @@ from support.waiting import TIMEOUT, wait_until
 DOMAINS = 50
 """Number of the domains of tests, 1 to 50; a demo takes one above them."""
 
+PATIENT = {
+    "joint_states_timeout": 1.0,
+    "imu_timeout": 1.0,
+    "cmd_vel_timeout": 10.0,
+    "watchdog_timeout": 1.0,
+}
+"""The longest timeouts of a controller: a busy machine makes no difference, one that stalls for
+longer does."""
+
 
 def domain_id() -> int:
     """Return the domain of this test process, so that parallel runs are separate.

@@ -25,7 +25,7 @@ from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from support.grounds import make_terrain, wall_at, waves
-from support.ros_fixtures import RosRun, call
+from support.ros_fixtures import PATIENT, RosRun, call
 from support.waiting import wait_until
 
 START_X = -1.0
@@ -58,8 +58,7 @@ def start_simulator(ros, terrain_file, **values) -> RoverSimulator:
 
 def start_controller(ros, enabled=True) -> TractionController:
     """Return a controller with the longest timeouts, for the sake of busy machines."""
-    values = {"enabled_at_start": enabled, "cmd_vel_timeout": 10.0}
-    values |= dict.fromkeys(("joint_states_timeout", "imu_timeout", "watchdog_timeout"), 1.0)
+    values = {"enabled_at_start": enabled} | PATIENT
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     return ros.spin(TractionController(context=ros.context, parameter_overrides=parameters))
 

@@ -5,15 +5,8 @@ from rclpy.parameter import Parameter
 
 from benchmarks.driven_rover import RATE, DrivenRover
 from rover_planner.nodes.traction_controller import TractionController
+from support.ros_fixtures import PATIENT
 from support.waiting import wait_until
-
-PATIENT = {
-    "joint_states_timeout": 1.0,
-    "imu_timeout": 1.0,
-    "cmd_vel_timeout": 10.0,
-    "watchdog_timeout": 1.0,
-}
-"""The longest timeouts: a busy machine makes no difference, one that stalls for longer does."""
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from support.grounds import make_terrain
+from support.ros_fixtures import PATIENT
 from support.waiting import wait_until
 
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "ros2_control"
@@ -144,16 +145,13 @@ def start(ros):
     """Return a function that starts a controller of the shipped configuration."""
 
     def start_controller(**others):
-        values = {
+        own = {
             "joint_map": read_config("joints.yaml", "/**")["joint_map"],
             "joints": read_config("joints.yaml", "traction_controller")["joints"],
             "enabled_at_start": True,
-            "joint_states_timeout": 1.0,
-            "imu_timeout": 1.0,
-            "cmd_vel_timeout": 10.0,
-            "watchdog_timeout": 1.0,
             "stamp_tolerance": 1.0,
-        } | others
+        }
+        values = own | PATIENT | others
         groups = {
             "commands": "wheel_efforts",
             "velocity_commands": "wheel_velocities",

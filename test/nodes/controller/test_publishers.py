@@ -8,7 +8,7 @@ from sensor_msgs.msg import PointCloud2
 
 from benchmarks.driven_rover import DrivenRover
 from rover_planner.nodes.traction_controller import TractionController
-from support.ros_fixtures import RosRun
+from support.ros_fixtures import PATIENT, RosRun
 from support.waiting import wait_until
 
 
@@ -95,8 +95,7 @@ def test_two_rovers_in_two_namespaces_do_not_meet(ros):
         rover = DrivenRover(ros.context, namespace=name)
         rover.send_twists()
         rovers[name] = ros.spin(rover)
-    values = {"enabled_at_start": True, "joint_states_timeout": 1.0, "imu_timeout": 1.0}
-    values |= {"cmd_vel_timeout": 10.0, "watchdog_timeout": 1.0}
+    values = {"enabled_at_start": True} | PATIENT
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     for name in rovers:
         node = TractionController(

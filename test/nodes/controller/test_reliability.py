@@ -10,11 +10,12 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from support.command_line import REPOSITORY
 from support.waiting import wait_until
 
-LONGEST, LONGEST_SHOWN = 5000.0, 10000.0
+LONGEST, LONGEST_SHOWN = 2000.0, 6000.0
 """Longest times to rest and to the error in diagnostics on a busy machine [ms]."""
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_every_fault_ends_the_push_and_nothing_normal_does(tmp_path):
     words = ["--repeats", "1", "--seconds", "2", "--out", str(tmp_path / "figures.json")]
     with stopping_children() as children:

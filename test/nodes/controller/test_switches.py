@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from support.ros_fixtures import call, domain_id, run_in_executor
+from support.ros_fixtures import PATIENT, call, domain_id, run_in_executor
 from support.waiting import wait_until
 
 
@@ -149,8 +149,7 @@ def test_a_node_that_is_stopped_sends_zeros_and_no_more(rover, controller):
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_process_that_is_told_to_end_sends_zeros_last(rover, how):
-    values = {"enabled_at_start": "true", "cmd_vel_timeout": 10.0}
-    values |= dict.fromkeys(("joint_states_timeout", "imu_timeout", "watchdog_timeout"), 1.0)
+    values = {"enabled_at_start": "true"} | PATIENT
     words = ["--ros-args"]
     for name, value in values.items():
         words += ["-p", f"{name}:={value}"]

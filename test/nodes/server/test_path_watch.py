@@ -3,6 +3,7 @@
 import json
 import threading
 import time
+from statistics import median
 
 import numpy as np
 import pytest
@@ -147,7 +148,7 @@ def test_a_rock_put_across_the_path_stops_the_rover_in_half_a_second(watched, cl
     for _ in range(2):
         clear_the_path(rover, client)
         delays.append(time_stop(rover, client))
-    assert min(delays) < 0.5, delays  # a machine that stops for a moment delays one of them
+    assert median(delays) < 0.5, delays  # a machine that stops for a moment delays one of them
 
 
 @pytest.mark.timed
@@ -167,7 +168,7 @@ def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros, endles
             assert not future.done()
             server.desk.cancel("cancelled", "the question has lasted long enough")
         clear_the_path(rover, client)
-    assert min(delays) < 0.5, delays
+    assert median(delays) < 0.5, delays
 
 
 def test_a_stop_lasts_until_another_path_is_accepted(watched, client):
