@@ -24,7 +24,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help
 help: ## list what there is
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/make \1\t\2/' | expand -t 14
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/make \1\t\2/' | expand -t 18
 
 .PHONY: demo
 demo: $(READY) ## plan over DDS on a made Mars terrain; MAP=spirit for Mars, MAP=file.npz for another
@@ -45,16 +45,20 @@ test: lint kernels ## lint, type check and all tests
 	}
 	failed=0
 	run "tests" --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder \
-	  -m "not timed" $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
+	  -m "not timed and not long" $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
 	run "tests that bound a time by the clock, one after another" \
-	  -m timed $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
+	  -m "timed and not long" $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
 	run "tests of the page, alone: a browser without a graphics card needs all cores" \
-	  $(BROWSER_TESTS) || failed=1
+	  -m "not long" $(BROWSER_TESTS) || failed=1
 	exit $$failed
+
+.PHONY: test-long
+test-long: $(READY) kernels ## the tests that take a minute or more each: lowest versions, killed workers, long drives
+	@$(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 -m long test
 
 .PHONY: quick
 quick: $(READY) ## the tests that are not slow: under a minute once the kernels are compiled
-	@$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow and not timed" test
+	@$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow and not timed and not long" test
 
 .PHONY: lint
 lint: $(READY) ## ruff and mypy

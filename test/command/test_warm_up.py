@@ -6,7 +6,6 @@ import sys
 
 import pytest
 
-from support.project.long_tests import on_demand
 from support.project.without_disk import fill_disk
 
 LOAD_ALL = """
@@ -21,7 +20,7 @@ def run(*words, **options):
     )
 
 
-@on_demand  # test/planning/answering/test_warm_up.py holds that no question compiles after it
+@pytest.mark.long
 @pytest.mark.slow
 def test_after_it_every_kernel_is_on_disk(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}

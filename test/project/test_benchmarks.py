@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from support.project.long_tests import on_demand
-
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 TOPICS = sorted(path.stem.removeprefix("bench_") for path in BENCHMARKS.glob("bench_*.py"))
 SMALL = {
@@ -63,7 +61,7 @@ LONGER = ("rough", "scheduler", "service", "start", "survey", "view")
 def params_of_topics():
     """Return the topics with their marks."""
     marks = {topic: (pytest.mark.slow,) for topic in TOPICS if topic not in QUICK}
-    marks |= {topic: (pytest.mark.slow, on_demand) for topic in LONGER}
+    marks |= {topic: (pytest.mark.slow, pytest.mark.long) for topic in LONGER}
     return [pytest.param(topic, marks=marks.get(topic, ())) for topic in TOPICS]
 
 

@@ -10,7 +10,6 @@ import pytest
 
 from rover_planner.nodes.programs import PROGRAMS
 from support.project.checkout import TOP, copy_checkout, setup_arguments
-from support.project.long_tests import on_demand
 
 CORE = """
 import numpy as np
@@ -100,7 +99,7 @@ def test_the_lowest_versions_are_what_pip_installs(environment, tmp_path):
         assert installed[name] in versions
 
 
-@on_demand
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_command_line_runs_with_the_lowest_versions(environment, tmp_path):
     for words, told in (
@@ -123,7 +122,7 @@ def test_the_command_line_runs_with_the_lowest_versions(environment, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "program", [CORE, pytest.param(MORE, marks=on_demand)], ids=["core", "more"]
+    "program", [CORE, pytest.param(MORE, marks=pytest.mark.long)], ids=["core", "more"]
 )
 def test_the_library_runs_with_the_lowest_versions(environment, tmp_path, program):
     ended = run(environment, tmp_path, "python", "-c", program)

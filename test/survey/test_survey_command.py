@@ -22,7 +22,6 @@ from rover_planner.survey.cluster.client import ClusterSettings, open_client
 from rover_planner.survey.cluster.runner import run_survey
 from rover_planner.survey.store import SurveyStore
 from rover_planner.survey.survey import prepare_survey
-from support.project.long_tests import on_demand
 from support.survey_maps import (
     assert_same_bits,
     count_chunks,
@@ -104,7 +103,7 @@ def test_a_killed_worker_costs_only_its_chunks_time(whole, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "how", [signal.SIGKILL, signal.SIGINT, pytest.param(signal.SIGTERM, marks=on_demand)]
+    "how", [signal.SIGKILL, signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
 )
 def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_path, how):
     folder, layers = whole

@@ -8,7 +8,6 @@ from rover_physics.traversability.judge_path import judge_path
 from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession
-from support.project.long_tests import on_demand
 from support.viewer.browser import Visitor, needs_browser, wait_until
 from support.viewer.sessions import (
     GOAL,
@@ -116,7 +115,7 @@ def test_the_old_verdict_is_greyed_until_the_new_one_is_there(visitor, slow_page
     wait_until(lambda: slow_page.scene.paths._old == set(), "coloured paths")
 
 
-@on_demand
+@pytest.mark.long
 def test_camera_and_second_visitor_are_served_while_a_change_is_judged(
     visitor, slow_page, browser
 ):
@@ -154,7 +153,7 @@ def test_a_cancelled_judgement_leaves_the_old_verdict_and_can_be_begun_again(vis
     visitor.tab.locator("#old").first.wait_for(state="detached")
 
 
-@on_demand
+@pytest.mark.long
 def test_sliders_dragged_to_both_ends_leave_the_page_alive_and_right(visitor, slow_page):
     session = slow_page.session
     for label, end in ((FRICTION, 1.0), (FRICTION, 0.0), ("front wheel x [m]", 1.0)):

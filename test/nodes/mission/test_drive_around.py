@@ -15,7 +15,6 @@ from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.project.long_tests import on_demand
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
@@ -53,7 +52,7 @@ def without_gaps(terrain: Terrain) -> Terrain:
     return Terrain(terrain.elevation[tuple(nearest)], terrain.resolution, terrain.origin)
 
 
-@on_demand  # two to three minutes each; test_drive.py and test_rover_simulator.py drive every time
+@pytest.mark.long  # two to three minutes each
 @pytest.mark.slow
 @pytest.mark.timed
 @pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
