@@ -1,6 +1,5 @@
 """Writes .npz files of long arrays, which come part by part."""
 
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -9,8 +8,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rover_physics.errors import RoverFileError
-from rover_physics.files.npz_file import method_for
-from rover_physics.files.user_file import open_without_waiting
+from rover_physics.files.npz_file import create_npz, method_for
 
 
 class NpzParts:
@@ -75,39 +73,11 @@ class NpzParts:
                 self._types[name] = np.asarray(value).dtype
             for stream in self._streams.values():
                 stream.close()
-            with open(path, "wb", opener=open_without_waiting) as file:
-                late = _LateErrors(file)
-                with zipfile.ZipFile(late, "w") as archive:  # type: ignore[call-overload]
-                    for name, dtype in self._types.items():
-                        archive.write(self._path_of(name), f"{name}.npy", method_for(dtype), 1)
-                late.raise_error()
-        except (OSError, ValueError) as error:
+            with create_npz(path) as archive:
+                for name, dtype in self._types.items():
+                    archive.write(self._path_of(name), f"{name}.npy", method_for(dtype), 1)
+        except OSError as error:
             raise _cannot_write(error) from error
-
-
-class _LateErrors:
-    """A file to write to that keeps its first error: zipfile prints errors in some places."""
-
-    def __init__(self, file: BinaryIO):
-        self._file = file
-        self._error: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        """Write as a file does, or do nothing after an error."""
-        if self._error is None:
-            try:
-                self._file.write(data)
-            except OSError as error:
-                self._error = error
-        return len(data)
-
-    def flush(self) -> None:
-        """Do nothing: the file is flushed when it is closed."""
-
-    def raise_error(self) -> None:
-        """Raise the first error, if there was one."""
-        if self._error is not None:
-            raise self._error
 
 
 def _cannot_write(error: Exception) -> RoverFileError:
