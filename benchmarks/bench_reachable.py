@@ -10,15 +10,14 @@ from scipy import ndimage
 
 from benchmarks.measure import Figure
 from rover_planner.survey.layers import bits_type
-from rover_planner.survey.reach.grid import HeadingGrid, choose_tile
 from rover_planner.survey.reach.moves import find_moves
-from rover_planner.survey.reach.reachable import search_area
+from rover_planner.survey.reach.reachable import HeadingGrid, search_area
 
 SIDE = 3200
 """Side of the map [cells]."""
 HEADINGS = 8
 CHUNK = 192
-"""Side of a chunk of the survey, of which tiles are made [cells]."""
+"""Side of a chunk of the survey [cells]."""
 BLUR = 4.0
 """Size of the blots that cannot be passed [cells]."""
 OPEN = 0.9
@@ -33,11 +32,11 @@ def measure() -> list[Figure]:
     distance = np.full(bits.shape, np.inf, np.float32)
     warm = HeadingGrid(bits[:64, :64], bits[:64, :64], moves, 32)
     with tempfile.TemporaryDirectory() as folder:
-        search_area(warm, (32, 32), lambda _box, _nearest: None, Path(folder))
-    grid = HeadingGrid(bits, bits, moves, choose_tile(HEADINGS, CHUNK))
+        search_area(warm, (32, 32), np.full((64, 64), np.inf, np.float32), Path(folder))
+    grid = HeadingGrid(bits, bits, moves, CHUNK)
     before, began = _peak_memory(), time.process_time()
     with tempfile.TemporaryDirectory() as folder:
-        found = search_area(grid, (middle, column), distance.__setitem__, Path(folder))
+        found = search_area(grid, (middle, column), distance, Path(folder))
     told = (
         ("cells", bits.size, ""),
         ("cells of the area", found.cells, ""),

@@ -22,6 +22,14 @@ class Moves(NamedTuple):
     lengths: np.ndarray
     """(headings,) length [m]."""
 
+    def reversed(self) -> "Moves":
+        """Return the moves from their goals back to their starts, of length 0."""
+        steps = np.zeros_like(self.steps)
+        for k, count in enumerate(self.counts):
+            way = np.vstack([self.steps[k, : count - 1][::-1], np.zeros((1, 2), np.int64)])
+            steps[k, :count] = way - self.steps[k, count - 1]
+        return Moves(steps, self.counts, np.zeros_like(self.lengths))
+
 
 def find_moves(headings: int, cell: float) -> Moves:
     """Return the shortest move of each heading that is aligned with it.

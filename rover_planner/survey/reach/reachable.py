@@ -1,17 +1,16 @@
 """Where a rover can go on a surveyed map and come back from, over cells and headings."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import LIMIT_NUMBERS
-from rover_planner.survey.layout import Box, Index
-from rover_planner.survey.reach.distances import TileDistances
-from rover_planner.survey.reach.grid import HeadingGrid, choose_tile
+from rover_planner.survey.layers import LIMIT_NUMBERS, bits_type, pack_bits, unpack_bits
+from rover_planner.survey.layout import Index
 from rover_planner.survey.reach.kept_area import (
     DISTANCE,
     ReachableArea,
@@ -19,12 +18,25 @@ from rover_planner.survey.reach.kept_area import (
     note_area,
     open_area,
 )
-from rover_planner.survey.reach.merged_graph import MergedGraph
-from rover_planner.survey.reach.moves import find_moves
+from rover_planner.survey.reach.kernels import advance_front
+from rover_planner.survey.reach.moves import Moves, find_moves
 from rover_planner.survey.store import SurveyStore
 
-Keep = Callable[[Box, NDArray[np.float32]], None]
-"""Takes the distances of a box of cells."""
+CLOSED = -1.0
+"""Distance of headings that are not passable."""
+
+
+class HeadingGrid(NamedTuple):
+    """Where and how a rover may drive; a node is a cell at a heading that is passable there."""
+
+    passable: Any
+    """(ny, nx) bits of the passable headings, an array or one of Zarr."""
+    turnable: Any
+    """The same for headings at which the rover may turn."""
+    moves: Moves
+    """The move of each heading."""
+    chunk: int
+    """Number of rows that are read at once."""
 
 
 class AreaNumbers(NamedTuple):
@@ -40,7 +52,6 @@ def find_reachable(
     store: SurveyStore,
     x: float,
     y: float,
-    tile: int | None = None,
     report: Callable[[str], object] = lambda what: None,
 ) -> ReachableArea:
     """Find where the rover can go from a place and return to it, and keep that in the store.
@@ -53,8 +64,6 @@ def find_reachable(
         store: The survey.
         x: Start [m], map frame.
         y: The same.
-        tile: Side of the tiles in which the map is searched [cells] (default: that of some
-            200 MB). The result does not depend on it.
         report: Called with what is done next.
 
     Raises:
@@ -67,13 +76,12 @@ def find_reachable(
         passable,
         store.layer("turnable_headings") if notes.turns else passable,
         find_moves(notes.headings, notes.cell),
-        tile or choose_tile(notes.headings, notes.layout.chunk),
+        notes.layout.chunk,
     )
     with new_area(store) as (folder, group):
-        distance = group[DISTANCE]
-        numbers = search_area(grid, start, distance.__setitem__, folder, report)
-        found = ReachableArea(start, (x, y), distance, notes.cell, *numbers)
-        note_area(store, group, found)
+        numbers = search_area(grid, start, group[DISTANCE], folder, report)
+        area = ReachableArea(start, (x, y), group[DISTANCE], notes.cell, *numbers)
+        note_area(store, group, area)
     kept = open_area(store)
     assert kept is not None
     return kept
@@ -94,46 +102,100 @@ def say_why_none(store: SurveyStore, start: Index) -> str:
 def search_area(
     grid: HeadingGrid,
     start: Index,
-    keep: Keep,
+    area: Any,
     folder: Path,
     report: Callable[[str], object] = lambda what: None,
 ) -> AreaNumbers:
     """Find the cells that can be reached and returned from.
 
+    All that grows with the map is in files that are mapped to memory: the system keeps in memory
+    what the search is about, and as much of the rest as there is room for.
+
     Args:
         grid: Passable headings.
         start: Row and column of the start.
-        keep: Called with the distances [m] of each part of the map in which there are such cells.
-        folder: An empty folder for distances.
+        area: (ny, nx) array or one of Zarr, infinite, to which the distances [m] are written.
+        folder: An empty folder for files of 4 bytes a node and 2 bits a node.
         report: Called with what is done next.
     """
-    report("join the parts of the map")
-    merged = MergedGraph(grid, start)
-    report("find what is reached and returned from")
-    distances, reached, cells = TileDistances(grid, folder), 0, 0
-    for tile in grid.tiles:
-        reach = merged.reach_of(tile)
-        if reach is not None:
-            reached += int(reach.reached.sum())
-            here = int(reach.inside.any(axis=2).sum())
-            cells += here
-            if here:
-                distances.ask(tile, reach.inside)
+    (rows, columns), headings = grid.passable.shape, len(grid.moves.counts)
+    spans = [slice(row, min(row + grid.chunk, rows)) for row in range(0, rows, grid.chunk)]
+    distance = _map_file(folder / "distance", np.float32, (rows, columns, headings))
+    turnable, returns = (
+        _map_file(folder / name, bits_type(headings), (rows, columns)) for name in ("turn", "back")
+    )
+    for span in spans:
+        turnable[span] = np.asarray(grid.turnable[span]) & np.asarray(grid.passable[span])
+
+    def measure(moves: Moves) -> None:
+        for span in spans:
+            for row, bits in enumerate(np.asarray(grid.passable[span]), span.start):
+                distance[row] = np.where(unpack_bits(bits, headings), np.inf, CLOSED)
+        _measure_ways(distance, turnable, moves, start)
+
+    report("find where the rover returns from")
+    measure(grid.moves.reversed())
+    for row in range(rows):
+        returns[row] = pack_bits(distance[row] == 0.0)
     report("measure the ways")
-    if cells:
-        distances.search(start)
-    longest, farthest = -1.0, (0, 0)
-    for box, nearest in distances.nearest():
-        keep(box, nearest)
-        lengths = np.where(np.isfinite(nearest), nearest, -1.0)
-        row, column = np.unravel_index(int(np.argmax(lengths)), lengths.shape)
-        length = float(lengths[row, column])
-        place = box[0].start + int(row), box[1].start + int(column)
-        if (-length, place) < (-longest, farthest):
-            longest, farthest = length, place
-    if not cells:
-        return AreaNumbers(0, reached, None, None)
-    return AreaNumbers(cells, reached, longest, farthest)
+    measure(grid.moves)
+    cells, reached, longest, farthest = 0, 0, -1.0, None
+    for span in spans:
+        nearest = np.full((span.stop - span.start, columns), np.inf, np.float32)
+        for row, lengths in zip(range(span.start, span.stop), nearest, strict=True):
+            is_reached = np.isfinite(distance[row]) & (distance[row] >= 0.0)
+            inside = is_reached & unpack_bits(returns[row], headings)
+            lengths[:] = np.where(inside, distance[row], np.inf).min(axis=1)
+            reached += int(is_reached.any(axis=1).sum())
+            ends = np.where(np.isfinite(lengths), lengths, -1.0)
+            column = int(ends.argmax())
+            if ends[column] > longest:
+                longest, farthest = float(ends[column]), (row, column)
+        if np.isfinite(nearest).any():
+            area[span] = nearest
+            cells += int(np.isfinite(nearest).sum())
+    return AreaNumbers(cells, reached, longest if cells else None, farthest)
+
+
+def _measure_ways(
+    distance: NDArray[np.float32], turnable: NDArray[Any], moves: Moves, start: Index
+) -> None:
+    """Find the length of the shortest way from any heading at a cell to each node.
+
+    Lengths are sums from the start on, rounded after each move, and the least of all ways; so
+    they do not depend on the order of the search. Nodes up to one move ahead of the nearest go
+    first, so that few are visited twice.
+
+    Args:
+        distance: (ny, nx, headings) infinite, or CLOSED where not passable; written.
+        turnable: (ny, nx) bits of the headings at which the rover may turn.
+        moves: Moves.
+        start: Row and column of the cell.
+    """
+    _, columns, headings = distance.shape
+    flat, ahead = distance.reshape(-1), moves.lengths.min()
+    nodes = (start[0] * columns + start[1]) * headings + np.arange(headings)
+    waiting = nodes[flat[nodes] > CLOSED]
+    flat[waiting] = 0.0
+    while len(waiting):
+        far = flat[waiting]
+        is_next = far <= far.min() + ahead
+        front = waiting[is_next]
+        onward = np.empty(3 * len(front), np.int64)
+        count = advance_front(distance, turnable, moves, front, onward)
+        waiting = np.concatenate([waiting[~is_next], onward[:count]])
+
+
+def _map_file(path: Path, dtype: DTypeLike, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Return an array of zeros that is in a file.
+
+    Raises:
+        OSError: There is no room for it.
+    """
+    with path.open("wb") as file:
+        # Room that is lacking later would end the process.
+        os.posix_fallocate(file.fileno(), 0, int(np.prod(shape)) * np.dtype(dtype).itemsize)
+    return np.asarray(np.memmap(path, dtype, "r+", shape=shape))
 
 
 def _cell_at(store: SurveyStore, x: float, y: float) -> Index:
