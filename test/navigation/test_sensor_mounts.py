@@ -7,7 +7,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.navigation.sensor_mounts import SensorPoses, read_mounts
 from rover_planner.planning.navigation.transforms import (
     Rigid,
-    StampedTransform,
     TransformError,
     TransformTree,
 )
@@ -44,10 +43,10 @@ def test_tf_comes_before_odometry_and_knows_further_mounts():
     sensors, tree = poses_with(), TransformTree(0.5)
     sensors.take(Rigid.from_rpy(*THERE), 10 * SECOND)
     on_mast = Rigid.from_rpy(0.0, 0.0, 1.2, 0.0, 0.3, 0.0)
-    tree.take(StampedTransform("base_link", "mast", 0, on_mast), is_static=True)
+    tree.take("base_link", "mast", 0, on_mast, is_static=True)
     by_odometry = sensors.find("mast", 10 * SECOND, 10 * SECOND, tree)
     assert_same(by_odometry, Rigid.from_rpy(*THERE).then(on_mast))
-    tree.take(StampedTransform("map", "base_link", 10 * SECOND, Rigid.from_rpy(*HERE)))
+    tree.take("map", "base_link", 10 * SECOND, Rigid.from_rpy(*HERE))
     for frame, mount in (("mast", on_mast), ("front_camera", MOUNT)):
         found = sensors.find(frame, 10 * SECOND, 10 * SECOND, tree)
         assert_same(found, Rigid.from_rpy(*HERE).then(mount))
@@ -55,14 +54,14 @@ def test_tf_comes_before_odometry_and_knows_further_mounts():
 
 def test_clouds_in_a_frame_beside_the_robot_need_no_robot():
     tree, survey = TransformTree(0.5), Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
-    tree.take(StampedTransform("survey", "map", 10 * SECOND, survey.inverse()))
+    tree.take("survey", "map", 10 * SECOND, survey.inverse())
     found = poses_with().find("survey", 10 * SECOND, 10 * SECOND, tree)
     assert_same(found, survey)
 
 
 def test_tf_that_does_not_reach_the_map_leaves_the_robot_to_odometry():
     sensors, tree = poses_with(), TransformTree(0.5)
-    tree.take(StampedTransform("odom", "base_link", 10 * SECOND, Rigid.from_rpy(*THERE)))
+    tree.take("odom", "base_link", 10 * SECOND, Rigid.from_rpy(*THERE))
     sensors.take(Rigid.from_rpy(*HERE), 10 * SECOND)
     found = sensors.find("front_camera", 10 * SECOND, 10 * SECOND, tree)
     assert_same(found, Rigid.from_rpy(*HERE).then(MOUNT))

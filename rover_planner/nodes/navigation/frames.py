@@ -20,7 +20,6 @@ from rover_planner.planning.navigation.transforms import (
     Rigid,
     TransformError,
     TransformTree,
-    stamped_transform,
 )
 
 TF_DEPTH = 100
@@ -197,11 +196,11 @@ class Frames:
     def _take(self, transforms: list[TransformStamped], *, is_static: bool) -> None:
         for transform in transforms:
             try:
-                read = read_transform(transform)
+                at = read_transform(transform)
             except MessageError as error:
                 self._node.get_logger().warning(str(error), throttle_duration_sec=5.0)
                 continue
-            self._tree.take(stamped_transform(read), is_static=is_static)
+            self._tree.take(at.parent, at.child, at.stamp, Rigid.of(at), is_static=is_static)
 
 
 def is_empty(stamped: PoseStamped) -> bool:

@@ -7,7 +7,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import NO_MOUNTS, TraverseServerParameters
 from rover_planner.planning.navigation.transforms import (
     Rigid,
-    StampedTransform,
     TransformError,
     TransformTree,
 )
@@ -74,7 +73,7 @@ class SensorPoses:
 
     def take(self, robot: Rigid, stamp: int) -> None:
         """Keep where odometry says that the robot's frame is in the map frame at a time [ns]."""
-        self._driven.take(StampedTransform(self._map, self._base, stamp, robot))
+        self._driven.take(self._map, self._base, stamp, robot)
 
     def find(self, frame: str, stamp: int | None, now: int, tree: TransformTree) -> Rigid:
         """Return where a sensor's frame is in the map frame.

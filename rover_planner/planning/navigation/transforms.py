@@ -35,6 +35,11 @@ class Rigid:
         return Rigid(np.array([x, y, z]), Rotation.from_euler("xyz", [roll, pitch, yaw]))
 
     @staticmethod
+    def of(transform: FrameTransform) -> "Rigid":
+        """Return the position and orientation of a message's transform."""
+        return Rigid(transform.translation, Rotation.from_quat(transform.xyzw))
+
+    @staticmethod
     def none() -> "Rigid":
         """Return the transform that changes nothing."""
         return Rigid(np.zeros(3), Rotation.identity())
@@ -61,26 +66,6 @@ class Rigid:
         """(3,) x, y [m] and yaw [rad] of the child frame's origin and x axis."""
         ahead = self.rotation.apply([1.0, 0.0, 0.0])
         return np.array([*self.translation[:2], np.arctan2(ahead[1], ahead[0])])
-
-
-@dataclass(frozen=True, eq=False)
-class StampedTransform:
-    """Where a child frame is in its parent frame at a time."""
-
-    parent: str
-    """Name of the parent frame."""
-    child: str
-    """Name of the child frame."""
-    stamp: int
-    """Time [ns]."""
-    rigid: Rigid
-    """Position and orientation of the child in the parent frame."""
-
-
-def stamped_transform(read: FrameTransform) -> StampedTransform:
-    """Return the transform of a message."""
-    rigid = Rigid(read.translation, Rotation.from_quat(read.xyzw))
-    return StampedTransform(read.parent, read.child, read.stamp, rigid)
 
 
 class _Edge:
@@ -138,14 +123,19 @@ class TransformTree:
         self._edges: dict[str, _Edge] = {}
         self._lock = threading.Lock()
 
-    def take(self, transform: StampedTransform, *, is_static: bool = False) -> None:
-        """Keep a transform; with another parent, or a clock set back, the old ones are dropped."""
+    def take(
+        self, parent: str, child: str, stamp: int, rigid: Rigid, *, is_static: bool = False
+    ) -> None:
+        """Keep where a child frame is in its parent frame at a time [ns].
+
+        With another parent, or a clock set back, the old transforms of the child are dropped.
+        """
         with self._lock:
-            edge, parent = self._edges.get(transform.child), transform.parent
-            stale = edge is not None and edge.newest - transform.stamp > MEMORY
+            edge = self._edges.get(child)
+            stale = edge is not None and edge.newest - stamp > MEMORY
             if edge is None or edge.parent != parent or edge.is_static != is_static or stale:
-                edge = self._edges[transform.child] = _Edge(parent, is_static)
-            edge.add(transform.stamp, transform.rigid)
+                edge = self._edges[child] = _Edge(parent, is_static)
+            edge.add(stamp, rigid)
 
     def knows(self, frame: str) -> bool:
         """Return whether a frame is the parent or the child of a transform."""

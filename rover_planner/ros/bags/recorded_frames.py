@@ -13,7 +13,7 @@ from msg_adapters.stamps import stamp_to_ns
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.rigid_poses import move_path, read_pose
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
-from rover_planner.planning.navigation.transforms import Rigid, TransformTree, stamped_transform
+from rover_planner.planning.navigation.transforms import Rigid, TransformTree
 
 
 class RecordedFrames:
@@ -38,7 +38,8 @@ class RecordedFrames:
             MessageError: A transform is none.
         """
         for transform in message.transforms:
-            self._tree.take(stamped_transform(read_transform(transform)), is_static=is_static)
+            at = read_transform(transform)
+            self._tree.take(at.parent, at.child, at.stamp, Rigid.of(at), is_static=is_static)
 
     def locate(self, odometry: Odometry, recorded: int) -> tuple[float, ...]:
         """Return x, y, z [m], roll, pitch, yaw [rad] of the body on the map, and keep the pose.
