@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from msg_adapters.identity import path_hash, plan_request_hash
+from msg_adapters.identity import path_hash
 from msg_adapters.paths import path_to_poses
 from msg_adapters.stamps import stamp_to_ns
-from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
-from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import stamp_text
-from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.answering.questions import Answer, BadQuestion, PathCheck, Question
+from rover_planner.planning.answering.situation import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
-from rover_planner.planning.path_planner import Pose
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.refusals import attempt
+from rover_planner.ros.refusals import INPUT_ERRORS
 
 Publish = Callable[[Judgement, IdentityReport], Any]
-ReadEnds = Callable[[PoseStamped, PoseStamped], tuple[Pose, Pose]]
+ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
 
 
 def nav2_service() -> type | None:
@@ -76,26 +76,29 @@ class PathValidity:
         path that is refused before it is judged, such as without a map, has all of them.
         """
         path: Path = request.path
-        about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
-        given: list[NDArray[np.intp]] = []
-        located = attempt(lambda: path_to_poses(self._localise(path), self._frame))
+        service, about = "is_path_valid", path_hash(path)
+        stamp = stamp_text(stamp_to_ns(path.header.stamp))
+        question: Question
+        try:
+            poses = path_to_poses(self._localise(path), self._frame)
+            question = PathCheck(service, about, GivenPath(poses, "", about, stamp))
+        except INPUT_ERRORS as error:
+            question = BadQuestion(service, about, str(error))
 
-        def answer(situation: Situation) -> Judgement:
-            poses = located()
-            given.append(next_given_poses(poses, situation.settings.query.waypoint_spacing))
-            return replace(situation, path=GivenPath(poses, "", *about)).check_path().complete()
-
-        def deliver(judgement: Judgement, identity: IdentityReport) -> None:
-            response.is_valid = judgement.traversable
-            response.invalid_pose_indices = (
-                list(range(len(path.poses)))
-                if judgement.candidate is None
-                else find_invalid_poses(judgement.candidate.verdict.codes, given[0])
-            )
-            self._publish(judgement, replace(identity, path_hash=about[0], path_stamp=about[1]))
+        def send(answer: Answer) -> None:
+            judged = answer.judgement
+            response.is_valid = judged.traversable
+            response.invalid_pose_indices = list(range(len(path.poses)))
+            if judged.candidate is not None:
+                spacing = answer.situation.settings.query.waypoint_spacing
+                given = next_given_poses(poses, spacing)
+                response.invalid_pose_indices = find_invalid_poses(
+                    judged.candidate.verdict.codes, given
+                )
+            self._publish(judged, replace(answer.identity, path_hash=about, path_stamp=stamp))
             reply(response)
 
-        self._desk.ask(Inquiry("is_path_valid", about[0], answer, refusal, deliver))
+        self._desk.ask(question, send)
 
 
 def nav2_action() -> type | None:
@@ -125,28 +128,28 @@ NO_VALID_PATH = 209
 class PathComputation:
     """Answers goals of ComputePathToPose."""
 
-    def __init__(self, desk: QuestionDesk, read_ends: ReadEnds, publish: Publish, result: type):
+    def __init__(self, desk: QuestionDesk, read: ReadQuestion, publish: Publish, result: type):
         """Keep what is needed for answers.
 
         Args:
             desk: Answers the questions.
-            read_ends: Returns start and goal (3,) of the body; an empty start is where it is.
+            read: Returns the question of a service, by start and goal of the robot.
             publish: Publishes the results of a judgement and returns the plan first.
             result: Type of the action's result.
         """
-        self._desk, self._read_ends, self._publish = desk, read_ends, publish
+        self._desk, self._read, self._publish = desk, read, publish
         self._result = result
         self._answers: dict[int, tuple[bool, Any]] = {}
 
     @staticmethod
-    def serve(node: Node, desk: QuestionDesk, read_ends: ReadEnds, publish: Publish) -> None:
+    def serve(node: Node, desk: QuestionDesk, read: ReadQuestion, publish: Publish) -> None:
         """Create the action, where its type is installed."""
         kind: Any = nav2_action()
         if kind is None:
             return
         from rclpy.action import ActionServer
 
-        answers = PathComputation(desk, read_ends, publish, kind.Result)
+        answers = PathComputation(desk, read, publish, kind.Result)
         ActionServer(
             node,
             kind,
@@ -159,25 +162,20 @@ class PathComputation:
         """Take an accepted goal; it is executed, which ends it, once its answer is found."""
         goal, begin = handle.request, time.monotonic()
         start = goal.start if goal.use_start else PoseStamped()
-        ends = attempt(lambda: self._read_ends(start, goal.goal))
-        about = plan_request_hash(start, goal.goal, 0.0)
 
-        def answer(situation: Situation) -> Judgement:
-            return situation.answer(*ends()).complete()
-
-        def deliver(judgement: Judgement, identity: IdentityReport) -> None:
-            result = self._result()
-            result.path, _ = self._publish(judgement, identity)
+        def send(answer: Answer) -> None:
+            judged, result = answer.judgement, self._result()
+            result.path, _ = self._publish(judged, answer.identity)
             seconds = time.monotonic() - begin
             result.planning_time = Duration(seconds=seconds).to_msg()
-            code = "" if judgement.traversable else judgement.code
+            code = "" if judged.traversable else judged.code
             result.error_code = ERROR_CODES.get(code, NO_VALID_PATH)
             if hasattr(result, "error_msg"):  # newer than Jazzy's first release
-                result.error_msg = "" if judgement.traversable else judgement.reason
-            self._answers[id(handle)] = judgement.traversable, result
+                result.error_msg = "" if judged.traversable else judged.reason
+            self._answers[id(handle)] = judged.traversable, result
             handle.execute()
 
-        self._desk.ask(Inquiry("compute_path_to_pose", about, answer, refusal, deliver))
+        self._desk.ask(self._read("compute_path_to_pose", start, goal.goal), send)
 
     def finish(self, handle: Any) -> Any:
         """End a goal whose answer is found; return its result."""

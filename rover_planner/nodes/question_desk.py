@@ -1,9 +1,15 @@
-"""Takes the questions of a node's services and answers them in a thread, within their budget."""
+"""Takes the questions of a node's services and has them judged, within their budget.
+
+A question's way: a service makes a `Question` of its request; the desk notes when it came and what
+is known then; the queue judges it in its thread; the desk hands the `Answer` to the service, which
+makes messages of it.
+"""
 
 import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -12,9 +18,10 @@ from rclpy.node import Node
 
 from msg_adapters.results.server_status import search_diagnostics
 from rover_planner.nodes.maps.map_topics import MapTopics
-from rover_planner.planning.answering.budget import Budget
+from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.identity import Register
-from rover_planner.planning.answering.question_queue import Question, QuestionQueue
+from rover_planner.planning.answering.question_queue import Asked, Judged, QuestionQueue
+from rover_planner.planning.answering.questions import Answer, Question
 from rover_planner.planning.answering.search_watch import (
     NewerMapError,
     SearchReport,
@@ -38,20 +45,26 @@ GRACE = 0.1
 """Time after its deadline in which a question in work may still end by itself [s]."""
 
 
-@dataclass(frozen=True)
-class Inquiry:
-    """A question as a service puts it to the desk."""
+Reply = Callable[[Answer], None]
+"""Makes messages of an answer and sends them; called once, in the executor's thread."""
 
-    service: str
-    """Name of the service, for logs."""
-    question_hash: str
-    """Hash of the request."""
-    answer: Callable[[Situation], Any]
-    """Finds the answer, which has a `code`; called in the thread."""
-    refuse: Callable[[str, str], Any]
-    """Makes an answer of a refusal's code and reason."""
-    deliver: Callable[[Any, IdentityReport], None]
-    """Sends an answer, with what it is about; called in the executor's thread."""
+
+@dataclass(eq=False, kw_only=True)
+class Inquiry(Asked):
+    """A question that came to a node."""
+
+    reply: Reply
+    """Takes the answer."""
+    situation: Situation
+    """What is known; its map is that of the time of judging."""
+    number: int
+    """Number of the question."""
+    ros_time: int
+    """ROS time of its arrival [ns]."""
+    arrival: float
+    """Time of its arrival [s], steady clock."""
+    ticket: int
+    """The maps that had come until then."""
 
 
 class QuestionDesk:
@@ -68,7 +81,9 @@ class QuestionDesk:
         """Counts of answers and faults."""
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._handover = Handover(node, guard)
-        self._queue = QuestionQueue(0, lambda: self._handover.call(self._deliver))
+        self._queue = QuestionQueue(
+            0, self._judge, lambda: self._handover.call(self._send_finished)
+        )
         self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
         self._patrol = node.create_timer(
             PATROL, guard.around(self._refuse_overdue), clock=steady, autostart=False
@@ -84,35 +99,51 @@ class QuestionDesk:
         self._time_budget = time_budget
         self._queue.max_waiting = max_waiting
 
-    def ask(self, inquiry: Inquiry) -> None:
+    def ask(self, question: Question, reply: Reply) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
-        now, arrival = self._node.get_clock().now().nanoseconds, time.monotonic()
-        situation = replace(self._service.situation(now), watch=self._watch())
-        asked = _Asked(self._register.next_number(), situation)
-        ticket = self._maps.ticket()
-
-        def answer(budget: Budget) -> Any:
-            self._maps.wait(ticket, budget.check)
-            while True:
-                asked.situation = self._service.add_map(asked.situation, now)
-                with contextlib.suppress(NewerMapError):
-                    return inquiry.answer(asked.situation)
-
-        def fail(error: Exception) -> Any:
-            return refuse_error(self.guard, inquiry.service, error, inquiry.refuse)
-
-        def deliver(given: Any) -> None:
-            done, question = time.monotonic(), f"{asked.number}, {inquiry.service}"
-            self.health.take_answer(given.code, done, question, done - arrival)
-            identity = self._register.identify(
-                asked.number, inquiry.service, inquiry.question_hash, asked.situation
-            )
-            self._sender.send(lambda: inquiry.deliver(given, identity))
-
-        budget = Budget(self._time_budget)
-        self._queue.ask(Question(answer, inquiry.refuse, fail, self.guard.around(deliver), budget))
+        now = self._node.get_clock().now().nanoseconds
+        inquiry = Inquiry(
+            question,
+            Budget(self._time_budget),
+            reply=reply,
+            situation=replace(self._service.situation(now), watch=self._watch()),
+            number=self._register.next_number(),
+            ros_time=now,
+            arrival=time.monotonic(),
+            ticket=self._maps.ticket(),
+        )
+        self._send(self._queue.ask(inquiry))
         if self._queue.open_count:
             self._patrol.reset()
+
+    def _judge(self, inquiry: Inquiry) -> Any:
+        """Return the judgement of a question on the newest map; called in the queue's thread."""
+        question = inquiry.question
+        try:
+            self._maps.wait(inquiry.ticket, inquiry.budget.check)
+            while True:
+                inquiry.situation = self._service.add_map(inquiry.situation, inquiry.ros_time)
+                with contextlib.suppress(NewerMapError):
+                    return question.judge(inquiry.situation)
+        except QuestionStoppedError:
+            raise
+        except Exception as error:
+            return refuse_error(self.guard, question.service, error, question.refuse)
+
+    def _send(self, judged: list[Judged]) -> None:
+        """Send the answers to questions."""
+        for inquiry, judgement in judged:
+            assert isinstance(inquiry, Inquiry)
+            question, done = inquiry.question, time.monotonic()
+            told = f"{inquiry.number}, {question.service}"
+            self.health.take_answer(judgement.code, done, told, done - inquiry.arrival)
+            identity = self._register.identify(
+                inquiry.number, question.service, question.hash, inquiry.situation
+            )
+            answer = Answer(judgement, inquiry.situation, identity)
+            self._sender.send(partial(inquiry.reply, answer))
+        if not self._queue.open_count:
+            self._patrol.cancel()
 
     def _watch(self) -> SearchWatch:
         """Return a watch that publishes the progress of a question's searches."""
@@ -138,29 +169,21 @@ class QuestionDesk:
 
     def cancel(self, code: str, reason: str) -> int:
         """Answer all open questions with a refusal; return their number."""
-        return self._queue.stop_all(code, reason)
+        stopped = self._queue.stop_all(code, reason)
+        self._send(stopped)
+        return len(stopped)
 
     def close(self) -> None:
         """Refuse all open questions and end the thread; the refusals have time to leave."""
-        is_asked = self.open_count > 0
+        count = self.cancel(STOPPING, "the server is shutting down")
         self._queue.close()
         self._sender.send_all()
-        if is_asked:
+        if count:
             time.sleep(LEAVE_TIME)
 
-    def _deliver(self) -> None:
-        self._queue.deliver()
-        if not self._queue.open_count:
-            self._patrol.cancel()
+    def _send_finished(self) -> None:
+        self._send(self._queue.finished())
 
     def _refuse_overdue(self) -> None:
-        self._queue.refuse_overdue(GRACE)
-        self._deliver()
-
-
-@dataclass
-class _Asked:
-    """A question's number, and the situation in which it is answered."""
-
-    number: int
-    situation: Situation
+        self._send(self._queue.overdue(GRACE))
+        self._send_finished()

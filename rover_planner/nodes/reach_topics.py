@@ -7,9 +7,9 @@ from std_srvs.srv import Trigger
 from msg_adapters.errors import MessageError
 from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
-from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
-from rover_planner.planning.answering.reach_query import ReachJudgement, ReachQuery, refuse_reach
-from rover_planner.planning.verdict_report import IdentityReport
+from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.planning.answering.questions import Answer, ReachCheck
+from rover_planner.planning.answering.reach_query import ReachJudgement, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.requests import subscribe_to_requests
 
@@ -49,14 +49,13 @@ class ReachTopics:
     def _check_reach(
         self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
     ) -> None:
-        def deliver(answer: ReachJudgement, _identity: IdentityReport) -> None:
-            response.success = answer.possible
-            response.message = report_to_json(answer)
+        def send(answer: Answer) -> None:
+            response.success = answer.judgement.possible
+            response.message = report_to_json(answer.judgement)
             reply(response)
-            self._log(answer)
+            self._log(answer.judgement)
 
-        query = self._query.copy()
-        self._desk.ask(Inquiry("check_reach", "", query.ask, refuse_reach, deliver))
+        self._desk.ask(ReachCheck("check_reach", "", self._query.copy()), send)
 
     def _log(self, answer: ReachJudgement) -> None:
         logger = self._node.get_logger()

@@ -39,7 +39,7 @@ from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.navigation.sensor_frames import SensorFrames
 from rover_planner.nodes.programs import read_words
-from rover_planner.nodes.question_desk import Inquiry, QuestionDesk
+from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
@@ -48,9 +48,16 @@ from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
-from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.map_status import MapStatus
+from rover_planner.planning.answering.questions import (
+    Answer,
+    BadQuestion,
+    PathCheck,
+    PathQuestion,
+    Question,
+)
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
 from rover_planner.planning.answering.situation import Situation
@@ -62,7 +69,7 @@ from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.guard import Guard, GuardedExecutor
 from rover_planner.ros.qos import sensor_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS, attempt
+from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.ros.requests import subscribe_to_requests
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.kernels import load_kernels
@@ -122,7 +129,7 @@ class TraverseServer(Node):
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
         PathValidity(self.desk, frame, self.publish, self.frames.localise_path).serve(self)
-        PathComputation.serve(self, self.desk, self._read_ends, self.publish)
+        PathComputation.serve(self, self.desk, self.read_question, self.publish)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self._files = MapFileService(
             self, self._maps, frame, self.guard, lambda: map_limits(self._values)
@@ -229,19 +236,32 @@ class TraverseServer(Node):
     def _can_traverse(
         self, request: GetPlan.Request, response: GetPlan.Response, reply: Reply
     ) -> None:
-        ends = attempt(
-            lambda: self._read_ends(request.start, request.goal)
-        )  # transforms are those of now
+        question = self.read_question(
+            "can_traverse", request.start, request.goal, request.tolerance
+        )
 
-        def answer(situation: Situation) -> Judgement:
-            return situation.answer(*ends(), request.tolerance).complete()
-
-        def deliver(judgement: Judgement, identity: IdentityReport) -> None:
-            response.plan, _ = self.publish(judgement, identity)
+        def send(answer: Answer) -> None:
+            response.plan, _ = self.publish(answer.judgement, answer.identity)
             reply(response)
 
-        about = plan_request_hash(request.start, request.goal, request.tolerance)
-        self.desk.ask(Inquiry("can_traverse", about, answer, refusal, deliver))
+        self.desk.ask(question, send)
+
+    def read_question(
+        self, service: str, begin: PoseStamped, end: PoseStamped, tolerance: float = 0.0
+    ) -> Question:
+        """Return the question for a path between poses of the robot; transforms are those of now.
+
+        Args:
+            service: Name of the service.
+            begin: Start; an empty one is where the rover is.
+            end: Goal.
+            tolerance: As in `Situation.answer` [m].
+        """
+        about = plan_request_hash(begin, end, tolerance)
+        try:
+            return PathQuestion(service, about, *self._read_ends(begin, end), tolerance)
+        except INPUT_ERRORS as error:
+            return BadQuestion(service, about, str(error))
 
     def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
         """Return start and goal (3,) of the body in the map frame; an empty start is here."""
@@ -279,17 +299,14 @@ class TraverseServer(Node):
     ) -> None:
         path = self._service.given_path
 
-        def answer(situation: Situation) -> Judgement:
-            return situation.check_path().complete()
-
-        def deliver(judgement: Judgement, identity: IdentityReport) -> None:
-            about = replace(identity, path_hash=path.hash, path_stamp=path.stamp)
-            _, report = self.publish(judgement, about)
-            response.success = judgement.traversable
+        def send(answer: Answer) -> None:
+            about = replace(answer.identity, path_hash=path.hash, path_stamp=path.stamp)
+            _, report = self.publish(answer.judgement, about)
+            response.success = answer.judgement.traversable
             response.message = report_to_json(report())
             reply(response)
 
-        self.desk.ask(Inquiry("check_path", path.hash, answer, refusal, deliver))
+        self.desk.ask(PathCheck("check_path", path.hash, path), send)
 
     def publish(
         self, judgement: Judgement, identity: IdentityReport

@@ -1,8 +1,7 @@
 """Turns every error of a request into a refusal with a reason, so that the node continues."""
 
 from collections.abc import Callable
-from functools import partial
-from typing import NoReturn, TypeVar
+from typing import TypeVar
 
 from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
@@ -13,19 +12,6 @@ INPUT_ERRORS = (MessageError, PlanningError, RoverError)
 """Errors of the input; any other error is an internal error."""
 
 Answer = TypeVar("Answer")
-
-
-def attempt(function: Callable[[], Answer]) -> Callable[[], Answer]:
-    """Call a function now; return one that returns its value, or raises its error of the input."""
-    try:
-        value = function()
-    except INPUT_ERRORS as error:
-        return partial(_raise, error)
-    return lambda: value
-
-
-def _raise(error: Exception) -> NoReturn:
-    raise error
 
 
 def refuse_error(

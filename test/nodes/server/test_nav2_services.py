@@ -84,7 +84,7 @@ class GoalHandle:
 def compute(server, start, goal):
     """Hand a goal to the handlers of the action, as rclpy would."""
     result = SimpleNamespace
-    computation = PathComputation(server.desk, server._read_ends, server.publish, result)
+    computation = PathComputation(server.desk, server.read_question, server.publish, result)
     handle = GoalHandle(computation, start, goal)
     computation.take(handle)
     wait_until(lambda: handle.ends, "the end of the goal")

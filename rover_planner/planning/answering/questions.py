@@ -1,0 +1,102 @@
+"""The questions of the services as plain values, and their answers."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rover_planner.planning.answering.judgement import refusal
+from rover_planner.planning.answering.reach_query import ReachQuery, refuse_reach
+from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.path_planner import Pose
+from rover_planner.planning.verdict_report import IdentityReport
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A question; it is judged in a thread."""
+
+    service: str
+    """Name of the service that was asked."""
+    hash: str
+    """Hash of the request; empty if it has none."""
+
+    def judge(self, situation: Situation) -> Any:
+        """Return the judgement, which has a `code`.
+
+        Raises:
+            PlanningError: The request is invalid.
+            RoverError: The model refuses the request.
+            NewerMapError: It is to be judged again on the newest map.
+        """
+        raise NotImplementedError
+
+    def refuse(self, code: str, reason: str) -> Any:
+        """Return a judgement that refuses the question."""
+        return refusal(code, reason)
+
+
+@dataclass(frozen=True, eq=False)
+class PathQuestion(Question):
+    """Is there a path from start to goal?"""
+
+    start: Pose
+    """(3,) x, y [m], yaw [rad] of the body, map frame."""
+    goal: Pose
+    """The same."""
+    tolerance: float = 0.0
+    """As in `Situation.answer` [m]."""
+
+    def judge(self, situation: Situation) -> Any:
+        """Return the judgement of the best path."""
+        return situation.answer(self.start, self.goal, self.tolerance).complete()
+
+
+@dataclass(frozen=True, eq=False)
+class PathCheck(Question):
+    """Can the rover drive a path?"""
+
+    path: GivenPath
+    """The path."""
+
+    def judge(self, situation: Situation) -> Any:
+        """Return the judgement of the path."""
+        return replace(situation, path=self.path).check_path().complete()
+
+
+@dataclass(frozen=True, eq=False)
+class ReachCheck(Question):
+    """Can the arm reach its target at the end of the last path?"""
+
+    query: ReachQuery
+    """Target and wrench, which do not change."""
+
+    def judge(self, situation: Situation) -> Any:
+        """Return the judgement of the arm."""
+        return self.query.ask(situation)
+
+    def refuse(self, code: str, reason: str) -> Any:
+        """Return a judgement that refuses the question."""
+        return refuse_reach(code, reason)
+
+
+@dataclass(frozen=True, eq=False)
+class BadQuestion(Question):
+    """A request that cannot be read."""
+
+    reason: str
+    """Why not."""
+
+    def judge(self, _situation: Situation) -> Any:
+        """Return the refusal."""
+        return self.refuse("bad_request", self.reason)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The answer to a question."""
+
+    judgement: Any
+    """A `Judgement` or `ReachJudgement`."""
+    situation: Situation
+    """What it was judged by."""
+    identity: IdentityReport
+    """What it is about."""
