@@ -12,6 +12,7 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
+from rover_planner.ros.guard import Guard, GuardedExecutor
 from support.waiting import TIMEOUT, wait_until
 
 DOMAINS = 50
@@ -49,8 +50,12 @@ class RosRun:
 
     def spin(self, node: Node, executor: SingleThreadedExecutor | None = None) -> Node:
         """Spin a node of this context in the background from now on."""
-        executor = executor or SingleThreadedExecutor(context=self.context)
-        executor.add_node(node)
+        if executor is None and isinstance(getattr(node, "guard", None), Guard):
+            executor = GuardedExecutor(context=self.context)
+            executor.add_guarded(node, node.guard)
+        else:
+            executor = executor or SingleThreadedExecutor(context=self.context)
+            executor.add_node(node)
         thread = threading.Thread(target=self._spin, args=(executor,), daemon=True)
         thread.start()
         self._spinning.append((node, executor, thread))

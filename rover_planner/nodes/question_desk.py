@@ -71,9 +71,7 @@ class QuestionDesk:
     """Numbers questions, queues them, and delivers each answer once."""
 
     def __init__(self, node: Node, service: TraverseService, maps: MapTopics, guard: Guard):
-        self._node, self._service, self._maps = node, service, maps
-        self.guard = guard
-        """Takes unexpected errors."""
+        self._node, self._service, self._maps, self._guard = node, service, maps, guard
         self._sender = PacedSender(node, guard)
         self._register = Register()
         self._time_budget = 1.0
@@ -86,7 +84,7 @@ class QuestionDesk:
         )
         self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
         self._patrol = node.create_timer(
-            PATROL, guard.around(self._refuse_overdue), clock=steady, autostart=False
+            PATROL, self._refuse_overdue, clock=steady, autostart=False
         )
 
     @property
@@ -128,7 +126,7 @@ class QuestionDesk:
         except QuestionStoppedError:
             raise
         except Exception as error:
-            return refuse_error(self.guard, question.service, error, question.refuse)
+            return refuse_error(self._guard, question.service, error, question.refuse)
 
     def _send(self, judged: list[Judged]) -> None:
         """Send the answers to questions."""

@@ -24,7 +24,7 @@ class ReachTopics:
             (PoseStamped, "~/tool_target", self._take_target),
             (WrenchStamped, "~/tool_wrench", self._take_wrench),
         ):
-            subscribe_to_requests(node, kind, name, desk.guard.around(take), reliability)
+            subscribe_to_requests(node, kind, name, take, reliability)
         serve_later(node, Trigger, "~/check_reach", self._check_reach)
 
     @property

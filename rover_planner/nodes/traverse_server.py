@@ -103,7 +103,7 @@ class TraverseServer(Node):
         """Takes unexpected errors."""
         frame, reliability = self._values.map_frame, self._values.input_reliability
         self._joint_names = read_joint_map(self._values.joint_map, self._service.all_joint_names)
-        self.frames = SensorFrames(self, self._values, self.guard.around)
+        self.frames = SensorFrames(self, self._values)
         """Transforms poses to the map frame."""
         self.frames.listen()
         self._results = ResultTopics(
@@ -118,7 +118,6 @@ class TraverseServer(Node):
             self,
             self._service,
             self._values,
-            self.guard,
             lambda error: self._note_map(error),
             self.frames.find_sensor,
         )
@@ -146,9 +145,7 @@ class TraverseServer(Node):
         )
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(
-            DIAGNOSTICS_PERIOD, self.guard.around(self._publish_diagnostics), clock=steady
-        )
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
         follow_changes(self, lambda: self._values, load_service_settings, self._apply_parameters)
         warn_of_unknown_parameters(self, TraverseServerParameters)
         self._log_ready()
@@ -174,13 +171,12 @@ class TraverseServer(Node):
         super().destroy_node()
 
     def _create_subscriptions(self, reliability: str) -> None:
-        around = self.guard.around
         for kind, name, take in (
             (JointState, "joint_states", self._take_joints),
             (Odometry, "odometry", self._take_odometry),
         ):
-            self.create_subscription(kind, name, around(take), sensor_qos())
-        subscribe_to_requests(self, Path, "~/path", around(self._take_path), reliability)
+            self.create_subscription(kind, name, take, sensor_qos())
+        subscribe_to_requests(self, Path, "~/path", self._take_path, reliability)
 
     def _log_ready(self) -> None:
         name, known = self._service.settings.rover.name, self._service.known_map

@@ -199,7 +199,6 @@ def _write_aside(plain: Path, whole: Path, layer: Any, profile: dict[str, Any]) 
         OSError: The system refuses, in the words of GDAL if it gives no others.
     """
     rasterio = _import_rasterio()
-    from rasterio._err import CPLE_BaseError  # what GDAL raises where rasterio adds nothing
     from rasterio.shutil import copy
 
     rows, columns = layer.shape
@@ -214,7 +213,7 @@ def _write_aside(plain: Path, whole: Path, layer: Any, profile: dict[str, Any]) 
             copy(plain, whole, driver="COG", compress="deflate", overview_resampling="nearest")
             with rasterio.open(whole) as file:  # GDAL does not tell of all that it could not write
                 why = _find_missing(file, whole)
-        except (rasterio.errors.RasterioError, CPLE_BaseError) as error:
+        except Exception as error:  # some errors of GDAL have no public name
             why = str(error)
     why = find_reason(messages) or why
     if why:

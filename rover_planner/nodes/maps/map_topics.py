@@ -21,7 +21,6 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid, TransformError
-from rover_planner.ros.guard import Guard
 from rover_planner.ros.logs.repeat_log import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions, sensor_qos
@@ -76,7 +75,6 @@ class MapTopics:
         node: Node,
         service: TraverseService,
         parameters: TraverseServerParameters,
-        guard: Guard,
         tell: Callable[[str], None],
         find_sensor: Callable[[str, int | None], Rigid],
     ):
@@ -86,7 +84,6 @@ class MapTopics:
             node: The node.
             service: Takes the maps.
             parameters: The parameters of the node.
-            guard: Takes unexpected errors.
             tell: Called in the thread after each map: with the reason if it was refused, else
                 with an empty text.
             find_sensor: Returns where a sensor's frame was in the map frame at a time [ns];
@@ -109,16 +106,14 @@ class MapTopics:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self._keep(self._keeper.load(terrain, self._now(), None), parameters.terrain_file)
         self._intake: MapIntake[None] = MapIntake(self._take_message, self._refuse)
-        self._subscribe(CLOUD, PointCloud2, parameters, guard)
+        self._subscribe(CLOUD, PointCloud2, parameters)
         if parameters.imu_attitude:
-            self._subscribe_to_imu(parameters, guard)
+            self._subscribe_to_imu(parameters)
         grid_map = grid_map_type()
         if grid_map is not None:
-            self._subscribe(GRID_MAP, grid_map, parameters, guard)
+            self._subscribe(GRID_MAP, grid_map, parameters)
 
-    def _subscribe(
-        self, topic: str, kind: type, parameters: TraverseServerParameters, guard: Guard
-    ) -> None:
+    def _subscribe(self, topic: str, kind: type, parameters: TraverseServerParameters) -> None:
         def offer(message: bytes) -> None:
             if not self._intake.offer(message, kind):
                 self._intake.do(self._renew)
@@ -128,10 +123,10 @@ class MapTopics:
         ):
             events = warn_of_mismatch(self._node, topic, mends)
             self._node.create_subscription(
-                kind, topic, guard.around(offer), qos, event_callbacks=events, raw=True
+                kind, topic, offer, qos, event_callbacks=events, raw=True
             )
 
-    def _subscribe_to_imu(self, parameters: TraverseServerParameters, guard: Guard) -> None:
+    def _subscribe_to_imu(self, parameters: TraverseServerParameters) -> None:
         mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
 
         def take(imu: Imu) -> None:
@@ -143,7 +138,7 @@ class MapTopics:
                 return
             self._service.take_tilt(attitude.roll, attitude.pitch)
 
-        self._node.create_subscription(Imu, "imu", guard.around(take), sensor_qos())
+        self._node.create_subscription(Imu, "imu", take, sensor_qos())
 
     def ticket(self) -> int:
         """Return a number for `wait`: all maps that have come until now."""

@@ -1,7 +1,6 @@
 """Transforms poses of messages to the map frame and to the body; listens to /tf and /tf_static."""
 
 import copy
-from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -62,20 +61,9 @@ class Frames:
     Messages in the map frame, about a body without offset, are passed on as they are.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        parameters: FrameParameters,
-        around: Callable[[Callable[..., Any]], Callable[..., Any]],
-    ):
-        """Know only the frame of the map; `listen` hears of others.
-
-        Args:
-            node: The node.
-            parameters: Its parameters.
-            around: Guards callbacks.
-        """
-        self._node, self._around = node, around
+    def __init__(self, node: Node, parameters: FrameParameters):
+        """Know only the frame of the map; `listen` hears of others."""
+        self._node = node
         self._map, self._base = parameters.map_frame, parameters.base_frame
         self._tree = TransformTree(parameters.transform_timeout)
         offset = parameters.base_offset
@@ -89,9 +77,8 @@ class Frames:
             return
         self._listens = True
         static = QoSProfile(depth=TF_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        around = self._around
-        self._node.create_subscription(kind, "/tf", around(self.take), TF_DEPTH)
-        self._node.create_subscription(kind, "/tf_static", around(self.take_static), static)
+        self._node.create_subscription(kind, "/tf", self.take, TF_DEPTH)
+        self._node.create_subscription(kind, "/tf_static", self.take_static, static)
 
     @property
     def silence(self) -> str:

@@ -73,7 +73,7 @@ class HazardTopics:
         self._topics: dict[str, LazyPublisher] = {}
         node.create_service(GetMap, "~/get_hazard_map", self._get)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(CATCH_UP, guard.around(self._catch_up), clock=steady)
+        node.create_timer(CATCH_UP, self._catch_up, clock=steady)
         self._withdrawals = 0
         self._enabled = threading.Event()
         self._ending = threading.Event()

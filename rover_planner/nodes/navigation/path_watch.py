@@ -88,9 +88,9 @@ class PathWatch:
         self._ending = False
         self._thread = threading.Thread(target=self._run, name="monitor", daemon=True)
         self._thread.start()
-        node.create_service(SetBool, "~/monitor", guard.around(self._switch))
+        node.create_service(SetBool, "~/monitor", self._switch)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(IDLE_PERIOD, guard.around(self._offer_sight), clock=steady)
+        self._timer = node.create_timer(IDLE_PERIOD, self._offer_sight, clock=steady)
         self.apply(parameters)
 
     def apply(self, parameters: TraverseServerParameters) -> None:

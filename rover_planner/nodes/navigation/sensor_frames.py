@@ -1,8 +1,5 @@
 """The frames of a node that also places clouds of sensors on the map."""
 
-from collections.abc import Callable
-from typing import Any
-
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 
@@ -17,18 +14,13 @@ from rover_planner.planning.navigation.transforms import Rigid, TransformError
 class SensorFrames(Frames):
     """Frames, and where sensors are by their mounts, /tf or odometry."""
 
-    def __init__(
-        self,
-        node: Node,
-        parameters: TraverseServerParameters,
-        around: Callable[[Callable[..., Any]], Callable[..., Any]],
-    ):
+    def __init__(self, node: Node, parameters: TraverseServerParameters):
         """See `Frames`.
 
         Raises:
             PlanningError: The parameter sensor_mounts is wrong.
         """
-        super().__init__(node, parameters, around)
+        super().__init__(node, parameters)
         self._sensors = sensor_poses(parameters)
 
     def apply_timeout(self, timeout: float) -> None:

@@ -69,7 +69,7 @@ class TractionInputs:
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
-        self.frames = Frames(node, parameters, guard.around)
+        self.frames = Frames(node, parameters)
         """Brings odometry of other frames to that of the map."""
         self._subscribe(parameters)
         self.publishers = self._check_publishers(parameters)
