@@ -244,6 +244,12 @@ class Rover:
         return masses.body.mass + sides + 6.0 * self.wheel.mass
 
     @property
+    def wheelbase(self) -> float:
+        """Distance from rear to front wheels in [m]."""
+        wheels = self.suspension.wheels
+        return float(wheels["front"][0] - wheels["rear"][0])
+
+    @property
     def weight(self) -> float:
         """Weight of the whole rover in [N], without payload."""
         return self.total_mass * self.gravity

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import LIMIT_NUMBERS
+from rover_planner.survey.layers import number_limits
 from rover_planner.survey.layout import Box, Index
 from rover_planner.survey.reach.distances import TileDistances
 from rover_planner.survey.reach.grid import HeadingGrid, choose_tile
@@ -87,7 +87,7 @@ def say_why_none(store: SurveyStore, start: Index) -> str:
         start: Row and column of the start.
     """
     number = int(store.layer("first_limit")[start])
-    names = {number: name for name, number in LIMIT_NUMBERS.items()}
+    names = {number: name for name, number in number_limits().items()}
     return f"no heading is passable at the start: {names.get(number) or 'not surveyed'}"
 
 

@@ -15,7 +15,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
 from rover_physics.traversability.torque_ranges import find_torque_ranges
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import balance_residuals, turned_round
 
