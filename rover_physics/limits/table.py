@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-from rover_physics.names import SERVO, TORQUE_POLICIES
+from rover_physics.names import CONTROL_POLICIES, SERVO, TORQUE_POLICIES
 from rover_physics.status import Stall
 
 MODERATE_SINKAGE = 1.0 / 6.0
@@ -126,12 +126,12 @@ class Limit:
     def find_bound(self, rover: Any) -> Bound:
         """Return the bound for a `Rover`, None where it is not asked."""
         if self.bound is None:
-            return getattr(rover.limits, self.key, None)
+            return rover.limits.further.get(self.key)  # type: ignore[no-any-return]
         return self.bound(rover)
 
 
 FORCES: dict[str, Any] = {"needs_forces": True, "rests_in_a_fall": True}
-ON_TORQUES: dict[str, Any] = {"policies": tuple(one for one in TORQUE_POLICIES if one != SERVO), **FORCES}
+ON_TORQUES: dict[str, Any] = {"policies": CONTROL_POLICIES, **FORCES}
 ON_SERVOS: dict[str, Any] = {"policies": (SERVO,), **FORCES}
 SIDE_NAMES = ("right", "left")
 

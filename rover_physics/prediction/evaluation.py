@@ -215,7 +215,9 @@ def evaluate_row(models, limits, work, written, i):
     status = stand(models[0], work)
     for k in range(models.size):
         evaluate_stance(models[k], work, status, results[i])
-        if status != PoseStatus.SETTLED or passes(results, numbers, i, limits):
+        if k + 1 == models.size or status != PoseStatus.SETTLED:
+            break
+        if passes(results, numbers, i, limits):
             break
 
 
