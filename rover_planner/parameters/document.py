@@ -36,12 +36,19 @@ def parameters_document() -> str:
 
 
 def _sections() -> Iterator[str]:
-    """Yield the lines of a Markdown table per node, under its name."""
+    """Yield the lines of a Markdown table per node; rows of an earlier table are named below it."""
+    homes: dict[str, str] = {}
     for node, table in TABLES.items():
+        rows = {spec.name: _row(spec) for spec in specs_of(table)}
         yield from (f"## {node}", "")
         yield from ("| name | type | default | allowed | meaning |", "|---|---|---|---|---|")
-        yield from (_row(spec) for spec in specs_of(table))
+        yield from (row for row in rows.values() if row not in homes)
         yield ""
+        for home in dict.fromkeys(homes.values()):
+            same = [f"`{name}`" for name, row in rows.items() if homes.get(row) == home]
+            if same:
+                yield from (f"As for {home}: {', '.join(same)}.", "")
+        homes |= {row: node for row in rows.values() if row not in homes}
 
 
 def _row(spec: ParameterSpec) -> str:
