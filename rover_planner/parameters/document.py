@@ -61,4 +61,4 @@ def _allowed(spec: ParameterSpec) -> str:
     """Return the bounds with their unit, or the choices, as text."""
     if spec.bounds is not None:
         return f"{spec.bounds[0]:g} to {spec.bounds[1]:g} {spec.unit}".rstrip()
-    return ", ".join(f"`{choice}`" for choice in spec.choices) or "any"
+    return ", ".join(f"`{choice}`" for choice in spec.choices)
