@@ -35,7 +35,7 @@ class SweepOptions:
     """
 
     policy: str = EQUAL
-    """EQUAL: equal torques on all wheels; SERVO: the torques of speed servos, on firm ground and on
+    """EQUAL: equal torques on all wheels; SERVO: the torques of speed servos, on firm ground and
     soil; OPTIMAL: the torques that need the least friction."""
     control_margin: float = 0.0
     """Share of the limits of friction and torque that policy OPTIMAL leaves to the controller,
