@@ -26,8 +26,8 @@ def parameters_document() -> str:
             "a test holds them together.",
             "",
             *_sections(),
-            "The default shows the type; an empty one is a string. Read-only parameters are set",
-            "at start, the others at any time (`ros2 param set /traverse_server friction 0.6`).",
+            "The default shows the type; an empty one is a string. Parameters with \\* are set",
+            "at start (read-only), the others at any time (`ros2 param set /traverse_server friction 0.6`).",
             "A value of the wrong type, NaN, out of bounds or not among the choices "
             "is refused with the reason.",
             "",
@@ -53,7 +53,7 @@ def _sections() -> Iterator[str]:
 
 def _row(spec: ParameterSpec) -> str:
     default = f"`{spec.ros_default}`" if spec.default != "" else "empty"
-    name = f"`{spec.name}`" + (" (read-only)" if spec.read_only else "")
+    name = f"`{spec.name}`" + ("\\*" if spec.read_only else "")
     return f"| {name} | {default} | {_allowed(spec)} | {spec.meaning} |"
 
 
