@@ -27,7 +27,8 @@ def parameters_document() -> str:
             "",
             *_sections(),
             "The default shows the type; an empty one is a string. Parameters with \\* are set",
-            "at start (read-only), the others at any time (`ros2 param set /traverse_server friction 0.6`).",
+            "at start (read-only), the others at any time "
+            "(`ros2 param set /traverse_server friction 0.6`).",
             "A value of the wrong type, NaN, out of bounds or not among the choices "
             "is refused with the reason.",
             "",
