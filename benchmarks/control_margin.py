@@ -2,7 +2,7 @@
 
 Run from the repository:
 python -m benchmarks.control_margin [--count N] [--seed S] [--workers W] [--out FILE]
-It needs the extra `bench`. Its results are in docs/validation.md.
+It needs the extra `bench`. Its results are in docs/reliability.md.
 """
 
 import argparse

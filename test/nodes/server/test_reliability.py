@@ -9,7 +9,7 @@ from support.project.without_disk import fill_disk
 MANY = 12
 BUDGET, LATE = 1.0, 2.0
 """time_budget [s], and how late an answer may be on a busy machine [s]: one question after another
-would take 50 s. The figure of a quiet machine is in docs/validation.md."""
+would take 50 s. The figure of a quiet machine is in docs/reliability.md."""
 
 
 @pytest.fixture
