@@ -1,7 +1,7 @@
 """Bounds on the prediction along a path over an uncertain map.
 
 If a terrain has a layer `elevation_std`, each height may be wrong by a given number of standard
-deviations. docs/notes/uncertainty.md has the method, its assumptions and its failure rate.
+deviations. docs/uncertainty.md has the method, docs/validation.md its failure rate.
 """
 
 from dataclasses import replace

@@ -1,7 +1,7 @@
 """Wheel-soil models: slip, sinkage and torque of a wheel for given forces on a soil.
 
 There are two models: Coulomb friction, and for a rigid wheel Bekker's pressure-sinkage relation
-with Janosi and Hanamoto's shear relation. docs/notes/soil.md has the formulas, symbols and limits.
+with Janosi and Hanamoto's shear relation. docs/soil.md has the formulas, symbols and limits.
 
 Source: Wong, Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 2.
 """

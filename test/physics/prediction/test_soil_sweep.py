@@ -41,7 +41,7 @@ def with_soil(ground: Terrain, *names: str, index=0) -> Terrain:
 
 
 def bekker_wong(name: str, N: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sinkage [m], resistance and largest thrust [N] by the formulas of notes/soil.md."""
+    """Return sinkage [m], resistance and largest thrust [N] by the formulas of docs/soil.md."""
     soil, r, b = load_soils()[name], LSR1.wheel.radius, LSR1.wheel.width
     stiffness = soil.k_c + b * soil.k_phi
     sinkage = (3.0 * N / ((3.0 - soil.n) * stiffness * np.sqrt(2.0 * r))) ** (
