@@ -24,7 +24,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.simulator.mujoco_rover import MujocoRover

@@ -12,7 +12,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import Verdict
 from support.rough_grounds import bouldered, fractal, rocky
 

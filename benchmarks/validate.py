@@ -9,7 +9,7 @@ from rich.table import Table
 
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_cases import reference_predictions, steered_predictions
 from support.reference_drives import (
     PASSED,

@@ -18,7 +18,7 @@ from rover_physics.numerics.quaternions import (
     xyzw_from_rpy,
     xyzw_from_yaw,
 )
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 
 _LENGTH_TOLERANCE = 0.005
 """Largest deviation of a quaternion's length from 1, as in tf2."""

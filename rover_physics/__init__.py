@@ -8,18 +8,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rover_physics.deprecated import sweep_path, sweep_paths, sweep_poses
     from rover_physics.errors import RoverError
     from rover_physics.prediction.map_sweep import PoseScores, score_poses, sweep_map
-    from rover_physics.prediction.path_prediction import PathPrediction
-    from rover_physics.prediction.sweep import sweep_path, sweep_paths, sweep_poses
     from rover_physics.prediction.sweep_options import SweepOptions
+    from rover_physics.results.path_prediction import PathPrediction
     from rover_physics.rover.model import Rover
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.status import PoseStatus
     from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
     from rover_physics.traversability.classification import classify_path
-    from rover_physics.traversability.judge_path import judge_path, judge_paths
-    from rover_physics.traversability.judge_poses import judge_poses
+    from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
+    from rover_physics.traversability.pieces import judge_pieces
     from rover_physics.traversability.reach import judge_reach
     from rover_physics.traversability.torque_ranges import find_torque_ranges
     from rover_physics.traversability.verdict import Verdict
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "PathPrediction": "prediction.path_prediction",
+    "PathPrediction": "results.path_prediction",
     "PoseScores": "prediction.map_sweep",
     "PoseStatus": "status",
     "Rover": "rover.model",
@@ -37,18 +37,19 @@ _HOMES = {
     "Verdict": "traversability.verdict",
     "classify_path": "traversability.classification",
     "find_torque_ranges": "traversability.torque_ranges",
-    "judge_path": "traversability.judge_path",
-    "judge_paths": "traversability.judge_path",
-    "judge_poses": "traversability.judge_poses",
+    "judge_path": "traversability.judge",
+    "judge_paths": "traversability.judge",
+    "judge_pieces": "traversability.pieces",
+    "judge_poses": "traversability.judge",
     "judge_reach": "traversability.reach",
     "load_rover": "rover.rover_file",
     "load_terrain": "terrain.grid",
     "save_terrain": "terrain.grid",
     "score_poses": "prediction.map_sweep",
     "sweep_map": "prediction.map_sweep",
-    "sweep_path": "prediction.sweep",
-    "sweep_paths": "prediction.sweep",
-    "sweep_poses": "prediction.sweep",
+    "sweep_path": "deprecated",
+    "sweep_paths": "deprecated",
+    "sweep_poses": "deprecated",
 }
 """Names of the API, and the module below this package that holds each."""
 
@@ -66,6 +67,7 @@ __all__ = [
     "find_torque_ranges",
     "judge_path",
     "judge_paths",
+    "judge_pieces",
     "judge_poses",
     "judge_reach",
     "load_rover",

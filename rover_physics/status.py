@@ -59,3 +59,14 @@ class TorquePolicy(IntEnum):
     """The torques that need the least friction, as traction control can apply them."""
     SERVO = 2
     """What speed servos at the rate of the commanded motion bring about."""
+
+
+class Stall(IntEnum):
+    """Why no forward speed of a rover on speed servos balances; SLIDING also where one does."""
+
+    SLIDING = 0
+    """The wheels slide."""
+    STALLED = 1
+    """The motors stall at their largest torque."""
+    WEDGED = 2
+    """A wheel is wedged between faces in front and behind."""

@@ -18,7 +18,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 
 EXACT = (
     Step("rover", "rover_physics.warm_up:pack_rover"),
@@ -45,7 +45,8 @@ def pack_rover() -> None:
 
 def evaluate_poses() -> None:
     """Evaluate the model at a pose."""
-    evaluate(pack_model(*_rover_and_step()).records, np.zeros((1, 3)))
+    model = pack_model(*_rover_and_step())
+    evaluate(model.records, model.limits.records, np.zeros((1, 3)))
 
 
 def judge_paths() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover

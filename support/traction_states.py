@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain

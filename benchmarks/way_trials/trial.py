@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.way_trials.grounds import Case, Pair
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.way_search import LatticeSettings, WayAnswer, find_way
 

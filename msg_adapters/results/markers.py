@@ -9,7 +9,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rover_physics.numerics.quaternions import xyzw_from_yaw
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.traversability import classification
 
 PASSABLE = ColorRGBA(r=0.10, g=0.70, b=0.30, a=1.0)

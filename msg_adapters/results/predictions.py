@@ -10,7 +10,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from msg_adapters.errors import MessageError
 from msg_adapters.joint_map import OWN_NAMES, JointMap
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import (
     LEFT,

@@ -1,7 +1,7 @@
 """Bounds on the prediction along a path over an uncertain map.
 
 If a terrain has a layer `elevation_std`, each height may be wrong by a given number of standard
-deviations. docs/notes/uncertainty.md has the method, its assumptions and its failure rate.
+deviations. docs/uncertainty.md has the method, docs/validation.md its failure rate.
 """
 
 from dataclasses import replace
@@ -16,10 +16,10 @@ from rover_physics.errors import ModelError
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import forget_models, pack_model
-from rover_physics.prediction.path_bounds import PathBounds
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.path_bounds import PathBounds
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground

@@ -25,15 +25,13 @@ from rover_physics.forces.servo_record import (
 )
 from rover_physics.forces.servo_soil import roll_on_soil, speed_of_thrust
 from rover_physics.forces.servo_wheel import ACROSS, ALONG, GRIP, SPIN, D, S, T, roll_wheel
+from rover_physics.limits.table import MIN_SPEED_SHARE
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 
 CREEP = 0.01
 """Sliding velocity, over the nominal speed, at which a wheel has 0.7 of its friction: elastic slip
 of treads on hard ground is about a per cent."""
-MIN_SPEED_SHARE = 0.05
-"""Least share of the commanded motion with which a rover drives. A servo at its torque limit still
-turns; below this share the rover grinds on the spot."""
 MAX_STEPS = 25
 """Largest number of Newton steps."""
 MAX_HALVINGS = 12

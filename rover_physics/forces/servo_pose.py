@@ -14,7 +14,9 @@ from rover_physics.forces.soil import (
     effective_friction,
     solve_wheel,
 )
+from rover_physics.limits.table import TOLERANCE
 from rover_physics.numerics.kernels import kernel
+from rover_physics.status import Stall
 from rover_physics.terrain.ground import copy_soil, friction_at, soil_row_at
 
 
@@ -59,7 +61,7 @@ def write_servo_forces(model, work, result):
     """Write forces, slip, torques, power and motion of the servo balance into a RESULT."""
     linkage, settings, servo = model.linkage, model.settings, work.servo
     weight = linkage.mass * linkage.gravity
-    power = 0.0
+    power, shear, strength, saturation = 0.0, 0.0, 0.0, 0.0
     for wheel in range(6):
         N = weight * servo.load[wheel]
         result.lift_rate[wheel] = servo.rise[wheel] if servo.z[wheel] <= 0.0 else 0.0
@@ -73,10 +75,16 @@ def write_servo_forces(model, work, result):
         result.slip_speed[wheel] = settings.speed * np.sqrt(along * along + across * across)
         result.slip_ratio[wheel] = _slip_ratio(servo, wheel)
         result.torque_saturation[wheel] = abs(torque) / settings.max_torque
+        shear += np.sqrt(traction * traction + lateral * lateral)
+        strength += result.friction[wheel] * max(N, 0.0)
+        saturation += result.torque_saturation[wheel]
         power += max(torque * servo.rim_speed[wheel] * settings.speed / linkage.radius, 0.0)
     result.power = power
     result.speed_share = servo.speed_share
-    result.stalls = 1.0 if servo.balance == ServoBalance.STALLS else 0.0
+    stalled = servo.balance == ServoBalance.STALLS
+    result.stalls = Stall.STALLED.value if stalled else Stall.SLIDING.value
+    result.friction_share = shear / max(strength, TOLERANCE)
+    result.torque_share = saturation / 6.0
     for k in range(MOTIONS):
         result.deviation[k] = servo.deviation[k]
 

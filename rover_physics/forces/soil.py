@@ -1,7 +1,7 @@
 """Wheel-soil models: slip, sinkage and torque of a wheel for given forces on a soil.
 
 There are two models: Coulomb friction, and for a rigid wheel Bekker's pressure-sinkage relation
-with Janosi and Hanamoto's shear relation. docs/notes/soil.md has the formulas, symbols and limits.
+with Janosi and Hanamoto's shear relation. docs/soil.md has the formulas, symbols and limits.
 
 Source: Wong, Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 2.
 """
@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.limits.table import MODERATE_SINKAGE
 from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import SOIL_NUMBERS
 from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, load_soils, soil_named
@@ -24,8 +25,6 @@ COULOMB, BEKKER_WONG = 0.0, 1.0
 """Values of the column SOIL_MODEL."""
 MIN_FRICTION = 1e-3
 """Least effective friction, for wheels without drawbar pull; above 0 because it is a divisor."""
-MODERATE_SINKAGE = 1.0 / 6.0
-"""Largest sinkage [wheel diameters] at which the sinkage formula holds, according to Wong."""
 MAX_NEWTON_STEPS = 50
 """Largest number of Newton steps of `find_mobilisation`."""
 

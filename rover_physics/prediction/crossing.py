@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.evaluation import NONE_HELD, RESULT, new_results
+from rover_physics.prediction.evaluation import NONE_HELD
 from rover_physics.prediction.path_kernels import (
     JumpLimits,
     PathPoints,
@@ -24,6 +24,14 @@ from rover_physics.prediction.path_kernels import (
     find_turned_wheels,
     find_turns,
     sort_pieces,
+)
+from rover_physics.results.record import (
+    join_results,
+    new_results,
+    numbers_of,
+    place_results,
+    select_results,
+    unwritten_results,
 )
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
@@ -45,7 +53,6 @@ the wheel already touches the edge of the face there: no later contact is as ste
 Evaluate = Callable[..., Any]
 """Function of poses (k, 3), `held` (default NONE_HELD) and `motions` (default AHEAD) that returns
 RESULTs (k,)."""
-_NUMBERS = RESULT.itemsize // 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,26 +131,6 @@ def join_crossings(parts: Sequence[Crossings]) -> Crossings:
     )
 
 
-def select_results(results: Any, rows: Any) -> Any:
-    """Return a copy of the RESULTs at row indices, or where a mask is True."""
-    return _numbers(results)[rows].view(RESULT)[:, 0]
-
-
-def place_results(results: Any, to: Any, rows: Any) -> None:
-    """Copy RESULTs (k,) into rows (k,) of others."""
-    _numbers(to)[rows] = _numbers(results)
-
-
-def join_results(parts: Sequence[Any]) -> Any:
-    """Return the RESULTs of all parts, one after the other."""
-    return np.concatenate([_numbers(part) for part in parts]).view(RESULT)[:, 0]
-
-
-def _numbers(results: Any) -> np.ndarray:
-    """Return RESULTs (n,) as floats (n, k), which numpy copies faster than records."""
-    return results.view(np.float64).reshape(len(results), _NUMBERS)
-
-
 class _Known:
     """Evaluated poses of the searched stretches, in arrays with room for more."""
 
@@ -166,14 +153,14 @@ class _Known:
         rows = slice(self.count, end)
         self._place[rows], self._waypoint[rows] = more.place, more.waypoint
         self._climbing[rows], self._poses[rows] = more.climbing, more.poses
-        _numbers(self._results)[rows] = _numbers(more.results)
+        numbers_of(self._results)[rows] = numbers_of(more.results)
         self.count = end
 
     def _make_room(self, known: Crossings, size: int) -> None:
         """Move the poses so far into arrays of `size` rows."""
         self._place, self._waypoint = np.empty(size), np.empty(size, np.int64)
         self._climbing, self._poses = np.empty(size, bool), np.empty((size, 3))
-        self._results = np.empty((size, _NUMBERS)).view(RESULT)[:, 0]
+        self._results = unwritten_results(size)
         count, self.count = self.count, 0
         if count:
             self.add(known)
@@ -181,14 +168,15 @@ class _Known:
 
 def limits_of(wheels: Wheels) -> JumpLimits:
     """Return the JumpLimits of a rover."""
-    radius, no_peaks = wheels.radius, float("inf")
+    radius = wheels.radius
     return JumpLimits(
         max_spacing=radius,
         min_spacing=MIN_SPACING,
         height=HEIGHT_JUMP * radius,
         reach=wheels.reach,
-        friction=no_peaks if wheels.on_servos else wheels.friction_limit,
-        torque=no_peaks if wheels.on_servos else wheels.torque_limit,
+        on_servos=wheels.on_servos,
+        friction=wheels.friction_limit,
+        torque=wheels.torque_limit,
         peak_spacing=PEAK_SPACING * radius,
         fall_spacing=FALL_SPACING * radius,
     )

@@ -17,7 +17,7 @@ import numpy as np
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossings
-from rover_physics.prediction.path_kernels import FACE, Wheels, way_between
+from rover_physics.prediction.path_kernels import FACE, ROUNDING, Wheels, force_limit, way_between
 
 MIN_ANGLE = np.radians(15.0)
 """Least steepness [rad] of a contact behind a wheel from which it falls."""
@@ -25,8 +25,6 @@ WALL = np.radians(60.0)
 """Steepness [rad] of such a contact from which the ground is no slope."""
 MAX_FALLING = 2
 """Most wheels that can fall at once: one axle. If there are more, the rover slides downhill."""
-ROUNDING = 1e-9
-"""Descent [m] below which it counts as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +113,12 @@ def _find_falls(wheels, poses, results, between):
 @exact_kernel
 def _is_held(result, wheels, wheel):
     """Return whether a wheel is on the ground, within the limits of friction and torque."""
+    friction = force_limit(wheels.friction_limit, result.kept_share)
+    torque = force_limit(wheels.torque_limit, result.kept_share)
     return (
         result.wheel_loads[wheel] >= 0.0
-        and result.friction_utilisation[wheel] <= wheels.friction_limit
-        and result.torque_saturation[wheel] <= wheels.torque_limit
+        and result.friction_utilisation[wheel] <= friction
+        and result.torque_saturation[wheel] <= torque
     )
 
 

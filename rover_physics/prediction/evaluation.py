@@ -24,9 +24,16 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
 from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.tip_over import find_tip_over
+from rover_physics.results.record import (
+    clear_results,
+    forget_uncomputable,
+    numbers_of,
+    unwritten_results,
+)
+from rover_physics.results.uses import passes
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
 from rover_physics.rover.steering import steer_wheels
-from rover_physics.status import PoseStatus, TorquePolicy
+from rover_physics.status import PoseStatus, Stall, TorquePolicy
 from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
 
 CHUNK, MAX_CHUNKS = 16, 64
@@ -45,9 +52,10 @@ SETTINGS = record_type(
     ("friction", float),  # friction coefficient where the terrain has no friction layer
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
-    ("allowed_friction", float),  # largest friction utilisation within these
+    ("allowed_friction", float),  # largest friction utilisation within the safety limit
+    ("allowed_saturation", float),  # largest torque saturation within the safety limit
     ("allowed_drop", float),  # largest drop of a wheel [m]
-    ("control_margin", float),  # share of the limits left to the controller, for the results
+    ("control_margin", float),  # share of the limits of friction and torque left to the controller
     ("servo_droop", float),  # share of the nominal speed that a servo loses at full torque
     ("friction_share", float),  # share of the friction that policy SERVO may use
     ("on_soil", np.bool_),  # whether the terrain or the options name soils; else Coulomb friction
@@ -66,38 +74,6 @@ MODEL = record_type(
     ("settings", SETTINGS),
 )
 """All inputs of the kernels: terrain, rover with arm and payload, wheel samples, options."""
-
-RESULT = record_type(
-    ("status", np.int8),
-    ("q", float, (6,)),
-    ("wheel_centres", float, (6, 3)),
-    ("contact_points", float, (6, 3)),
-    ("contact_angle", float, (6,)),
-    ("wheel_loads", float, (6,)),
-    ("tangential", float, (6,)),
-    ("lateral", float, (6,)),
-    ("torque", float, (6,)),
-    ("friction", float, (6,)),
-    ("friction_utilisation", float, (6,)),
-    ("slip_ratio", float, (6,)),
-    ("torque_saturation", float, (6,)),
-    ("sinkage", float, (6,)),
-    ("motion_resistance", float, (6,)),
-    ("tip_over_ratio", float),
-    ("tip_over_force_angle", float),
-    ("belly_clearance", float),
-    ("power", float),
-    ("speed_share", float),
-    ("stalls", float),
-    ("deviation", float, (3,)),
-    ("lift_rate", float, (6,)),
-    ("slip_speed", float, (6,)),
-    ("motion", float, (3,)),
-    ("steering_angle", float, (6,)),
-    ("wheel_speed", float, (6,)),
-)
-"""Results at one pose: `q` as in WORK, the rest as in `PathPrediction`. The last three are also
-written where the rover does not settle."""
 
 WORK = record_type(
     ("pose", float, (3,)),  # x, y [m] and yaw [rad] of the body origin
@@ -122,27 +98,8 @@ WORK = record_type(
     ("moment", float, (3,)),  # net moment about the centre without that of the ground [N m]
     ("soils", float, (6, SOIL_NUMBERS)),  # soil under each wheel
     ("best", float, (3, 6)),  # best N, T, S so far, over the rover's weight
-    ("result", RESULT),  # result of a pose if only its score is kept
 )
 """Work space of one thread: all that kernels write at one pose; map frame."""
-
-
-def new_results(n: int) -> Any:
-    """Return RESULTs (n,), all NaN with status 0."""
-    results = unwritten_results(n)
-    _clear(results)
-    return results
-
-
-def unwritten_results(n: int) -> Any:
-    """Return RESULTs (n,) of any content: the system provides their memory when it is written."""
-    return np.empty((n, RESULT.itemsize // 8)).view(RESULT)[:, 0]
-
-
-def _clear(results: Any) -> None:
-    """Make RESULTs (n,) NaN with status 0."""
-    results.view(np.float64).fill(np.nan)
-    results["status"] = 0
 
 
 def new_work() -> Any:
@@ -157,12 +114,17 @@ _NEW_WORK = np.array([new_work()], WORK).view(np.float64)
 
 
 def evaluate(
-    model: Any, poses: np.ndarray, held: np.ndarray = NONE_HELD, motions: np.ndarray = AHEAD
+    models: Any,
+    limits: Any,
+    poses: np.ndarray,
+    held: np.ndarray = NONE_HELD,
+    motions: np.ndarray = AHEAD,
 ) -> Any:
     """Evaluate the model at poses and return RESULTs (n,).
 
     Args:
-        model: (1,) MODEL.
+        models: (1,) MODEL, or (3,) with a control margin, see `evaluate_row`.
+        limits: (k,) LIMIT.
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
             those that rest on the ground; (0, 6, 2) if none climbs.
@@ -170,13 +132,15 @@ def evaluate(
             returns them; (0, 3) if all are straight ahead.
     """
     results = unwritten_results(len(poses))
-    with limit_threads(effort(model["settings"][0], len(poses))) as threads:
+    with limit_threads(effort(models["settings"][0], len(poses))) as threads:
         works = new_works(threads, len(poses))
         for part in slices(len(poses)):
-            _clear(results[part])
+            clear_results(results[part])
             places = poses[part], motions[part], held[part]
-            sweep = model, places, works, results[part]
+            written = results[part], numbers_of(results[part])
+            sweep = models, limits, places, works, written
             run_chunks(evaluate_poses, sweep, len(works), threads)
+            forget_uncomputable(results[part])
     return results
 
 
@@ -192,23 +156,24 @@ def effort(settings, poses: int) -> int:
 
 
 @kernel
-def evaluate_poses(models, places, works, results, part):
-    """Evaluate the poses of some chunks into `results`, one chunk per work space.
+def evaluate_poses(models, limits, places, works, written, part):
+    """Evaluate the poses of some chunks into results, one chunk per work space.
 
     Args:
-        models: (1,) MODEL.
+        models: (1,) or (3,) MODEL.
+        limits: (k,) LIMIT.
         places: `poses`, `motions` and `held` of `evaluate`.
         works: (chunks,) WORK.
-        results: (n,) RESULT, written.
+        written: (n,) RESULT and the same as numbers (n, NUMBERS), written.
         part: The first chunk and the one after the last.
     """
-    (poses, motions, held), chunks = places, works.size
+    (poses, motions, held), (results, numbers), chunks = places, written, works.size
     n = poses.shape[0]
     for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(models[0], poses, motions, i, works[chunk])
             hold_wheels(held, i, works[chunk].contacts)
-            evaluate_pose(models[0], works[chunk], results[i])
+            evaluate_row(models, limits, works[chunk], (results, numbers), i)
 
 
 @kernel
@@ -228,12 +193,37 @@ def set_pose(model, poses, motions, i, work):
 
 
 @kernel
-def evaluate_pose(model, work, result):
-    """Evaluate the model at the pose and motion of `set_pose` into a RESULT.
+def evaluate_row(models, limits, work, written, i):
+    """Evaluate the pose and motion of `set_pose` into row i of results.
 
-    If the rover does not settle or its forces do not balance, only motion, steering, status and q
-    (NaN) are written. If a result is not a number, all are NaN: NaN would keep every limit.
+    If the rover does not settle or its forces do not balance, only motion, steering and status are
+    written. If a number is none, the status says so: NaN would keep every limit.
+
+    A control margin asks three models: optimal torques that leave the margin, equal torques, which
+    need none, and optimal torques up to the physical limits. The first that passes counts, else
+    the last, which shows by how much the margin is missed.
+
+    Args:
+        models: (1,) MODEL, or these three.
+        limits: (k,) LIMIT.
+        work: WORK.
+        written: (n,) RESULT and the same as numbers (n, NUMBERS), written.
+        i: The row.
     """
+    results, numbers = written
+    _write_motion(models[0].linkage, work, results[i])
+    status = stand(models[0], work)
+    for k in range(models.size):
+        evaluate_stance(models[k], work, status, results[i])
+        if k + 1 == models.size or status != PoseStatus.SETTLED:
+            break
+        if passes(results, numbers, i, limits):
+            break
+
+
+@kernel
+def evaluate_pose(model, work, result):
+    """Evaluate one model at the pose and motion of `set_pose` into a RESULT."""
     _write_motion(model.linkage, work, result)
     evaluate_stance(model, work, stand(model, work), result)
 
@@ -257,11 +247,17 @@ def evaluate_stance(model, work, status, result):
     if status == PoseStatus.SETTLED and not _balance(model, work):
         status = PoseStatus.NO_EQUILIBRIUM
     result.status = status
+    _write_no_path(result)
     if status != PoseStatus.SETTLED:
         result.q[:] = np.nan
         return
+    result.time = result.energy = 0.0
     for k in range(6):
         result.q[k] = work.q[k]
+    result.rocker_angle[0], result.rocker_angle[1] = work.q[3], -work.q[3]
+    upright = np.cos(work.q[1]) * np.cos(work.q[2])
+    result.tilt = np.arccos(min(max(upright, -1.0), 1.0))
+    result.kept_share = 1.0 - model.settings.control_margin
     _write_geometry(work.placement, work.contacts, result)
     _write_forces(model, work, result)
     angle, measure = find_tip_over(linkage, work)
@@ -270,7 +266,7 @@ def evaluate_stance(model, work, status, result):
     result.belly_clearance = belly_clearance(model.ground, linkage, work.placement)
     if not _is_computable(result):
         result.status = PoseStatus.NOT_COMPUTABLE
-        _forget(result)
+        result.time = result.energy = np.nan
 
 
 @kernel
@@ -298,23 +294,12 @@ def _is_computable(result):
 
 
 @kernel
-def _forget(result):
-    """Overwrite the numbers of a RESULT by NaN."""
-    result.q[:] = np.nan
-    result.wheel_centres[:, :] = np.nan
-    result.contact_points[:, :] = np.nan
-    for k in range(6):
-        result.contact_angle[k] = result.wheel_loads[k] = result.friction[k] = np.nan
-        result.tangential[k] = result.lateral[k] = result.torque[k] = np.nan
-        result.friction_utilisation[k] = result.slip_ratio[k] = np.nan
-        result.torque_saturation[k] = result.sinkage[k] = np.nan
-        result.motion_resistance[k] = np.nan
-    result.tip_over_ratio = result.tip_over_force_angle = np.nan
-    result.belly_clearance = result.power = result.speed_share = np.nan
-    result.stalls = np.nan
-    result.deviation[:] = np.nan
-    result.lift_rate[:] = np.nan
-    result.slip_speed[:] = np.nan
+def _write_no_path(result):
+    """Write what the path around a pose would decide, as at a pose that is on no path."""
+    for wheel in range(6):
+        result.wheel_drop[wheel] = result.falling[wheel] = result.lift_height[wheel] = 0.0
+    result.drift[0] = result.drift[1] = result.distance = 0.0
+    result.time = result.energy = np.nan
 
 
 @kernel
@@ -341,7 +326,8 @@ def _write_forces(model, work, result):
     if settings.policy == TorquePolicy.SERVO:
         write_servo_forces(model, work, result)
         return
-    result.speed_share, result.stalls = 1.0, 0.0
+    result.speed_share, result.stalls = 1.0, Stall.SLIDING.value
+    result.friction_share = result.torque_share = 0.0
     result.deviation[:] = 0.0
     result.lift_rate[:] = 0.0
     result.slip_speed[:] = 0.0

@@ -1,8 +1,7 @@
 """Scores of many single poses, such as all cells of a map.
 
 A prediction keeps about 100 numbers per pose, which is 6 GB for a map of a million cells at eight
-headings. Here each pose keeps only the numbers that decide whether the rover can stand and drive
-there.
+headings. Here each pose keeps only the uses of the limits, and the numbers that maps show.
 """
 
 from collections.abc import Iterator
@@ -13,19 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.arrays import SingleFloats
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import (
     AHEAD,
     effort,
-    evaluate_pose,
+    evaluate_row,
     new_works,
     set_pose,
 )
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.record import numbers_of, unwritten_results
+from rover_physics.results.uses import RoverLimits, find_use
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
@@ -33,15 +33,19 @@ from rover_physics.terrain.grid import Terrain
 BATCH = 32_768
 """Approximate number of poses of a map that are scored at a time."""
 NUMBERS = 6
-"""Numbers in a score, without the status."""
+"""Numbers in a score, without the status and the uses."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseScores:
     """Scores of poses: read-only arrays of one shape, NaN where the rover does not settle."""
 
+    limits: RoverLimits
+    """The limits that were asked."""
     status: NDArray[np.int8]
     """PoseStatus of each pose."""
+    uses: SingleFloats
+    """Use of each limit, in a further last axis; infinite where the rover does not settle."""
     friction_utilisation: SingleFloats
     """Largest of the six wheels; infinite where a wheel lifts off, and with speed servos where no
     forward speed balances."""
@@ -59,20 +63,10 @@ class PoseScores:
     def __post_init__(self) -> None:
         freeze_fields(self)
 
-    @quiet
-    def within_limits(self, rover: Rover) -> NDArray[np.bool_]:
-        """Return True where the rover keeps its limits, sinkage and suspension not checked."""
-        limits = rover.limits
-        return np.asarray(
-            (self.status == PoseStatus.SETTLED)
-            & (self.friction_utilisation <= limits.friction_utilisation)
-            & (self.torque_saturation <= limits.torque_saturation)
-            & (self.least_load >= 0.0)
-            & (self.least_load < np.inf)
-            & (self.tip_over_ratio >= limits.tip_over_ratio)
-            & (self.tilt <= limits.tilt)
-            & (self.belly_clearance >= limits.belly_clearance)
-        )
+    @property
+    def passable(self) -> NDArray[np.bool_]:
+        """True where the rover settles and keeps all its limits."""
+        return ~np.asarray((self.uses > 1.0).any(axis=-1))
 
 
 def score_poses(
@@ -111,7 +105,7 @@ def sweep_map(
 
     Yields:
         Index of the first row, and scores (rows, nx, headings) of it and the rows that follow.
-        A score takes 25 bytes per pose.
+        A score takes 25 bytes per pose, and 4 for each limit.
 
     Raises:
         ModelError, SoilError: As `sweep_path`.
@@ -130,35 +124,46 @@ def sweep_map(
 
 def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
     """Score poses (n, 3) and return scores of `shape`, which has n elements."""
-    n = len(poses)
+    n, limits = len(poses), model.limits
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
+    uses = np.empty((n, len(limits)), np.float32)
     with limit_threads(effort(model.settings, n)) as threads:
         works = new_works(threads, n)
-        sweep = model.records, (poses, AHEAD), works, (status, numbers)
+        results = unwritten_results(len(works))
+        spaces = works, results, numbers_of(results)
+        scores = status, numbers, uses
+        sweep = model.records, limits.records, (poses, AHEAD), spaces, scores
         run_chunks(score_all, sweep, len(works), threads)
-    return PoseScores(status.reshape(shape), *(values.reshape(shape) for values in numbers))
+    values = (row.reshape(shape) for row in numbers)
+    return PoseScores(limits, status.reshape(shape), uses.reshape(*shape, -1), *values)
 
 
 @kernel
-def score_all(models, places, works, scores, part):
+def score_all(models, limits, places, spaces, scores, part):
     """Score the poses of some chunks, one chunk per work space.
 
     Args:
-        models: (1,) MODEL.
+        models: (1,) or (3,) MODEL.
+        limits: (k,) LIMIT.
         places: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame, and their motions, as
             for `evaluate`.
-        works: (chunks,) WORK.
-        scores: (n,) PoseStatus, and (NUMBERS, n) numbers in the order of `PoseScores`, written.
+        spaces: (chunks,) WORK and RESULT, and the results as numbers.
+        scores: (n,) PoseStatus, (NUMBERS, n) numbers in the order of `PoseScores` and (n, k) uses,
+            written.
         part: The first chunk and the one after the last.
     """
-    (poses, motions), (status, numbers), chunks = places, scores, works.size
-    n = poses.shape[0]
+    (poses, motions), (works, results, rows), (status, numbers, uses) = places, spaces, scores
+    n, chunks = poses.shape[0], works.size
     for chunk in range(part[0], part[1]):
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
             set_pose(models[0], poses, motions, i, works[chunk])
-            evaluate_pose(models[0], works[chunk], works[chunk].result)
-            status[i] = works[chunk].result.status
-            write_score(works[chunk].result, i, numbers)
+            evaluate_row(models, limits, works[chunk], (results, rows), chunk)
+            status[i] = results[chunk].status
+            write_score(results[chunk], i, numbers)
+            for k in range(limits.size):
+                uses[i, k] = np.inf
+                if status[i] == PoseStatus.SETTLED:
+                    uses[i, k] = find_use(rows, chunk, limits[k], False)[0]
 
 
 @kernel
@@ -175,8 +180,6 @@ def write_score(result, i, numbers):
         use = max(use, result.friction_utilisation[wheel])
         saturation = max(saturation, result.torque_saturation[wheel])
         least = min(least, result.wheel_loads[wheel])
-    upright = np.cos(result.q[1]) * np.cos(result.q[2])
     numbers[0, i], numbers[1, i], numbers[2, i] = use, saturation, least
-    numbers[3, i] = result.tip_over_ratio
-    numbers[4, i] = np.arccos(min(max(upright, -1.0), 1.0))
+    numbers[3, i], numbers[4, i] = result.tip_over_ratio, result.tilt
     numbers[5, i] = result.belly_clearance

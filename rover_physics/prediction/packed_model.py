@@ -9,15 +9,19 @@ import numpy as np
 from rover_physics.contact.wheel_samples import sample_wheel
 from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
+from rover_physics.limits import table
+from rover_physics.limits.table import Limit
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.records import new_record, shared_array_of
+from rover_physics.numerics.records import new_record
 from rover_physics.prediction.evaluation import MODEL, SETTINGS, new_work
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.prediction.tip_over import find_tip_over
+from rover_physics.results.uses import RoverLimits, SameObject, limits_of
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com, pack_tool
 from rover_physics.rover.model import Rover
 from rover_physics.rover.plausible import check_plausible
+from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import Ground, pack_ground, with_soils
 
@@ -27,7 +31,9 @@ class PackedModel:
     """A rover on a terrain with options, in the form that the kernels read."""
 
     records: np.ndarray
-    """(1,) MODEL."""
+    """(1,) MODEL; with a control margin (3,), see `evaluate_row`."""
+    limits: RoverLimits
+    """The limits that are asked of it."""
     ground: Ground
     """The terrain. The MODEL holds its addresses, so it must live as long as this object."""
 
@@ -39,7 +45,7 @@ class PackedModel:
 
     @cached_property
     def record(self) -> Any:
-        """The MODEL itself."""
+        """The MODEL itself; with a control margin the one of optimal torques that leave it."""
         return self.records[0]
 
     @cached_property
@@ -59,19 +65,24 @@ def pack_model(
             arm, or a rover with an implausible number.
         SoilError: A soil of the terrain, or `options.soil`, that is not a preset.
     """
-    return _pack_model(_SameRover(rover), terrain, options)
+    return _pack_model(SameObject(rover), terrain, options, table.LIMITS)
 
 
 @lru_cache(maxsize=8)
-def _pack_model(same: "_SameRover", terrain: Terrain, options: SweepOptions) -> PackedModel:
+def _pack_model(
+    same: SameObject, terrain: Terrain, options: SweepOptions, rows: tuple[Limit, ...]
+) -> PackedModel:
+    """Pack a model for the rows of the table of limits."""
+    rover: Rover = same.value
     on_soil = bool(terrain.soil_names or options.soil is not None)
     linkage, samples, settings = _pack_request(same, terrain.resolution, on_soil, options)
     soils = pack_soils(terrain.soil_names, default=options.soil)
     ground = with_soils(pack_ground(terrain), soils)
-    record = new_record(
-        MODEL, ground=ground.records[0], linkage=linkage, samples=samples, settings=settings
-    )
-    return PackedModel(shared_array_of(record), ground)
+    records = np.zeros(len(settings), MODEL)
+    for record, one in zip(records, settings, strict=True):
+        record["ground"], record["linkage"] = ground.records[0], linkage
+        record["samples"], record["settings"] = samples, one
+    return PackedModel(records, limits_of(rover, options.policy), ground)
 
 
 def forget_models() -> None:
@@ -80,25 +91,12 @@ def forget_models() -> None:
     pack_ground.cache_clear()
 
 
-class _SameRover:
-    """A cache key that compares rovers by identity."""
-
-    def __init__(self, rover: Rover):
-        self.rover = rover
-
-    def __hash__(self) -> int:
-        return id(self.rover)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SameRover) and self.rover is other.rover
-
-
 @lru_cache(maxsize=16)
 def _pack_request(
-    same: _SameRover, resolution: float, on_soil: bool, options: SweepOptions
+    same: SameObject, resolution: float, on_soil: bool, options: SweepOptions
 ) -> tuple[Any, Any, Any]:
-    """Return LINKAGE, WHEEL_SAMPLES and SETTINGS, cached."""
-    rover, angles = same.rover, options.arm_angles
+    """Return LINKAGE, WHEEL_SAMPLES and the SETTINGS of each MODEL, cached."""
+    rover, angles = same.value, options.arm_angles
     check_plausible(rover)
     mu = rover.friction if options.friction is None else options.friction
     torque = rover.wheel.max_torque if options.max_torque is None else options.max_torque
@@ -113,7 +111,8 @@ def _pack_request(
         allowed_torque=float(
             torque * rover.limits.torque_saturation * (1.0 - options.kept_margin)
         ),
-        allowed_friction=float(rover.limits.friction_utilisation * (1.0 - options.kept_margin)),
+        allowed_friction=float(rover.limits.friction_utilisation),
+        allowed_saturation=float(rover.limits.torque_saturation),
         allowed_drop=float(rover.limits.wheel_drop),
         control_margin=float(options.kept_margin),
         servo_droop=float(rover.wheel.servo_droop),
@@ -125,17 +124,31 @@ def _pack_request(
         flat_angle=flat_angle,
         flat_measure=flat_measure,
     )
-    return pack_linkage(rover, mass, com, tool), sample_wheel(rover, resolution), settings
+    return (
+        pack_linkage(rover, mass, com, tool),
+        sample_wheel(rover, resolution),
+        _with_fallbacks(settings, float(torque * rover.limits.torque_saturation)),
+    )
+
+
+def _with_fallbacks(settings: Any, allowed_torque: float) -> tuple[Any, ...]:
+    """Return SETTINGS, with a control margin followed by those of the other models."""
+    if settings.control_margin == 0.0:
+        return (settings,)
+    equal, physical = settings.copy(), settings.copy()
+    equal.policy, equal.control_margin = TorquePolicy.EQUAL, 0.0
+    equal.allowed_torque = physical.allowed_torque = allowed_torque
+    return settings, equal, physical
 
 
 @lru_cache(maxsize=4)
-def _tip_over_on_flat_ground(same: _SameRover) -> tuple[float, float]:
+def _tip_over_on_flat_ground(same: SameObject) -> tuple[float, float]:
     """Return tip-over angle [rad] and force-angle measure [N m] on flat ground, arm stowed.
 
     Raises:
         ModelError: The rover tips over on flat ground.
     """
-    rover = same.rover
+    rover = same.value
     linkage = pack_linkage(rover, *body_mass_and_com(rover))
     work, q = new_work(), np.zeros(6)
     place(linkage, work.pose, q, work.placement)

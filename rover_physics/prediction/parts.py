@@ -12,7 +12,6 @@ from rover_physics.prediction.crossing import find_crossings
 from rover_physics.prediction.evaluation import effort
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import path_motions
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import (
     NO_SUMS,
     check_poses,
@@ -22,6 +21,7 @@ from rover_physics.prediction.sweep import (
     wheels_of,
 )
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 

@@ -23,6 +23,8 @@ PEAK, LEAST_USE = 2.5, 0.55
 per rad by which a contact turns, that is looked for, from this share of a limit on."""
 NEAR_LIMIT, LEAST_TURN = 0.9, 0.02
 """Share of a limit from which any peak is looked for if a contact turns by that [rad]."""
+ROUNDING = 1e-9
+"""Descent [m] below which it counts as zero, and excess of a force limit that does."""
 AT_LIMIT = 0.95
 """Share of a limit from which a peak is looked for at the smallest spacing."""
 
@@ -35,9 +37,9 @@ class Wheels(NamedTuple):
     reach: float
     """Distance of the outermost wheel from the body origin, seen from above [m]."""
     friction_limit: float
-    """Largest friction utilisation with which the forces balance, at most 1."""
+    """Safety limit of the friction utilisation, see `force_limit`."""
     torque_limit: float
-    """Largest torque saturation with which the forces balance, at most 1."""
+    """Safety limit of the torque saturation."""
     drop_limit: float
     """Largest drop of a wheel [m]."""
     on_servos: bool
@@ -55,10 +57,12 @@ class JumpLimits(NamedTuple):
     """Change of a wheel's height above which it is a jump [m]."""
     reach: float
     """As in `Wheels`."""
+    on_servos: bool
+    """Whether no peaks are searched, as wheels may be at their limits."""
     friction: float
-    """Friction utilisation whose peaks are searched, infinite for none."""
+    """As `friction_limit` in `Wheels`."""
     torque: float
-    """Torque saturation whose peaks are searched, infinite for none."""
+    """As `torque_limit` in `Wheels`."""
     peak_spacing: float
     """Way below which no peaks at a limit are searched [m]."""
     fall_spacing: float
@@ -76,6 +80,16 @@ class PathPoints(NamedTuple):
     """(n, 3) x, y [m], yaw [rad]."""
     results: Any
     """(n,) RESULT of each."""
+
+
+@exact_kernel
+def force_limit(limit, kept_share):
+    """Return the friction utilisation or torque saturation up to which forces balance.
+
+    Forces beyond what friction and motors give never balance, whatever the safety `limit`, of
+    which a control margin leaves the `kept_share`.
+    """
+    return min(limit * kept_share, 1.0) + ROUNDING
 
 
 @exact_kernel
@@ -269,7 +283,9 @@ def _finest(here, there, limits):
         turn = max(turn, abs(other - angle))
         ahead = -1.0 if there.wheel_speed[wheel] < 0.0 else 1.0
         falls = falls or (ahead * angle < -FACE) != (ahead * other < -FACE)
-    use, other_use = _largest_use(here, limits), _largest_use(there, limits)
+    use, other_use = 0.0, 0.0
+    if not limits.on_servos:
+        use, other_use = _largest_use(here, limits), _largest_use(there, limits)
     largest = max(use, other_use)
     rises = largest > LEAST_USE and largest * (1.0 + PEAK * turn) > 1.0
     if min(use, other_use) <= 1.0 and (rises or (largest > NEAR_LIMIT and turn > LEAST_TURN)):
@@ -279,11 +295,13 @@ def _finest(here, there, limits):
 
 @exact_kernel
 def _largest_use(result, limits):
-    """Return the largest share of their limits that friction and torque of a wheel use."""
-    use = 0.0
+    """Return the largest share of what balances that friction and torque of a wheel use."""
+    use, kept = 0.0, result.kept_share
+    most_friction = force_limit(limits.friction, kept)
+    most_torque = force_limit(limits.torque, kept)
     for wheel in range(6):
-        friction = result.friction_utilisation[wheel] / limits.friction
-        torque = result.torque_saturation[wheel] / limits.torque
+        friction = result.friction_utilisation[wheel] / most_friction
+        torque = result.torque_saturation[wheel] / most_torque
         use = max(use, friction, torque)
     return use
 

@@ -21,14 +21,12 @@ import numpy as np
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.crossing import Crossings
 from rover_physics.prediction.path_kernels import Wheels
-from rover_physics.status import PoseStatus
+from rover_physics.status import PoseStatus, Stall
 
 WEDGED = np.radians(140.0)
 """Angle [rad] between contacts in front of and behind a wheel from which it is wedged. The line
 between them is then within 20 degrees of both normals, less than the friction angle of any ground
 that a rover drives on, so friction at the two faces can hold any force."""
-STOPPED, STALLED, LOCKED = 0.0, 1.0, 2.0
-"""Values of `stalls` in a RESULT: wheels slide, motors stall, a wheel is wedged."""
 
 
 def stop_in_slots(poses: np.ndarray, results: Any, crossings: Crossings) -> None:
@@ -49,7 +47,7 @@ def stop_in_slots(poses: np.ndarray, results: Any, crossings: Crossings) -> None
     for row in order[1:][wedged]:
         target = results if row < n else crossings.results
         target["speed_share"][row if row < n else row - n] = 0.0
-        target["stalls"][row if row < n else row - n] = LOCKED
+        target["stalls"][row if row < n else row - n] = Stall.WEDGED
 
 
 def find_lift_heights(

@@ -11,14 +11,14 @@ from rover_physics.prediction.evaluation import (
     AHEAD,
     NONE_HELD,
     evaluate_pose,
-    new_results,
     new_work,
     set_pose,
 )
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import check_poses, make_prediction, wheels_of
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import forget_uncomputable, new_results
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 
@@ -70,4 +70,5 @@ class _Evaluator:
             work.can_follow = True
             hold_wheels(held, i, work.contacts)
             evaluate_pose(self._record, work, results[i])
+        forget_uncomputable(results)
         return results

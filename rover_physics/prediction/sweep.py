@@ -1,5 +1,11 @@
-"""The quasi-static model along a path: poses in, `PathPrediction` out."""
+"""The quasi-static model along paths: poses in, `PathPrediction` out.
 
+A path can be swept up to its first failure. It is then swept in blocks, each longer than the one
+before; rows that may break a limit are found by a kernel that errs on the safe side, and only if
+there is one is the path so far held against all limits.
+"""
+
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,124 +15,46 @@ from numpy.typing import ArrayLike
 
 from rover_physics.errors import PoseError
 from rover_physics.numerics.interruption import check_interruption
+from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.plausible import MAX_COORDINATE
-from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.crossing import Crossings, Evaluate, find_crossings
-from rover_physics.prediction.drops import ROUNDING, Falls, find_falls
-from rover_physics.prediction.evaluation import AHEAD, NONE_HELD, RESULT, effort, evaluate
-from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.crossing import (
+    Crossings,
+    Evaluate,
+    find_crossings,
+    join_crossings,
+)
+from rover_physics.prediction.drops import MIN_ANGLE, Falls, find_falls
+from rover_physics.prediction.evaluation import AHEAD, NONE_HELD, effort, evaluate
+from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Wheels, add_up
-from rover_physics.prediction.path_motion import motions_of, path_motions
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.servo_path import (
     climb_costs,
     find_drift,
     find_lift_heights,
     stop_in_slots,
 )
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
-from rover_physics.rover.model import Rover
+from rover_physics.prediction.sweep_options import POLICIES
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import join_results, place_results, unwritten_results
+from rover_physics.results.uses import RoverLimits, find_broken, find_uses, readable
 from rover_physics.status import PoseStatus, TorquePolicy
 from rover_physics.terrain.grid import Terrain
 
 POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
+FIRST_BLOCK = 32
+"""Number of waypoints of a path that are evaluated first."""
+MIN_GROWTH, MAX_GROWTH = 2.0, 16.0
+"""Bounds of the length of a block over that of the block before."""
+BLOCK_TIME = 3e-3
+"""Time [s] that a block aims at, about ten times what a block costs beside its poses. What is
+found does not depend on the blocks."""
 
 Sums = tuple[float, float, float]
 """Distance [m], time [s] and energy [J] since the start of a path."""
 NO_SUMS = (0.0, 0.0, 0.0)
-
-
-def sweep_path(
-    rover: Rover,
-    terrain: Terrain,
-    poses: ArrayLike,
-    options: SweepOptions = DEFAULT_OPTIONS,
-) -> PathPrediction:
-    """Predict the rover at each pose of a path.
-
-    Args:
-        rover: The rover.
-        terrain: The ground; its friction and soil layers override the options.
-        poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        options: Torque policy, friction, soil, arm and direction.
-
-    Raises:
-        PoseError: Poses of wrong shape, or not finite.
-        ModelError: An option that this rover cannot have.
-        SoilError: A soil of the terrain, or of the options, that is not a preset.
-    """
-    return sweep_paths(rover, terrain, [poses], options)[0]
-
-
-@quiet
-def sweep_paths(
-    rover: Rover,
-    terrain: Terrain,
-    paths: Sequence[ArrayLike],
-    options: SweepOptions = DEFAULT_OPTIONS,
-) -> list[PathPrediction]:
-    """Predict the rover along several paths at once, faster than one by one.
-
-    Args:
-        rover: The rover.
-        terrain: The ground.
-        paths: Poses of each path, as `sweep_path` takes them.
-        options: As for `sweep_path`.
-
-    Raises:
-        PoseError, ModelError, SoilError: As `sweep_path`.
-    """
-    return [swept.prediction for swept in sweep_in_full(rover, terrain, paths, options)]
-
-
-@quiet
-def sweep_poses(
-    rover: Rover,
-    terrain: Terrain,
-    poses: ArrayLike,
-    curvature: ArrayLike,
-    options: SweepOptions = DEFAULT_OPTIONS,
-) -> PathPrediction:
-    """Predict the rover at single poses that form no path.
-
-    What would lie between poses, crossings, falls and drops, is left out. Time, energy and
-    distance are 0 where the rover settled.
-
-    Args:
-        rover: The rover.
-        terrain: The ground; its friction and soil layers override the options.
-        poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        curvature: (n,) curvature of the motion of base_link at each pose [1/m], positive to the
-            left, 0 straight ahead, inf or -inf on the spot.
-        options: As for `sweep_path`.
-
-    Raises:
-        PoseError: Poses of wrong shape, or not finite; curvatures of wrong shape, or NaN.
-        ModelError, SoilError: As `sweep_path`.
-    """
-    model, places = pack_model(rover, terrain, options), check_poses(poses)
-    results = evaluator(model)(places, motions=motions_of(model, places, curvature))
-    return predict_poses(model, places, results)
-
-
-def predict_poses(model: PackedModel, places: np.ndarray, results: Any) -> PathPrediction:
-    """Return the prediction of single poses (n, 3) that form no path from their RESULTs (n,)."""
-    prediction = _collect(
-        places,
-        results,
-        model,
-        wheel_drop=np.zeros((len(places), 6)),
-        drift=np.zeros((len(places), 2)),
-        lift_height=np.zeros((len(places), 6)),
-        falling=np.zeros((len(places), 6), bool),
-        start=NO_SUMS,
-        between=None,
-        waypoint=np.arange(len(places)),
-    )
-    nothing = np.where(prediction.settled, 0.0, np.nan)
-    return replace(prediction, energy=nothing, time=nothing, distance=np.zeros(len(places)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,29 +77,175 @@ class SweptPath:
         return SweptPath(self.path, prediction, self.results[:waypoints], crossings)
 
 
-@quiet
-def sweep_in_full(
-    rover: Rover, terrain: Terrain, paths: Sequence[ArrayLike], options: SweepOptions
+def sweep_paths(
+    terrain: Terrain, model: PackedModel, paths: Sequence[np.ndarray], stop_at_failure: bool
 ) -> list[SweptPath]:
-    """Sweep several paths and keep the results; arguments and errors as `sweep_paths`."""
-    model = pack_model(rover, terrain, options)
-    if not paths:
-        return []
-    checked = [check_poses(poses) for poses in paths]
-    ends = np.cumsum([len(poses) for poses in checked])
-    poses, evaluate_at = np.concatenate(checked), evaluator(model)
-    motions = np.concatenate([path_motions(model, path) for path in checked])
-    with limit_threads(effort(model.settings, len(poses))):  # set once, not per round
-        results = evaluate_at(poses, motions=motions)
-        crossings = find_crossings(
-            terrain, wheels_of(model), poses, results, evaluate_at, joined_paths(ends)
-        )
-    swept = []
-    for first, end in zip([0, *ends[:-1]], ends, strict=True):
-        check_interruption()
-        part = crossings.between(first, end) if len(paths) > 1 else crossings
-        swept.append(make_prediction(model, poses[first:end], results[first:end], part)[0])
-    return swept
+    """Sweep several paths at once, each in full or up to its first failure.
+
+    Args:
+        terrain: The ground.
+        model: The rover on it, with options.
+        paths: Poses of each path, as `check_poses` returns them.
+        stop_at_failure: Whether a path ends with the first waypoint that fails; up to there its
+            prediction is that of the whole path.
+    """
+    started = [_StartedPath(model, poses, stop_at_failure) for poses in paths]
+    going, block = started, FIRST_BLOCK if stop_at_failure else max(map(len, paths), default=0)
+    with limit_threads(effort(model.settings, sum(map(len, paths)))):  # set once, not per round
+        while going:
+            check_interruption()
+            began = time.perf_counter()
+            _evaluate_block(model, going, block)
+            _search_crossings(terrain, model, going)
+            for path in going:
+                check_interruption()
+                path.look_for_failure()
+            going = [path for path in going if path.swept is None]
+            growth = BLOCK_TIME / max(time.perf_counter() - began, 1e-9)
+            block = round(block * min(max(growth, MIN_GROWTH), MAX_GROWTH))
+    return [path.swept for path in started if path.swept is not None]
+
+
+class _StartedPath:
+    """A path of which the first waypoints are swept."""
+
+    def __init__(self, model: PackedModel, poses: np.ndarray, stops: bool):
+        self._model, self.poses, self._stops = model, poses, stops
+        self.motions = path_motions(model, poses)
+        self.results = unwritten_results(len(poses))
+        """(n,) RESULT of each waypoint; the first `evaluated` are written."""
+        self.evaluated = 0
+        self.searched = 0
+        """Number of waypoints up to which the crossings are known."""
+        self.swept: SweptPath | None = None
+        """The result once it is known."""
+        self._suspicious = False
+        self._crossings: list[Crossings] = []
+
+    def block(self, size: int) -> slice:
+        """Return the waypoints to evaluate next; none while evaluated ones are not searched."""
+        if self.searched < self.evaluated:
+            return slice(self.evaluated, self.evaluated)
+        return slice(self.evaluated, min(self.evaluated + size, len(self.poses)))
+
+    def stretch(self) -> slice:
+        """Return the waypoints between which to search crossings next, up to a sure failure."""
+        end = self.evaluated
+        if self._stops:
+            news = self.results[self.searched : self.evaluated]
+            suspect, failure = find_suspects(*readable(news), self._model.limits.records)
+            end = self.evaluated if failure < 0 else self.searched + failure + 1
+            self._suspicious |= 0 <= suspect < end - self.searched
+        first = max(self.searched - 1, 0)
+        self.searched = end
+        return slice(first, end)
+
+    def take_crossings(self, crossings: Crossings) -> None:
+        """Keep the crossings of the last stretch, whose places count from the path's start."""
+        self._crossings.append(crossings)
+        if self._stops:
+            between = readable(crossings.results)
+            suspect = find_suspects(*between, self._model.limits.records)[0]
+            self._suspicious |= bool(suspect >= 0)
+
+    def look_for_failure(self) -> None:
+        """Complete the path if all of it is swept, or if a waypoint that is swept fails."""
+        end, crossings = self.searched, join_crossings(self._crossings)
+        self._crossings = [crossings]
+        complete = end == len(self.poses)
+        here, results = self.poses[:end], self.results[:end]
+        if complete and not self._stops:
+            self.swept = make_prediction(self._model, here, results, crossings)[0]
+            return
+        if not (complete or self._suspicious):
+            if not len(crossings.place):
+                return
+            falls = find_falls(wheels_of(self._model), here, results, crossings)
+            if not falls.drops.max() > self._model.settings.allowed_drop:
+                return
+        swept, falls = make_prediction(self._model, here, results, crossings)
+        failure = find_first_failure(self._model.limits, swept.prediction)
+        if complete and failure < 0:
+            self.swept = swept
+        elif failure >= 0 and (complete or failure < falls.decided):
+            self.swept = swept.cut(failure + 1)
+
+
+@exact_kernel
+def find_suspects(results, numbers, limits):
+    """Return the first row that may break a limit, and the first that does so in any case; or -1.
+
+    A wheel that rolls off an edge needs no equilibrium, so a row with a contact that is behind a
+    wheel and steep may keep limits that it breaks. What the path around a row decides is not
+    known yet.
+
+    Args:
+        results: (n,) RESULT.
+        numbers: The same as numbers (n, NUMBERS).
+        limits: (k,) LIMIT.
+    """
+    suspect = -1
+    for row in range(results.size):
+        broken, in_a_fall = 0, 0
+        if results[row].status == PoseStatus.SETTLED:
+            broken, in_a_fall = find_broken(numbers, row, limits)
+        if broken >= 0:
+            suspect = row if suspect < 0 else suspect
+            if in_a_fall >= 0 or not _may_fall(results[row]):
+                return suspect, row
+    return suspect, -1
+
+
+@exact_kernel
+def _may_fall(result):
+    """Return whether a contact is so far behind its wheel that the wheel may roll off an edge."""
+    steepest = 0.0
+    for wheel in range(6):
+        angle = result.contact_angle[wheel]
+        steepest = min(steepest, -angle if result.wheel_speed[wheel] < 0.0 else angle)
+    return steepest < -MIN_ANGLE
+
+
+def find_first_failure(limits: RoverLimits, prediction: PathPrediction) -> int:
+    """Return the first waypoint that breaks a limit, itself or on the way to it; -1 for none."""
+    first = len(prediction.poses)
+    for part in (prediction, prediction.between):
+        if part is not None and len(part.poses):
+            broken = find_uses(limits, part.results).find_first() >= 0
+            first = min(first, int(part.waypoint[broken].min(initial=first)))
+    return first if first < len(prediction.poses) else -1
+
+
+def _evaluate_block(model: PackedModel, paths: Sequence[_StartedPath], size: int) -> None:
+    """Evaluate the next waypoints of all paths together."""
+    blocks = [path.block(size) for path in paths]
+    pairs = list(zip(paths, blocks, strict=True))
+    at = np.concatenate([path.poses[block] for path, block in pairs])
+    if not len(at):
+        return
+    motions = np.concatenate([path.motions[block] for path, block in pairs])
+    results, first = evaluator(model)(at, motions=motions), 0
+    for path, block in pairs:
+        end = first + block.stop - block.start
+        place_results(results[first:end], path.results, block)
+        path.evaluated, first = block.stop, end
+
+
+def _search_crossings(terrain: Terrain, model: PackedModel, paths: Sequence[_StartedPath]) -> None:
+    """Search the crossings of the next stretches of all paths together."""
+    stretches = [path.stretch() for path in paths]
+    pairs = list(zip(paths, stretches, strict=True))
+    ends = np.cumsum([stretch.stop - stretch.start for stretch in stretches])
+    crossings = find_crossings(
+        terrain,
+        wheels_of(model),
+        np.concatenate([path.poses[stretch] for path, stretch in pairs]),
+        join_results([path.results[stretch] for path, stretch in pairs]),
+        evaluator(model),
+        joined_paths(ends),
+    )
+    for (path, stretch), first, end in zip(pairs, [0, *ends[:-1]], ends, strict=True):
+        path.take_crossings(crossings.between(first, end).moved(stretch.start))
 
 
 def joined_paths(ends: np.ndarray) -> np.ndarray:
@@ -190,26 +264,27 @@ def evaluator(model: PackedModel) -> Evaluate:
     def evaluate_at(
         at: np.ndarray, held: np.ndarray = NONE_HELD, motions: np.ndarray = AHEAD
     ) -> Any:
-        return evaluate(model.records, at, held, motions)
+        return evaluate(model.records, model.limits.records, at, held, motions)
 
     return evaluate_at
 
 
 def wheels_of(model: PackedModel) -> Wheels:
-    """Return size and limits of the rover's wheels.
-
-    Forces beyond what friction and motors give never balance, whatever the safety limits.
-    """
+    """Return size and limits of the rover's wheels."""
     linkage, settings = model.record.linkage, model.record.settings
-    torque = settings.allowed_torque / settings.max_torque
     return Wheels(
         float(linkage.radius),
         float(linkage.reach),
-        min(float(settings.allowed_friction), 1.0) + ROUNDING,
-        min(float(torque), 1.0) + ROUNDING,
-        float(settings.allowed_drop) + ROUNDING,
+        float(settings.allowed_friction),
+        float(settings.allowed_saturation),
+        float(settings.allowed_drop),
         bool(settings.policy == TorquePolicy.SERVO),
     )
+
+
+def predict_poses(model: PackedModel, places: np.ndarray, results: Any) -> PathPrediction:
+    """Return the prediction of single poses (n, 3) that form no path from their RESULTs (n,)."""
+    return _collect(model, places, results, np.arange(len(places)))
 
 
 def make_prediction(
@@ -221,43 +296,29 @@ def make_prediction(
 ) -> tuple[SweptPath, Falls]:
     """Return the prediction of one path from its results, and its falls.
 
-    Distance, time and energy at the first pose are `start`.
+    What the path decides is written into the results. Distance, time and energy at the first pose
+    are `start`.
     """
-    wheels = wheels_of(model)
+    wheels, on_servos = wheels_of(model), model.settings["policy"] == TorquePolicy.SERVO
     falls = find_falls(wheels, poses, results, crossings)
-    if model.settings["policy"] == TorquePolicy.SERVO:
+    if on_servos:
         results, crossings = results.copy(), replace(crossings, results=crossings.results.copy())
         stop_in_slots(poses, results, crossings)
-    lift, lift_between = find_lift_heights(wheels, poses, results, crossings)
-    between = _collect(
-        crossings.poses,
-        crossings.results,
-        model,
-        wheel_drop=np.zeros((len(crossings.poses), 6)),
-        drift=np.zeros((len(crossings.poses), 2)),
-        lift_height=lift_between,
-        falling=falls.between,
-        start=NO_SUMS,
-        between=None,
-        waypoint=crossings.waypoint,
-    )
-    prediction = _collect(
-        poses,
-        results,
-        model,
-        wheel_drop=falls.drops,
-        lift_height=lift,
-        drift=find_drift(wheels, float(model.record.linkage.length), poses, results, crossings),
-        falling=falls.at_waypoints,
-        start=start,
-        between=between,
-        waypoint=np.arange(len(poses)),
-    )
-    if model.settings["policy"] == TorquePolicy.SERVO:
+    between = crossings.results
+    results["wheel_drop"] = falls.drops
+    results["falling"], between["falling"] = falls.at_waypoints, falls.between
+    _write_sums(model, crossings.poses, between, NO_SUMS)
+    _write_sums(model, poses, results, start)
+    if on_servos:
+        window = float(model.record.linkage.length)
+        results["drift"] = find_drift(wheels, window, poses, results, crossings)
+        heights = find_lift_heights(wheels, poses, results, crossings)
+        results["lift_height"], between["lift_height"] = heights
         time, energy = climb_costs(poses, results, crossings).T
-        prediction = replace(
-            prediction, time=prediction.time + time, energy=prediction.energy + energy
-        )
+        results["time"] += time
+        results["energy"] += energy
+    on_the_way = _collect(model, crossings.poses, between, crossings.waypoint)
+    prediction = _collect(model, poses, results, np.arange(len(poses)), on_the_way)
     return SweptPath(poses, prediction, results, crossings), falls
 
 
@@ -295,35 +356,25 @@ def sum_up(
     return add_up(*path, model.record.linkage.steering_rate, start, sums)
 
 
-def _collect(
-    poses: np.ndarray, results: np.ndarray, model: PackedModel, start: Sums, **more: Any
-) -> PathPrediction:
-    settings, rate = model.settings, model.record.linkage.steering_rate
-    same: dict[str, Any] = {name: results[name] for name in RESULT.names or () if name != "q"}
-    q, settled = results["q"], results["status"] == PoseStatus.SETTLED
-    position = np.empty((len(poses), 3))
-    position[:, :2], position[:, 2] = poses[:, :2], q[:, 0]
-    if not settled.all():
-        position[~settled] = np.nan
-        same["wheel_speed"] = np.where(settled[:, None], results["wheel_speed"], np.nan)
-        asked = settled | (results["status"] == PoseStatus.STEERING)
-        same["steering_angle"] = np.where(asked[:, None], results["steering_angle"], np.nan)
-    sums = np.empty((3, len(poses)))
+def _write_sums(model: PackedModel, poses: np.ndarray, results: Any, start: Sums) -> None:
+    """Write distance, time and energy at poses (n, 3) into their RESULTs."""
+    sums, rate = np.empty((3, len(poses))), model.record.linkage.steering_rate
     add_up(view_read_only(poses), view_read_only(results), rate, start, sums)
-    distance, time, energy = sums
+    results["distance"], results["time"], results["energy"] = sums
+
+
+def _collect(
+    model: PackedModel,
+    poses: np.ndarray,
+    results: Any,
+    waypoint: np.ndarray,
+    between: PathPrediction | None = None,
+) -> PathPrediction:
     return PathPrediction(
         poses=poses,
-        settled=settled,
-        position=position,
-        roll=q[:, 1],
-        pitch=q[:, 2],
-        rocker_angle=q[:, 3:4] * (1.0, -1.0),
-        bogie_angle=q[:, 4:6],
-        energy=energy,
-        time=time,
-        distance=distance,
-        policy=POLICY_NAMES[int(settings["policy"])],
-        control_margin=float(settings["control_margin"]),
-        **same,
-        **more,
+        results=results,
+        waypoint=waypoint,
+        policy=POLICY_NAMES[int(model.settings["policy"])],
+        control_margin=float(model.settings["control_margin"]),
+        between=between,
     )

@@ -35,8 +35,8 @@ class SweepOptions:
     """
 
     policy: str = EQUAL
-    """EQUAL: equal torques on all wheels; SERVO: the torques of speed servos, on Coulomb ground;
-    OPTIMAL: the torques that need the least friction."""
+    """EQUAL: equal torques on all wheels; SERVO: the torques of speed servos, on firm ground and
+    soil; OPTIMAL: the torques that need the least friction."""
     control_margin: float = 0.0
     """Share of the limits of friction and torque that policy OPTIMAL leaves to the controller,
     0 to below 1; 0 is the physical limit. The other policies have none."""
@@ -46,7 +46,7 @@ class SweepOptions:
     max_torque: float | None = None
     """Largest wheel torque [N m] (default: that of the rover file)."""
     soil: str | None = None
-    """Preset soil where the terrain names none (default: Coulomb friction; docs/notes/soil.md)."""
+    """Preset soil where the terrain names none (default: Coulomb friction; docs/soil.md)."""
     joint_angles: Mapping[str, float] | JointAngles | None = None
     """Arm angles [rad] by joint name, stored as pairs. Joints left out are stowed; None stows
     all."""

@@ -13,12 +13,12 @@ from rover_physics.prediction.crossing import (
     climb_faces,
     join_crossings,
     limits_of,
-    select_results,
 )
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import find_remaining_jumps
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import SweptPath, evaluator, make_prediction, wheels_of
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import select_results
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 

@@ -1,7 +1,7 @@
 """Rover parameters: geometry, masses, actuators and safety limits; the keys of a rover file."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from rover_physics.files.rules import (
@@ -172,6 +172,9 @@ class Limits:
     """Smallest height of the belly over the ground in [m]."""
     wheel_drop: Annotated[float, number("m", least=0.0, most=MAX_COORDINATE)]
     """Largest height that a wheel may drop when it rolls off an edge in [m]."""
+    further: Annotated[dict[str, float], Keys({})] = field(default_factory=dict)
+    """Numbers of limits that a rover file may leave out, by the keys of the table of limits; in a
+    file they stand beside the others."""
 
 
 @dataclass(frozen=True)
@@ -242,6 +245,12 @@ class Rover:
         masses = self.masses
         sides = 2.0 * (masses.rocker.mass + masses.bogie.mass)
         return masses.body.mass + sides + 6.0 * self.wheel.mass
+
+    @property
+    def wheelbase(self) -> float:
+        """Distance from rear to front wheels in [m]."""
+        wheels = self.suspension.wheels
+        return float(wheels["front"][0] - wheels["rear"][0])
 
     @property
     def weight(self) -> float:

@@ -14,6 +14,7 @@ from rover_physics.rover.model import Rover
 def rover_to_dict(rover: Rover) -> dict[str, Any]:
     """Return the keys of a rover's file with their values; absent parts are left out."""
     contents: dict[str, Any] = _plain(asdict(rover))
+    contents["limits"] |= contents["limits"].pop("further")
     return contents
 
 

@@ -1,12 +1,15 @@
 """Rover files: presets, and YAML files with the same keys."""
 
+import math
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
-from rover_physics.files.validation import errors_of, read_as, show_file
+from rover_physics.files.validation import errors_of, read_as, refuse, show_file
 from rover_physics.files.yaml_file import read_yaml
+from rover_physics.limits.table import optional_keys
 from rover_physics.rover.checks import check_rover
 from rover_physics.rover.model import Rover
 
@@ -51,6 +54,22 @@ def rover_from_dict(data: object, source: str) -> Rover:
         RoverFileError: A key is missing, unknown or invalid; the text names the dotted key.
     """
     with errors_of(source):
+        data, further = _take_further_limits(data)
         rover: Rover = read_as(Rover, data, "a rover file")
+        if further:
+            rover = replace(rover, limits=replace(rover.limits, further=further))
         check_rover(rover)
     return rover
+
+
+def _take_further_limits(data: object) -> tuple[object, dict[str, float]]:
+    """Return the contents without the optional limits of the table, and these."""
+    limits = data.get("limits") if isinstance(data, dict) else None
+    keys = [key for key in optional_keys() if isinstance(limits, dict) and key in limits]
+    if not keys or not isinstance(data, dict) or not isinstance(limits, dict):
+        return data, {}
+    for key in keys:
+        if type(limits[key]) not in (int, float) or not math.isfinite(limits[key]):
+            raise refuse(f"limits.{key}", limits[key], "a finite number")
+    rest = {key: value for key, value in limits.items() if key not in keys}
+    return {**data, "limits": rest}, {key: float(limits[key]) for key in keys}

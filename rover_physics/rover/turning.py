@@ -17,7 +17,7 @@ def tightest_radius(rover: Rover) -> float:
     skids in curves; its smallest radius is its wheelbase.
     """
     if rover.steering is None:
-        return wheelbase(rover)
+        return rover.wheelbase
     limit = rover.steering.limit
     slope = math.inf if limit > 0.5 * math.pi - UPRIGHT else math.tan(limit)
     return max(abs(y) + abs(x) / slope for x, y in _steered_wheels(rover))
@@ -29,12 +29,6 @@ def can_turn_on_the_spot(rover: Rover) -> bool:
         return False
     needed = max(math.atan2(abs(x), abs(y)) for x, y in _steered_wheels(rover))
     return needed <= rover.steering.limit
-
-
-def wheelbase(rover: Rover) -> float:
-    """Return the distance from rear to front wheels [m]."""
-    wheels = rover.suspension.wheels
-    return float(wheels["front"][0] - wheels["rear"][0])
 
 
 def swing_radius(rover: Rover) -> float:

@@ -69,7 +69,7 @@ def soils_from_dict(data: object, source: str) -> dict[str, Soil]:
     """Build soils from the contents of a soil file.
 
     Args:
-        data: A mapping of names to mappings with the keys of a soil (notes/soil.md), SI units.
+        data: A mapping of names to mappings with the keys of a soil (docs/soil.md), SI units.
         source: File name or other origin, at the start of every error text.
 
     Raises:

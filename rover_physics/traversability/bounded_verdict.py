@@ -5,13 +5,19 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics.bounds.path import BOUNDED_VALUES
+from rover_physics.limits.table import NOT_COMPUTABLE
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.path_bounds import PathBounds
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_bounds import PathBounds
+from rover_physics.results.path_prediction import PathPrediction, tilt_of
+from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus
-from rover_physics.traversability.check import NOT_COMPUTABLE
-from rover_physics.traversability.verdict import Verdict, find_reasons
+from rover_physics.traversability.verdict import (
+    Verdict,
+    explain_rows,
+    find_largest_risk,
+    with_refusals,
+)
 
 _UNBOUNDED = {
     BoundStatus.ON_EDGE: ("not_settled", "a wheel may climb or fall off an edge"),
@@ -21,7 +27,7 @@ _UNBOUNDED = {
 }
 
 
-def judge_bounds(
+def judge_worst_case(
     rover: Rover, prediction: PathPrediction, bounds: PathBounds, verdict: Verdict
 ) -> Verdict:
     """Add the refusals of the bounds to a verdict; its own refusals remain.
@@ -38,8 +44,9 @@ def judge_bounds(
     """
     codes, reasons = list(verdict.codes), list(verdict.reasons)
     within = f"within {bounds.sigmas:g} sigma of the map"
-    for i, (code, reason) in enumerate(zip(*_find_worst(rover, prediction, bounds), strict=True)):
-        if not codes[i] and code:
+    worst, risk = _find_worst(rover, prediction, bounds)
+    for i, (code, reason) in worst.items():
+        if not codes[i]:
             codes[i], reasons[i] = code, f"{reason}, at worst {within}"
     for i, status in enumerate(bounds.status.tolist()):
         if not codes[i] and status in _UNBOUNDED:
@@ -56,15 +63,9 @@ def judge_bounds(
             if not codes[i]:
                 codes[i] = NOT_COMPUTABLE
                 reasons[i] = f"{name} cannot be computed {within}: a bound is not a number"
-    first: int = next((k for k, code in enumerate(codes) if code), -1)
     return replace(
-        verdict,
-        traversable=first < 0,
-        reasons=tuple(reasons),
-        codes=tuple(codes),
-        first_failure=first,
-        code=codes[first] if first >= 0 else "",
-        reason=reasons[first] if first >= 0 else "",
+        with_refusals(verdict, codes, reasons),
+        risk=max(verdict.risk, risk),
         map_sigmas=bounds.sigmas,
         tip_over_ratio_bound=_extreme(np.min, bounds.tip_over_ratio[bounds.bounded, 0]),
         friction_utilisation_bound=_extreme(np.max, bounds.friction_utilisation[needed, :, 1]),
@@ -81,17 +82,19 @@ def _extreme(choose, values: Floats) -> float:
 
 def _find_worst(
     rover: Rover, prediction: PathPrediction, bounds: PathBounds
-) -> tuple[list[str], list[str]]:
-    """Return code and reason of the limits broken in the worst case, empty if none is."""
+) -> tuple[dict[int, tuple[str, str]], float]:
+    """Return code and reason of the rows that break a limit in the worst case, and their risk."""
 
     def at(name: str, end: int) -> Floats:
         values = getattr(bounds, name)[..., end]
         return np.where(np.isnan(values), getattr(prediction, name), values)
 
-    worst = replace(
-        prediction,
-        roll=_largest(prediction.roll, bounds.roll),
-        pitch=_largest(prediction.pitch, bounds.pitch),
+    roll = _largest(prediction.roll, bounds.roll)
+    pitch = _largest(prediction.pitch, bounds.pitch)
+    worst = prediction.change(
+        roll=roll,
+        pitch=pitch,
+        tilt=tilt_of(roll, pitch),
         rocker_angle=at("rocker_angle", 0),
         bogie_angle=at("bogie_angle", 0),
         belly_clearance=at("belly_clearance", 0),
@@ -101,12 +104,15 @@ def _find_worst(
         torque_saturation=at("torque_saturation", 1),
         sinkage=at("sinkage", 1),
     )
-    other = replace(worst, rocker_angle=at("rocker_angle", 1), bogie_angle=at("bogie_angle", 1))
-    codes, reasons = find_reasons(rover, other)
-    for i, (code, reason) in enumerate(zip(*find_reasons(rover, worst), strict=True)):
-        if code and codes[i] != "suspension":
-            codes[i], reasons[i] = code, reason
-    return codes, reasons
+    other = worst.change(rocker_angle=at("rocker_angle", 1), bogie_angle=at("bogie_angle", 1))
+    limits, found, risk = limits_of(rover, prediction.policy), dict[int, tuple[str, str]](), 0.0
+    for part in (worst, other):
+        uses = find_uses(limits, part.results)
+        for row, refusal in explain_rows(rover, part, uses).items():
+            if row not in found or refusal[0] == "suspension":
+                found[row] = refusal
+        risk = max(risk, find_largest_risk(uses, part.settled))
+    return found, risk
 
 
 def _largest(value: Floats, bounds: Floats) -> Floats:

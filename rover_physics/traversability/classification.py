@@ -18,14 +18,13 @@ from rover_physics.names import (
 )
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.uses import Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
-from rover_physics.traversability.judge_poses import judge_poses
-from rover_physics.traversability.limit_checks import check_limits
-from rover_physics.traversability.verdict import Verdict, find_reasons
+from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_physics.traversability.verdict import Verdict, explain_rows
 
 PASSABLE = "passable"
 WITH_SPEED_SERVOS = "passable with speed servos"
@@ -227,18 +226,40 @@ def _look_between(rover: Rover, prediction: PathPrediction, decisions: list[_Dec
 
 
 def _decide_rows(rover: Rover, prediction: PathPrediction) -> Iterator[_Decision]:
-    checks = check_limits(rover, prediction)
-    wheels = {check.code: check.wheels() for check in checks}
-    margins = {check.code: check.margins() for check in checks}
-    codes, reasons = find_reasons(rover, prediction)
-    tightest = np.argmin([margins[code] for code in WHEEL_CONSTRAINTS], axis=0)
-    falls = np.asarray(prediction.falling.any(axis=1)).tolist()
-    for i, which in enumerate(tightest.tolist()):
+    """Yield the decision of each row: its first broken limit, else its tightest constraint."""
+    uses = find_uses(limits_of(rover, prediction.policy), prediction.results)
+    reasons, first = explain_rows(rover, prediction, uses), uses.find_first()
+    is_constraint = np.array([row.code in WHEEL_CONSTRAINTS for row in uses.limits.rows])
+    asked = np.where(is_constraint & ~np.isnan(uses.use), uses.use, -np.inf)
+    tightest = asked.argmax(axis=1)
+    for i in range(len(prediction.poses)):
         check_interruption()
-        code = codes[i] or WHEEL_CONSTRAINTS[which]
-        if code not in margins:
-            yield _Decision(code, -1, float("nan"), reasons[i])
-        elif falls[i] and not codes[i]:
-            yield _NOTHING_ASKED
+        code, reason = reasons.get(i, ("", ""))
+        if not prediction.settled[i]:
+            yield _Decision(code, -1, float("nan"), reason)
+        elif reason:
+            yield _decision(prediction, uses, (i, int(first[i])), code, reason)
+        elif asked[i].max() > -np.inf:
+            k = int(tightest[i])
+            yield _decision(prediction, uses, (i, k), uses.limits.rows[k].code, "")
         else:
-            yield _Decision(code, int(wheels[code][i]), float(margins[code][i]), reasons[i])
+            yield _NOTHING_ASKED
+
+
+def _decision(
+    prediction: PathPrediction, uses: Uses, at: tuple[int, int], code: str, reason: str
+) -> _Decision:
+    """Return the decision by the use `at` a row and a limit."""
+    row, k = at
+    limit, use = uses.limits.rows[k], float(uses.use[row, k])
+    margin = 1.0 - use if limit.has_number or use <= 1.0 else float("nan")
+    return _Decision(code, find_wheel(prediction, uses, row, k), margin, reason)
+
+
+def find_wheel(prediction: PathPrediction, uses: Uses, row: int, k: int) -> int:
+    """Return the index of the wheel that decides limit k at a row, -1 if none does."""
+    limit = uses.limits.rows[k]
+    if limit.wheel_of:
+        return int(np.argmax(getattr(prediction, limit.wheel_of)[row]))
+    is_of_wheels = uses.limits.records["count"][k] == len(WHEELS) and not limit.elements
+    return int(uses.element[row, k]) if is_of_wheels else -1

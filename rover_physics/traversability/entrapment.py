@@ -12,23 +12,24 @@ places. The waypoint where the way back fails is the point of no return. Ways on
 straight ahead and in curves: from the end of the path, and from just past the point of no return.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rover_physics.forces.soil import use_of_shear
+from rover_physics.limits.table import TRAPPED
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import SweptPath
+from rover_physics.prediction.parts import PART, sweep_in_parts
+from rover_physics.prediction.sweep import SweptPath, sweep_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.prediction.way_back import predict_way_back
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.check import TOLERANCE, largest_of
-from rover_physics.traversability.first_failure import sweep_until_failure
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.verdict import Verdict, hold_against_limits
 
 LOOK_AHEAD = 1.5
 """Length of a way on [wheelbases], in addition to the distance from the point of no return."""
@@ -61,11 +62,11 @@ class Course:
     """(n,) True where the way back has to be judged, see `find_one_way`."""
     drop: np.ndarray
     """(n,) largest drop of a wheel at a waypoint or on the way to it [m]."""
-    judge_back: Callable[[slice], Verdict]
-    """Judges the way back over waypoints, which are in the order of the way in."""
+    swept: SweptPath | None
+    """What the way in was judged by; None if it was not kept."""
 
 
-def course_of(rover: Rover, terrain: Terrain, swept: SweptPath, options: SweepOptions) -> Course:
+def course_of(rover: Rover, swept: SweptPath, options: SweepOptions) -> Course:
     """Return the course of a swept path; `options` are those of the sweep."""
     prediction = swept.prediction
     return Course(
@@ -73,11 +74,11 @@ def course_of(rover: Rover, terrain: Terrain, swept: SweptPath, options: SweepOp
         prediction.distance,
         find_one_way(rover, prediction, options),
         prediction.wheel_drop.max(axis=1),
-        lambda waypoints: _judge_way_back(rover, terrain, swept, waypoints, options),
+        swept,
     )
 
 
-def ask_for_ways_out(
+def refuse_if_trapped(
     rover: Rover, terrain: Terrain, course: Course, verdict: Verdict, options: SweepOptions
 ) -> Verdict:
     """Return the verdict, refused as "trapped" if there is neither a way on nor a way back.
@@ -94,8 +95,9 @@ def ask_for_ways_out(
     one_way = np.flatnonzero(course.one_way[:end])
     if not one_way.size:
         return verdict
-    run_up = distance[one_way[0]] - RUN_UP * _wheelbase(rover)
-    back = course.judge_back(slice(int(np.searchsorted(distance, max(run_up, 0.0))), end))
+    run_up = distance[one_way[0]] - RUN_UP * rover.wheelbase
+    inside = slice(int(np.searchsorted(distance, max(run_up, 0.0))), end)
+    back = _judge_way_back(rover, terrain, course, inside, options)
     if back.traversable:
         return verdict
     stop = end - 1 - back.first_failure  # the way back is blocked here
@@ -131,23 +133,21 @@ def _resists_way_back(
     if prediction.policy == SERVO:
         return _uses_much(rover, prediction, options)
     resistance = prediction.motion_resistance
-    if not largest_of(resistance) > 0.0:
+    if not np.any(resistance > 0.0):
         return np.zeros(len(resistance), dtype=bool)
-    broken = np.zeros(resistance.shape, dtype=bool)
     wheels = np.nonzero(resistance > 0.0)
     direction = np.where(prediction.wheel_speed[wheels] < 0.0, -1.0, 1.0)
     R, N = resistance[wheels], prediction.wheel_loads[wheels]
     T, S = -direction * prediction.tangential[wheels], prediction.lateral[wheels]
     largest = prediction.friction[wheels] * N + R
-    use = np.vectorize(use_of_shear, otypes=[float])(T, S, R, largest)
     most = options.max_torque or rover.wheel.max_torque
-    saturation = rover.wheel.radius * np.abs(T + R) / most
-    limits = rover.limits
-    broken[wheels] = ~(
-        (use <= limits.friction_utilisation + TOLERANCE)
-        & (saturation <= limits.torque_saturation + TOLERANCE)
-    )
-    return np.asarray(broken.any(axis=1))
+    friction, torque = np.zeros(resistance.shape), np.zeros(resistance.shape)
+    friction[wheels] = np.vectorize(use_of_shear, otypes=[float])(T, S, R, largest)
+    torque[wheels] = rover.wheel.radius * np.abs(T + R) / most
+    back = prediction.change(friction_utilisation=friction, torque_saturation=torque)
+    uses = find_uses(limits_of(rover, prediction.policy), back.results)
+    by_forces = [row.code in ("friction", "torque") for row in uses.limits.rows]
+    return np.asarray(prediction.settled & (uses.use[:, by_forces] > 1.0).any(axis=1))
 
 
 def _uses_much(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
@@ -159,22 +159,18 @@ def _uses_much(rover: Rover, prediction: PathPrediction, options: SweepOptions) 
 
 
 def _judge_way_back(
-    rover: Rover, terrain: Terrain, swept: SweptPath, waypoints: slice, options: SweepOptions
+    rover: Rover, terrain: Terrain, course: Course, waypoints: slice, options: SweepOptions
 ) -> Verdict:
     """Judge the way back over waypoints; from the results of the way in where they do not differ.
 
     They do on soil and with speed servos.
     """
     reverse = replace(options, backward=not options.backward)
-    poses = swept.prediction.poses[waypoints][::-1]
     model = pack_model(rover, terrain, reverse)
-    if model.settings.on_soil or reverse.policy == SERVO:
-        return _judge_way(rover, terrain, poses, reverse)
-    verdict = judge(rover, predict_way_back(rover, terrain, model, swept, waypoints))
-    if verdict.traversable or reverse.policy == EQUAL:
-        return verdict
-    equal = sweep_until_failure(rover, terrain, [poses], replace(reverse, policy=EQUAL))[0][1]
-    return equal if equal.traversable else verdict
+    if course.swept is None or model.settings.on_soil or reverse.policy == SERVO:
+        return _judge_way(rover, terrain, course.path[waypoints][::-1], reverse)
+    back = predict_way_back(rover, terrain, model, course.swept, waypoints)
+    return hold_against_limits(rover, back)
 
 
 def _judge_way(
@@ -183,9 +179,25 @@ def _judge_way(
     """Judge a way under the first of `policies_of_ways` that passes it, else under the last."""
     for policy in policies_of_ways(options):
         asked = replace(options, policy=policy)
-        verdict = sweep_until_failure(rover, terrain, [poses], asked)[0][1]
+        verdict = _judge_to_failure(rover, terrain, np.ascontiguousarray(poses), asked)
         if verdict.traversable:
             break
+    return verdict
+
+
+def _judge_to_failure(
+    rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
+) -> Verdict:
+    """Judge a way up to its first failure; long ones in parts, to keep little in memory."""
+    if len(poses) <= PART:
+        model = pack_model(rover, terrain, options)
+        swept = sweep_paths(terrain, model, [poses], stop_at_failure=True)[0]
+        return hold_against_limits(rover, swept.prediction)
+    for part in sweep_in_parts(rover, terrain, poses, options):
+        verdict = hold_against_limits(rover, part.prediction)
+        if not verdict.traversable:
+            at = part.first - part.context + verdict.first_failure
+            return replace(verdict, first_failure=at)
     return verdict
 
 
@@ -198,11 +210,6 @@ def policies_of_ways(options: SweepOptions) -> tuple[str, ...]:
     return (EQUAL, OPTIMAL) if options.policy == OPTIMAL else (options.policy,)
 
 
-def _wheelbase(rover: Rover) -> float:
-    wheels = rover.suspension.wheels
-    return wheels["front"][0] - wheels["rear"][0]
-
-
 def _find_way_on(
     rover: Rover, terrain: Terrain, course: Course, inside: slice, options: SweepOptions
 ) -> str:
@@ -210,7 +217,7 @@ def _find_way_on(
 
     The rover can move within the waypoints `inside`.
     """
-    wheelbase, distance = _wheelbase(rover), course.distance
+    wheelbase, distance = rover.wheelbase, course.distance
     end = inside.stop - 1
     room = distance[end] - distance[inside.start]
     length = min(LOOK_AHEAD * wheelbase + room, MAX_LOOK_AHEAD * wheelbase)
@@ -267,13 +274,13 @@ def _refuse(rover: Rover, verdict: Verdict, stop: int, drop: float, ways: str) -
     what = f"a wheel drops {drop:.3f} m" if fell else "from here the rover goes in but not out"
     reason = f"trapped: {what}; {ways}"
     codes, reasons = list(verdict.codes), list(verdict.reasons)
-    codes[stop], reasons[stop] = "trapped", reason
+    codes[stop], reasons[stop] = TRAPPED, reason
     return replace(
         verdict,
         traversable=False,
         codes=tuple(codes),
         reasons=tuple(reasons),
         first_failure=stop,
-        code="trapped",
+        code=TRAPPED,
         reason=reason,
     )

@@ -7,25 +7,20 @@ The verdicts are the same as its own.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.names import EQUAL, SERVO
+from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.crossing import limits_of as jump_limits_of
-from rover_physics.prediction.crossing import (
-    place_results,
-    select_results,
-    turn_wheels,
-)
+from rover_physics.prediction.crossing import turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE
-from rover_physics.prediction.evaluation import unwritten_results
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_kernels import (
     FACE,
@@ -35,29 +30,26 @@ from rover_physics.prediction.path_kernels import (
     way_between,
 )
 from rover_physics.prediction.path_motion import path_motions
-from rover_physics.prediction.sweep import check_poses, evaluator, joined_paths, wheels_of
+from rover_physics.prediction.sweep import (
+    check_poses,
+    evaluator,
+    find_suspects,
+    joined_paths,
+    wheels_of,
+)
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.record import (
+    place_results,
+    select_results,
+    unwritten_results,
+)
+from rover_physics.results.uses import find_codes, readable
 from rover_physics.rover.model import Rover
-from rover_physics.rover.turning import wheelbase
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.first_failure import (
-    SuspectLimits,
-    find_suspects,
-    suspect_limits_of,
-)
-from rover_physics.traversability.judge_path import judge_paths
-from rover_physics.traversability.judge_poses import judge_results
-from rover_physics.traversability.risk import (
-    RiskLimits,
-    add_exposure,
-    find_exposure,
-    risk_limits_of,
-)
-from rover_physics.traversability.servo_checks import MAX_SLIDE, MAX_TURN_OFF
+from rover_physics.traversability.exposure import add_exposure, find_exposure
+from rover_physics.traversability.judge import judge_paths
 
-NUMBERS = 3
-"""Numbers of a piece that passes: time, energy and exposure."""
 STRIDE = 8
 """Every so many waypoints of a piece are evaluated first, then the others."""
 
@@ -116,7 +108,7 @@ def judge_pieces(
         options,
         sigmas=sigmas,
         stop_at_failure=True,
-        ask_ways_out=False,
+        check_entrapment=False,
     )
     for k, (prediction, verdict) in zip(rest, judged, strict=True):
         if verdict.traversable:
@@ -127,19 +119,21 @@ def judge_pieces(
     return [verdict for verdict in verdicts if verdict is not None]
 
 
-class _Ease(NamedTuple):
+class CloseLook(NamedTuple):
     """What a piece must keep to pass without a closer look."""
 
-    limits: SuspectLimits
-    """Limits of the waypoints."""
+    limits: np.ndarray
+    """(k,) LIMIT of the waypoints."""
     steepest: float
     """Least contact angle behind a wheel [rad]; no wheel falls from there."""
     most_turn: float
     """Largest turn off the path [rad]."""
     most_slide: float
     """Largest way off the path [m]."""
-    risk: RiskLimits
-    """Limits that count as risk."""
+    reach: float
+    """Distance of the outermost wheel from the body origin [m]."""
+    steering_rate: float
+    """Largest speed of the steering [rad/s]."""
 
 
 class _Sweep:
@@ -153,9 +147,6 @@ class _Sweep:
         options: SweepOptions,
     ):
         self._rover, self._model = rover, pack_model(rover, terrain, options)
-        # Equal torques may pass what only the control margin of other torques refuses.
-        physical = pack_model(rover, terrain, replace(options, control_margin=0.0))
-        self._sure = suspect_limits_of(rover, physical)
         poses = [check_poses(piece) for piece in pieces]
         self._counts = np.array([len(one) for one in poses])
         self._poses = np.concatenate(poses)
@@ -177,12 +168,10 @@ class _Sweep:
             results = evaluator(self._model)(self._poses[rows], motions=self._motions[rows])
             place_results(results, self._results, rows)
             fails = np.zeros(len(rows), bool)
-            mark_failures(view_read_only(results), self._sure, fails)
+            mark_failures(*readable(results), self._model.limits.records, fails)
             failed, first = np.unique(piece[rows[fails]], return_index=True)
             at = np.flatnonzero(fails)[first]
-            found = judge_results(
-                self._rover, self._model, self._poses[rows[at]], select_results(results, at)
-            )
+            found = find_codes(self._model.limits, select_results(results, at))
             codes |= {k: code for k, code in zip(failed.tolist(), found, strict=True) if code}
             self._is_open[list(codes)] = False
         return codes
@@ -204,73 +193,74 @@ class _Sweep:
         limits, far = jump_limits_of(wheels), np.empty_like(jumps)
         jumps = jumps[: find_jumps(results, poses, joined, limits, jumps)]
         far = far[: find_turns(results, poses, joined, limits, far)]
-        numbers, ease = np.full((len(indices), NUMBERS), np.nan), self._ease()
-        sums = np.empty((3, len(poses)))
-        path = view_read_only(poses), view_read_only(results), ends, sums
-        turns = view_read_only(turned.results), np.searchsorted(turned.waypoint, ends)
-        linkage = self._model.record.linkage
-        size = wheels.reach, linkage.steering_rate
-        sum_up_pieces(path, turns, ease, size, numbers)
+        found, sums = np.full((len(indices), 3), np.nan), np.empty((3, len(poses)))
+        path = view_read_only(poses), readable(results), ends
+        turns = readable(turned.results), np.searchsorted(turned.waypoint, ends)
+        sum_up_pieces(path, turns, self._close_look(), sums, found)
         closer = np.append(jumps[:, 0], far[:, 0])
-        numbers[np.searchsorted(ends, closer, side="right"), 0] = np.nan
+        found[np.searchsorted(ends, closer, side="right"), 0] = np.nan
         return {
             k: PieceVerdict("", *row)
-            for k, row in zip(indices.tolist(), numbers.tolist(), strict=True)
+            for k, row in zip(indices.tolist(), found.tolist(), strict=True)
             if row[0] == row[0]
         }
 
-    def _ease(self) -> _Ease:
+    def _close_look(self) -> CloseLook:
         """Return what a piece must keep to pass without a closer look."""
         on_servos = bool(self._model.settings.policy == TorquePolicy.SERVO)
-        return _Ease(
-            suspect_limits_of(self._rover, self._model),
+        linkage = self._model.record.linkage
+        return CloseLook(
+            self._model.limits.records,
             -MIN_ANGLE if on_servos else -FACE,
             MAX_TURN_OFF if on_servos else np.inf,
-            MAX_SLIDE * wheelbase(self._rover) if on_servos else np.inf,
-            risk_limits_of(self._rover, SERVO if on_servos else EQUAL),
+            MAX_SLIDE * self._rover.wheelbase if on_servos else np.inf,
+            float(linkage.reach),
+            float(linkage.steering_rate),
         )
 
 
 @exact_kernel
-def mark_failures(results, limits, fails):
+def mark_failures(results, numbers, limits, fails):
     """Write True into fails (n,) for RESULTs (n,) that break a limit in any case."""
     for row in range(results.size):
-        fails[row] = find_suspects(results[row : row + 1], limits)[1] >= 0
+        here = slice(row, row + 1)
+        fails[row] = find_suspects(results[here], numbers[here], limits)[1] >= 0
 
 
 @exact_kernel
-def sum_up_pieces(path, turns, ease, size, numbers):
-    """Write the numbers of the pieces that pass without a closer look.
+def sum_up_pieces(path, turns, look, sums, found):
+    """Write time, energy and exposure of the pieces that pass without a closer look.
 
     Args:
-        path: (n, 3) poses of all pieces, (n,) their RESULTs, (k,) the rows where pieces end, and
-            (3, n) work space.
-        turns: (m,) RESULTs where wheels turn at a waypoint, and (k,) the rows where those of the
+        path: (n, 3) poses of all pieces, their results as of `readable`, and (k,) the rows where
             pieces end.
-        ease: _Ease.
-        size: Distance of the outermost wheel from the body origin [m], and the largest speed of
-            the steering [rad/s].
-        numbers: (k, NUMBERS) time [s], energy [J] and exposure [s], written for pieces that pass.
+        turns: Results where wheels turn at a waypoint, and (k,) the rows where those of the pieces
+            end.
+        look: CloseLook.
+        sums: (3, n) work space.
+        found: (k, 3) time [s], energy [J] and exposure [s], written for pieces that pass.
     """
-    (poses, results, ends, sums), (turned, turned_ends) = path, turns
-    reach, rate = size
+    (poses, (results, numbers), ends), ((turned, turned_numbers), turned_ends) = path, turns
     first, first_turn = 0, 0
     for k in range(ends.size):
         piece, its_turns = slice(first, ends[k]), slice(first_turn, turned_ends[k])
         first, first_turn = ends[k], turned_ends[k]
-        if not (_is_easy(results[piece], ease) and _is_easy(turned[its_turns], ease)):
+        if not (
+            _is_easy(results[piece], numbers[piece], look)
+            and _is_easy(turned[its_turns], turned_numbers[its_turns], look)
+            and _keeps_to_path(poses[piece], results[piece], look)
+        ):
             continue
-        if not _keeps_to_path(poses[piece], results[piece], ease, reach):
-            continue
-        last = add_up(poses[piece], results[piece], rate, (0.0, 0.0, 0.0), sums[:, piece])
-        numbers[k, 0], numbers[k, 1] = last[1], last[2]
-        numbers[k, 2] = add_exposure(results[piece], sums[1, piece], ease.risk)
+        start = (0.0, 0.0, 0.0)
+        last = add_up(poses[piece], results[piece], look.steering_rate, start, sums[:, piece])
+        found[k, 0], found[k, 1] = last[1], last[2]
+        found[k, 2] = add_exposure(numbers[piece], sums[1, piece], look.limits)
 
 
 @exact_kernel
-def _is_easy(results, ease):
+def _is_easy(results, numbers, look):
     """Return whether no RESULT may break a limit and no wheel may fall or lift."""
-    if find_suspects(results, ease.limits)[0] >= 0:
+    if find_suspects(results, numbers, look.limits)[0] >= 0:
         return False
     for row in range(results.size):
         result = results[row]
@@ -278,21 +268,21 @@ def _is_easy(results, ease):
             angle = result.contact_angle[wheel]
             if result.wheel_speed[wheel] < 0.0:
                 angle = -angle
-            if angle < ease.steepest or result.lift_rate[wheel] > 0.0:
+            if angle < look.steepest or result.lift_rate[wheel] > 0.0:
                 return False
     return True
 
 
 @exact_kernel
-def _keeps_to_path(poses, results, ease, reach):
+def _keeps_to_path(poses, results, look):
     """Return whether the deviations from the path stay small, whatever their directions."""
     turn, slide = 0.0, 0.0
     for row in range(1, results.size):
-        way = way_between(poses[row - 1], poses[row], reach)
+        way = way_between(poses[row - 1], poses[row], look.reach)
         for i in range(row - 1, row + 1):
             x, y, rate = results[i].deviation[0], results[i].deviation[1], results[i].deviation[2]
             if x != 0.0 or y != 0.0 or rate != 0.0:
                 share = 0.5 * way / results[i].speed_share
                 turn += share * abs(rate)
                 slide += share * np.hypot(x, y)
-    return turn <= ease.most_turn and slide <= ease.most_slide
+    return turn <= look.most_turn and slide <= look.most_slide

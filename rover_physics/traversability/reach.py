@@ -11,13 +11,14 @@ from rover_physics.errors import ModelError, PoseError
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import check_poses, sweep_path
+from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.manipulator import as_vector, distance_to_reach, inverse_kinematics
 from rover_physics.rover.model import Manipulator, Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.judge import judge_poses
+from rover_physics.traversability.verdict import Verdict
 
 NO_LOAD = (0.0, 0.0, 0.0)
 """Neither force nor moment on the tool."""
@@ -93,7 +94,7 @@ def judge_reach(
         terrain: The ground.
         pose: (3,) x, y [m] and yaw [rad] of base_link, map frame.
         target: (3,) point that the tip of the arm has to reach [m], map frame.
-        options: As for `sweep_path`; its arm angles, tool load and control margin are ignored.
+        options: As for `judge_path`; its arm angles, tool load and control margin are ignored.
         force: (3,) force of the surroundings on the tip [N], map frame (default: none). A tool
             that presses on the ground is pushed up.
         moment: (3,) moment of the surroundings on the tip [N m], map frame (default: none).
@@ -121,9 +122,9 @@ def judge_reach(
     at_rest = replace(
         options, joint_angles=None, tool_force=None, tool_moment=None, control_margin=0.0
     )
-    standing = sweep_path(rover, terrain, poses, at_rest)
+    standing, verdict = judge_poses(rover, terrain, poses, None, at_rest, sigmas=0)
     if not standing.settled[0]:
-        return _refuse_to_stand(judge(rover, standing))
+        return _refuse_to_stand(verdict)
     to_map = _attitude(standing)
     local = to_map.T @ (point - standing.position[0])
     solutions = inverse_kinematics(arm, local)
@@ -137,8 +138,8 @@ def judge_reach(
             tool_force=to_map.T @ load[0],
             tool_moment=to_map.T @ load[1],
         )
-        prediction = sweep_path(rover, terrain, poses, reaching)
-        answers.append(_answer(judge(rover, prediction), local, reaching, prediction))
+        prediction, verdict = judge_poses(rover, terrain, poses, None, reaching, sigmas=0)
+        answers.append(_answer(verdict, local, reaching, prediction))
     return max(answers, key=_safety)
 
 

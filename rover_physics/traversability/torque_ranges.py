@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.read_only import freeze_fields
-from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work, set_pose
+from rover_physics.prediction.evaluation import evaluate_pose, new_work, set_pose
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.record import new_results
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain

@@ -1,4 +1,4 @@
-"""Verdict on a prediction: whether each waypoint keeps the safety limits, and if not, why."""
+"""Verdict on a prediction: whether each waypoint keeps the limits, and if not, why."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -6,59 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.limits.table import DEGREES, NOT_COMPUTABLE, Sense, list_codes
 from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import find_column, numbers_of
+from rover_physics.results.uses import Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.check import NOT_COMPUTABLE, compare, largest_of
-from rover_physics.traversability.limit_checks import check_limits
 
-CODES = (
-    "steering",
-    "off_map",
-    "unknown_ground",
-    "not_settled",
-    "no_equilibrium",
-    "not_computable",
-    "suspension",
-    "tilt",
-    "tip_over",
-    "wheel_lift",
-    "sinkage",
-    "friction",
-    "torque",
-    "wheel_drop",
-    "belly",
-    "trapped",
-)
-"""Codes of a verdict; the first that applies is the reason of a waypoint."""
-MARGIN_CODES = ("friction", "torque")
-"""Codes of the limits that a control margin reduces; their reasons name it."""
-UNNEEDED_IN_A_FALL = ("wheel_lift", "sinkage", "friction", "torque")
-"""Codes of limits that do not count while a wheel rolls off an edge."""
-LOWEST = (
-    "min_tip_over_ratio",
-    "min_belly_clearance",
-    "tip_over_ratio_bound",
-    "belly_clearance_bound",
-)
-"""Fields of a verdict that are the smallest value on the path."""
-LARGEST = (
-    "max_friction_utilisation",
-    "max_torque_saturation",
-    "max_tilt",
-    "max_wheel_drop",
-    "max_sinkage",
-    "friction_utilisation_bound",
-    "torque_saturation_bound",
-    "tilt_bound",
-)
-"""Fields of a verdict that are the largest value on the path."""
-_LOWER_LIMITS = ("tip_over", "wheel_lift", "belly")
-"""Codes of limits that are lower bounds."""
-_PLACELESS = {
+UNSETTLED = {
+    PoseStatus.STEERING: ("steering", ""),
     PoseStatus.OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
     PoseStatus.UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
     PoseStatus.NOT_SETTLED: (
@@ -74,6 +33,26 @@ _PLACELESS = {
         "a wheel load, torque or margin cannot be computed: it is not a finite number",
     ),
 }
+"""Code and reason of the status of a row that is not settled; those of steering depend on it."""
+EXTREMES = {
+    "min_tip_over_ratio": ("tip_over_ratio", np.fmin),
+    "max_friction_utilisation": ("friction_utilisation", np.fmax),
+    "max_torque_saturation": ("torque_saturation", np.fmax),
+    "max_tilt": ("tilt", np.fmax),
+    "min_belly_clearance": ("belly_clearance", np.fmin),
+    "max_wheel_drop": ("wheel_drop", np.fmax),
+    "max_sinkage": ("sinkage", np.fmax),
+}
+"""Fields of a verdict that are the extreme of a quantity, and which of two values is worse."""
+BOUNDS = {
+    "tip_over_ratio_bound": np.fmin,
+    "friction_utilisation_bound": np.fmax,
+    "torque_saturation_bound": np.fmax,
+    "tilt_bound": np.fmax,
+    "belly_clearance_bound": np.fmin,
+}
+"""Fields of a verdict that are the worst case on an uncertain map."""
+_REST_IN_A_FALL = ("friction_utilisation", "torque_saturation")
 
 
 @dataclass(frozen=True)
@@ -108,6 +87,9 @@ class Verdict:
     """Largest drop of a wheel that rolled off an edge [m]."""
     max_sinkage: float
     """Largest sinkage of a wheel on the settled part [m]; 0 on ground that does not yield."""
+    risk: float = 0.0
+    """Largest use of the limits that count as risk, on the way and, on an uncertain map, in the
+    worst case; 1 is at a limit. Paths of equal length are compared by it."""
     map_sigmas: float = 0.0
     """Number of standard deviations by which the map's heights may be wrong; 0 if it is exact."""
     tip_over_ratio_bound: float = float("nan")
@@ -126,96 +108,90 @@ class Verdict:
         return to_plain({field.name: getattr(self, field.name) for field in fields(self)})
 
 
-def judge(rover: Rover, prediction: PathPrediction) -> Verdict:
-    """Compare a prediction with the limits of the rover.
+def codes_of_verdicts() -> tuple[str, ...]:
+    """Return the codes of a verdict; the first that applies is the reason of a waypoint."""
+    return list_codes(tuple(code for code, _ in UNSETTLED.values()))
 
-    The reason of a waypoint is the first broken limit in the order of CODES. A limit broken on the
-    way to a waypoint counts there if the waypoint itself keeps all limits.
+
+def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
+    """Return the verdict on a prediction.
+
+    The reason of a waypoint is the first broken limit in the order of the table. A limit broken on
+    the way to a waypoint counts there if the waypoint itself keeps all limits.
     """
-    found, extremes = _hold_against_limits(rover, prediction)
-    between = prediction.between
-    if between is not None and len(between.poses):
-        on_the_way, others = _hold_against_limits(rover, between)
-        for row in sorted(on_the_way):
-            code, reason = on_the_way[row]
-            found.setdefault(int(between.waypoint[row]), (code, f"on the way here: {reason}"))
-        extremes = {
-            code: float((np.fmin if code in _LOWER_LIMITS else np.fmax)(value, others[code]))
-            for code, value in extremes.items()
-        }
-    first = min(found, default=-1)
-    code, reason = found.get(first, ("", ""))
-    codes, reasons = _spread_out(found, len(prediction.poses))
+    limits = limits_of(rover, prediction.policy)
+    n = len(prediction.poses)
+    codes, reasons, extremes, risk = [""] * n, [""] * n, dict[str, float](), 0.0
+    for part in (prediction, prediction.between):
+        if part is None or not len(part.poses):
+            continue
+        uses = find_uses(limits, part.results)
+        for row, (code, reason) in explain_rows(rover, part, uses).items():
+            waypoint = int(part.waypoint[row])
+            if not codes[waypoint]:
+                way = "" if part is prediction else "on the way here: "
+                codes[waypoint], reasons[waypoint] = code, f"{way}{reason}"
+        for name, value in _find_extremes(part).items():
+            extremes[name] = float(EXTREMES[name][1](value, extremes.get(name, np.nan)))
+        risk = max(risk, find_largest_risk(uses, part.settled))
+    first = next((i for i, code in enumerate(codes) if code), -1)
     return Verdict(
         traversable=first < 0,
         reasons=tuple(reasons),
         codes=tuple(codes),
         first_failure=first,
-        code=code,
-        reason=reason,
+        code=codes[first] if first >= 0 else "",
+        reason=reasons[first] if first >= 0 else "",
         policy=prediction.policy,
-        min_tip_over_ratio=extremes["tip_over"],
-        max_friction_utilisation=extremes["friction"],
-        max_torque_saturation=extremes["torque"],
-        max_tilt=extremes["tilt"],
-        min_belly_clearance=extremes["belly"],
-        max_wheel_drop=extremes["wheel_drop"],
-        max_sinkage=extremes["sinkage"],
+        risk=risk,
+        **extremes,
     )
 
 
-def find_first_failure(rover: Rover, prediction: PathPrediction) -> int:
-    """Return the first failure that `judge` finds, -1 if there is none, without the reasons."""
-    first = len(prediction.poses)
-    for part in (prediction, prediction.between):
-        if part is None or not len(part.poses):
-            continue
-        broken = part.status != PoseStatus.SETTLED
-        needed = _where_forces_count(part)
-        for check in check_limits(rover, part):
-            if check.breaks:
-                counts = needed if check.code in UNNEEDED_IN_A_FALL else True
-                broken = broken | (check.broken() & part.settled & counts)
-        first = min(first, int(part.waypoint[broken].min(initial=first)))
-    return first if first < len(prediction.poses) else -1
+def explain_rows(
+    rover: Rover, prediction: PathPrediction, uses: Uses
+) -> dict[int, tuple[str, str]]:
+    """Return code and reason of each row that does not pass, in the order of the rows."""
+    first = uses.find_first()
+    found: dict[int, tuple[str, str]] = {}
+    for row in np.flatnonzero((first >= 0) | ~prediction.settled).tolist():
+        check_interruption()
+        status = PoseStatus(prediction.status[row])
+        if status == PoseStatus.STEERING:
+            found[row] = "steering", _explain_steering(rover, prediction.steering_angle[row])
+        elif status != PoseStatus.SETTLED:
+            found[row] = UNSETTLED[status]
+        else:
+            found[row] = explain_use(prediction, uses, row, int(first[row]))
+    return found
 
 
-def forgive(verdict: Verdict, other: Verdict) -> Verdict:
-    """Return a verdict without its refusals of waypoints that another verdict does not refuse.
-
-    Args:
-        verdict: The verdict.
-        other: The verdict on the same path under another policy.
-    """
-    refused = [bool(code) for code in other.codes]
-    codes = [code if keep else "" for code, keep in zip(verdict.codes, refused, strict=True)]
-    reasons = [text if keep else "" for text, keep in zip(verdict.reasons, refused, strict=True)]
-    return with_refusals(verdict, codes, reasons)
-
-
-def name_margin(verdict: Verdict, physical: Verdict, margin: float) -> Verdict:
-    """Return a verdict whose refusals that are due to its control margin alone say so.
-
-    Args:
-        verdict: The verdict with a control margin.
-        physical: The verdict on the same path without one.
-        margin: The control margin.
-    """
-    waypoints = [
-        i
-        for i, code in enumerate(verdict.codes)
-        if code and code not in MARGIN_CODES and not physical.codes[i]
-    ]
-    return name_margin_at(verdict, waypoints, margin)
+def explain_use(prediction: PathPrediction, uses: Uses, row: int, k: int) -> tuple[str, str]:
+    """Return code and reason of limit k, which a settled row breaks."""
+    limit, bound = uses.limits.rows[k], uses.limits.bounds[k]
+    element = int(uses.element[row, k])
+    numbers = numbers_of(prediction.results)[row]
+    value = float(numbers[find_column(limit.reads)[0] + element])
+    if np.isnan(value):
+        quantity = limit.reads.replace("_", " ")
+        return NOT_COMPUTABLE, f"{quantity} cannot be computed: it is not a number"
+    if limit.sense == Sense.RANGE:
+        bound = bound[0] if value < bound[0] else bound[1]
+    margin = 1.0 - float(prediction.results["kept_share"][row]) if limit.keeps_margin else 0.0
+    reason = limit.words.format(
+        element=(limit.elements or WHEELS)[element],
+        value=limit.unit.write(value),
+        compared=limit.unit.compare(value, bound * (1.0 - margin)),
+        policy=prediction.policy,
+    )
+    named = f" ({bound:g} less control margin {margin:g})" if margin > 0.0 else ""
+    return limit.code, f"{reason}{named}"
 
 
-def name_margin_at(verdict: Verdict, waypoints: Sequence[int], margin: float) -> Verdict:
-    """Return a verdict that names the control margin as the reason of some waypoints' refusals."""
-    codes, reasons = list(verdict.codes), list(verdict.reasons)
-    for i in waypoints:
-        codes[i] = "torque"
-        reasons[i] = f"no torques within their limit less control margin {margin:g}"
-    return with_refusals(verdict, codes, reasons)
+def find_largest_risk(uses: Uses, settled: np.ndarray) -> float:
+    """Return the largest use of the limits that count as risk at the settled rows, 0 for none."""
+    counts = uses.limits.records["is_risk"] > 0
+    return float(np.fmax.reduce(uses.use[settled][:, counts], axis=None, initial=0.0))
 
 
 def with_refusals(verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]) -> Verdict:
@@ -234,69 +210,34 @@ def with_refusals(verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]
 
 def worst_of(verdict: Verdict, other: Verdict) -> Verdict:
     """Return a verdict with the worse of two verdicts' extremes; the rest is the second's."""
-    extremes = {name: float(np.fmin(getattr(verdict, name), getattr(other, name)))
-                for name in LOWEST}  # fmt: skip
-    extremes |= {name: float(np.fmax(getattr(verdict, name), getattr(other, name)))
-                 for name in LARGEST}  # fmt: skip
+    worse = {name: choose for name, (_, choose) in EXTREMES.items()} | BOUNDS | {"risk": np.fmax}
+    extremes = {
+        name: float(choose(getattr(verdict, name), getattr(other, name)))
+        for name, choose in worse.items()
+    }
     return replace(other, **extremes)  # type: ignore[arg-type]
 
 
-def find_reasons(rover: Rover, prediction: PathPrediction) -> tuple[list[str], list[str]]:
-    """Return code and reason of each row of a prediction, empty if passable."""
-    return _spread_out(_hold_against_limits(rover, prediction)[0], len(prediction.poses))
+def _find_extremes(prediction: PathPrediction) -> dict[str, float]:
+    """Return the EXTREMES of a prediction; NaN where no row has the quantity."""
+    falls = prediction.falling.any(axis=1)
+    found = {}
+    for name, (quantity, worse) in EXTREMES.items():
+        values = getattr(prediction, quantity)
+        if quantity in _REST_IN_A_FALL and falls.any():
+            values = values[~falls]
+        found[name] = float(worse.reduce(values, axis=None)) if values.size else np.nan
+    return found
 
 
-def _spread_out(found: dict[int, tuple[str, str]], n: int) -> tuple[list[str], list[str]]:
-    """Return code and reason of each of n rows, empty if none was found."""
-    codes, reasons = [""] * n, [""] * n
-    for row, (code, reason) in found.items():
-        codes[row], reasons[row] = code, reason
-    return codes, reasons
-
-
-def _hold_against_limits(
-    rover: Rover, prediction: PathPrediction
-) -> tuple[dict[int, tuple[str, str]], dict[str, float]]:
-    """Return code and reason of the impassable rows, and the extreme value of each limit."""
-    found = {
-        row: _explain_status(rover, prediction, row)
-        for row in np.flatnonzero(prediction.status != PoseStatus.SETTLED).tolist()
-    }
-    settled = prediction.settled
-    checks = check_limits(rover, prediction)
-    extremes = {check.code: check.extreme for check in checks}
-    needed = _where_forces_count(prediction)
-    for check in checks:
-        if check.breaks:
-            counts = needed if check.code in UNNEEDED_IN_A_FALL else True
-            for row in np.flatnonzero(check.broken() & settled & counts).tolist():
-                if row not in found:
-                    check_interruption()
-                    found[row] = check.explain(row)
-    if needed is not True:
-        extremes["friction"] = largest_of(prediction.friction_utilisation[needed])
-        extremes["torque"] = largest_of(prediction.torque_saturation[needed])
-    return found, extremes
-
-
-def _explain_status(rover: Rover, prediction: PathPrediction, row: int) -> tuple[str, str]:
-    """Return code and reason of a row that is not settled."""
-    status = PoseStatus(prediction.status[row])
-    if status != PoseStatus.STEERING:
-        return _PLACELESS[status]
-    angles, steering = prediction.steering_angle[row], rover.steering
+def _explain_steering(rover: Rover, angles: np.ndarray) -> str:
+    """Return why wheels cannot point as angles (6,) [rad] ask."""
+    steering = rover.steering
     assert steering is not None
     turns = np.tile([position in steering.wheels for position in WHEEL_POSITIONS], 2)
     wheel = int(np.argmax(np.abs(angles) - np.where(turns, steering.limit, 0.0)))
-    angle, limit = np.degrees(angles[wheel]), np.degrees(steering.limit)
     if turns[wheel]:
-        needed = f"needs a steering angle of {compare(angle, limit, 1, ' deg')}"
-    else:
-        needed = f"does not steer: the way leads {angle:.1f} deg aside of its heading"
-    return "steering", f"{WHEELS[wheel]} wheel {needed}"
-
-
-def _where_forces_count(prediction: PathPrediction) -> np.ndarray | bool:
-    """Return (n,) False where a wheel rolls off an edge, or a single True if none ever does."""
-    falling = prediction.falling
-    return ~np.asarray(falling.any(axis=1)) if falling.any() else True
+        compared = DEGREES.compare(float(angles[wheel]), steering.limit)
+        return f"{WHEELS[wheel]} wheel needs a steering angle of {compared}"
+    aside = DEGREES.write(float(angles[wheel]))
+    return f"{WHEELS[wheel]} wheel does not steer: the way leads {aside} aside of its heading"

@@ -23,7 +23,7 @@ Policy = Annotated[
 ]
 SoilName = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="Preset soil where the terrain names none; see docs/notes."),
+    typer.Option(metavar="NAME", help="Preset soil where the terrain names none (docs/soil.md)."),
 ]
 MaxGap = Annotated[
     float,

@@ -67,6 +67,7 @@ def plan(
 
     Exit code 0: it ran, with any answer. 2: bad input.
     """
+    from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.planning.path_query import PathQueryOptions
@@ -81,12 +82,13 @@ def plan(
         start,
         goal,
         PathQueryOptions(
-            policy=policy,
-            control_margin=0.0,
-            friction=friction,
-            max_torque=max_torque,
-            soil=soil,
-            payload=payload,
+            model=SweepOptions(
+                policy=policy,
+                friction=friction,
+                max_torque=max_torque,
+                soil=soil,
+                payload=payload,
+            ),
             map_sigmas=sigmas,
         ),
     )
@@ -127,8 +129,8 @@ def _ask(
         progress(f"search a way for {question.rover.name}")
         answer = find_way(question, settings)
     if answer.path is not None:
-        on_soil = question.options.soil is not None or bool(question.terrain.soil_names)
-        options = question.options.sweep_options(question.joint_angles)
+        options = question.options.model
+        on_soil = options.soil is not None or bool(question.terrain.soil_names)
         assumed = assume(question.rover, options, question.options.map_sigmas)
         write_prediction(
             out,
@@ -143,4 +145,4 @@ def _ask(
         draw_way(picture, question, answer)
     if answer.warning:
         typer.echo(f"warning: {answer.warning}", err=True)
-    typer.echo(json.dumps(report_way(question.rover, answer), allow_nan=False))
+    typer.echo(json.dumps(report_way(answer), allow_nan=False))

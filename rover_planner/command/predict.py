@@ -68,7 +68,7 @@ def predict(
         bool,
         typer.Option(
             "--classes",
-            help="Add the class of each waypoint, by both torque policies.",
+            help="Add the class of each waypoint, by all torque policies.",
         ),
     ] = False,
     torque_ranges: Annotated[
@@ -85,9 +85,8 @@ def predict(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_physics.traversability.classification import classify_judged
-    from rover_physics.traversability.judge_path import judge_path
-    from rover_physics.traversability.judge_poses import judge_many_poses, judge_poses
-    from rover_physics.traversability.long_path import judge_long_path
+    from rover_physics.traversability.judge import judge_path, judge_poses
+    from rover_physics.traversability.partwise import PartwiseJudge
     from rover_physics.traversability.torque_ranges import find_torque_ranges
     from rover_planner.command.arm_options import read_arm_angles
     from rover_planner.command.prediction_files import (
@@ -127,14 +126,12 @@ def predict(
 
         if len(path) > MAX_IN_MEMORY and not classes:
             with writing_parts(out, len(path), on_soil, assumed) as file:
-                if curvature is None:
-                    verdict = judge_long_path(
-                        model, ground, path, options, sigmas=sigmas, take=file.take
-                    )
-                else:
-                    verdict = judge_many_poses(
-                        model, ground, path, curvature, options, sigmas=sigmas, take=file.take
-                    )
+                judge = PartwiseJudge(
+                    model, ground, path, options, curvature=curvature, sigmas=sigmas
+                )
+                for part in judge.parts():
+                    file.take(part)
+                verdict = judge.verdict()
                 file.close(verdict, find_ranges())
         else:
             if curvature is None:

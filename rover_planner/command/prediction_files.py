@@ -14,7 +14,8 @@ from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import ArrayHeader, open_npz, write_npz
 from rover_physics.files.npz_parts import NpzParts
 from rover_physics.files.validation import errors_of, show_file
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction, prediction_of
+from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.classification import ClassifiedWaypoint
 from rover_physics.traversability.torque_ranges import TorqueRanges
 from rover_physics.traversability.verdict import Verdict
@@ -50,27 +51,8 @@ ARRAYS: dict[str, Shape] = {
     "time": (),
 }
 """Arrays of a prediction in the output file, under the same names: shape of a waypoint's part."""
-REPLAY_ARRAYS: dict[str, Shape] = {
-    "poses": (3,),
-    "status": (),
-    "contact_points": (6, 3),
-    "contact_angle": (6,),
-    "torque": (6,),
-    "friction": (6,),
-    "sinkage": (6,),
-    "motion_resistance": (6,),
-    "power": (),
-    "motion": (3,),
-    "distance": (),
-    "wheel_drop": (6,),
-    "falling": (6,),
-    "speed_share": (),
-    "stalls": (),
-    "slip_speed": (6,),
-    "lift_rate": (6,),
-    "lift_height": (6,),
-    "deviation": (3,),
-    "drift": (2,),
+REPLAY_ARRAYS: dict[str, Shape] = {"poses": (3,), "status": ()} | {
+    one.name: one.shape for one in QUANTITIES if one.is_kept and one.name not in ARRAYS
 }
 """Further arrays in the file that `rover_planner view` needs to replay it."""
 SOIL_ARRAYS = ("sinkage", "motion_resistance")
@@ -161,8 +143,9 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
         }
         reasons = tuple(archive.read("reason", most=MAX_REASONS).tolist())
     _check_numbers(path, arrays)
-    rest: dict[str, Any] = {"between": None, "policy": "recorded"}
-    return PathPrediction(**arrays, waypoint=np.arange(len(reasons)), **rest), reasons
+    poses, status = arrays.pop("poses"), arrays.pop("status")
+    del arrays["settled"]
+    return prediction_of(poses, status, arrays, "recorded"), reasons
 
 
 def read_recorded_assumptions(path: Path) -> Assumptions | None:

@@ -172,7 +172,7 @@ class _Results:
             candidate.prediction,
             candidate.verdict,
             on_soil=on_soil,
-            assumptions=assume(self._rover, query.sweep_options(), query.map_sigmas),
+            assumptions=assume(self._rover, query.model, query.map_sigmas),
         )
         told: dict[str, Any] = {"prediction": file, "waypoints": len(candidate.prediction.poses)}
         if answer.measured is not None:

@@ -256,7 +256,7 @@ def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[End, End]
     wanted = middle + np.array([[-half, 0.0], [half, 0.0]])
     places = np.vstack([wanted, np.column_stack([x.ravel(), y.ravel()])])
     poses = np.column_stack([places, np.zeros(len(places))])
-    stands = score_poses(rover, ground, poses).within_limits(rover)
+    stands = score_poses(rover, ground, poses).passable
     ends: list[End] = []
     for aim, side in zip(wanted, (-1.0, 1.0), strict=True):
         fit = stands & (side * (places[:, 0] - middle[0]) > 0.0)

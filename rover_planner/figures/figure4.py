@@ -18,9 +18,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_poses
 from rover_planner.figures.pictures import STYLE, save_figure
 
 AXLES = ("rear", "middle", "front")
@@ -40,7 +40,7 @@ def loads_at_rest(rover: Rover) -> np.ndarray:
     half = 3.0 * max(abs(place[0]) for place in rover.suspension.wheels.values())
     count = 2 * int(np.ceil(half / cell)) + 1
     level = Terrain(np.zeros((count, count)), cell, (-0.5 * (count - 1) * cell,) * 2)
-    loads = sweep_path(rover, level, np.zeros((1, 3))).wheel_loads[0]
+    loads = judge_poses(rover, level, np.zeros((1, 3)))[0].wheel_loads[0]
     return 0.5 * (loads[:3] + loads[3:])
 
 

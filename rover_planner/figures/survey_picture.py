@@ -15,7 +15,7 @@ from rover_physics.traversability.classification import IMPASSABLE
 from rover_planner.figures.pictures import STYLE, save_figure
 from rover_planner.figures.plots import hill_shade
 from rover_planner.survey.chunk_survey import open_map
-from rover_planner.survey.layers import CLASS_NUMBERS, LIMIT_NUMBERS, NOT_SURVEYED
+from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED, number_limits
 from rover_planner.survey.palette import (
     CLASS_COLOURS,
     CLASS_LABELS,
@@ -26,7 +26,7 @@ from rover_planner.survey.reach.kept_area import ReachableArea
 from rover_planner.survey.store import SurveyStore
 
 _IMPASSABLE = CLASS_NUMBERS[IMPASSABLE]
-_OFF_GROUND = [LIMIT_NUMBERS[code] for code in ("off_map", "unknown_ground")]
+_OFF_GROUND = [number_limits()[code] for code in ("off_map", "unknown_ground")]
 _UNKNOWN, _INK = "#CCD6E6", "#222222"
 _MAX_CELLS = 1200
 _STRENGTH = 0.55

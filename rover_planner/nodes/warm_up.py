@@ -7,11 +7,10 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_physics.warm_up import EXACT, SCORES, UNCERTAIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
-from rover_planner.planning.navigation import pose_classes
-from rover_planner.planning.navigation.pose_classes import RoverOnMap
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import LatticeSettings, find_way
@@ -22,7 +21,7 @@ CANDIDATES = (Step("candidate paths", "rover_planner.nodes.warm_up:plan_candidat
 """All that candidates of a question need."""
 WAYS = (Step("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
 """All that searches around obstacles need."""
-HAZARDS = (Step("classes of poses", "rover_planner.nodes.warm_up:classify_poses"),)
+HAZARDS = (Step("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
 """All that the hazard map needs."""
 TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
 """All that updates of the traction controller need."""
@@ -48,11 +47,11 @@ def search_ways() -> None:
         find_way(question, LatticeSettings(budget=60.0))
 
 
-def classify_poses() -> None:
+def classify_pose() -> None:
     """Find the class of a pose on level ground."""
     ground = Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
     on_map = RoverOnMap(load_rover("lsr1"), ground, SweepOptions())
-    pose_classes.classify_poses(on_map, np.array([[1.5, 1.5, 0.0]]))
+    classify_poses(on_map, np.array([[1.5, 1.5, 0.0]]))
 
 
 def control_traction() -> None:

@@ -26,7 +26,8 @@ def parameters_document() -> str:
             "a test holds them together.",
             "",
             *_sections(),
-            "Read-only parameters are set at start, the others at any time "
+            "The default shows the type; an empty one is a string. Parameters with \\* are set",
+            "at start (read-only), the others at any time "
             "(`ros2 param set /traverse_server friction 0.6`).",
             "A value of the wrong type, NaN, out of bounds or not among the choices "
             "is refused with the reason.",
@@ -36,22 +37,29 @@ def parameters_document() -> str:
 
 
 def _sections() -> Iterator[str]:
-    """Yield the lines of a Markdown table per node, under its name."""
+    """Yield the lines of a Markdown table per node; it only names rows of an earlier table."""
+    homes: dict[str, str] = {}
     for node, table in TABLES.items():
+        rows = {spec.name: _row(spec) for spec in specs_of(table)}
         yield from (f"## {node}", "")
-        yield from ("| name | type | default | allowed | meaning |", "|---|---|---|---|---|")
-        yield from (_row(spec) for spec in specs_of(table))
+        yield from ("| name | default | allowed | meaning |", "|---|---|---|---|")
+        yield from (row for row in rows.values() if row not in homes)
         yield ""
+        for home in dict.fromkeys(homes.values()):
+            same = [f"`{name}`" for name, row in rows.items() if homes.get(row) == home]
+            if same:
+                yield from (f"As for `{home}`: {', '.join(same)}.", "")
+        homes |= {row: node for row in rows.values() if row not in homes}
 
 
 def _row(spec: ParameterSpec) -> str:
     default = f"`{spec.ros_default}`" if spec.default != "" else "empty"
-    name = f"`{spec.name}`" + (" (read-only)" if spec.read_only else "")
-    return f"| {name} | {spec.type_name} | {default} | {_allowed(spec)} | {spec.meaning} |"
+    name = f"`{spec.name}`" + ("\\*" if spec.read_only else "")
+    return f"| {name} | {default} | {_allowed(spec)} | {spec.meaning} |"
 
 
 def _allowed(spec: ParameterSpec) -> str:
     """Return the bounds with their unit, or the choices, as text."""
     if spec.bounds is not None:
         return f"{spec.bounds[0]:g} to {spec.bounds[1]:g} {spec.unit}".rstrip()
-    return ", ".join(f"`{choice}`" for choice in spec.choices) or "any"
+    return ", ".join(f"`{choice}`" for choice in spec.choices)

@@ -22,7 +22,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     terrain_file: str = parameter(
         "",
-        "Terrain to drive on: a preset's name or a terrain file; empty generates a Mars-like one.",
+        "Terrain to drive on: a preset's name or a terrain file; empty makes one.",
         read_only=True,
     )
     max_map_cells: int = max_map_cells_parameter(read_only=True)
@@ -55,8 +55,8 @@ class RoverSimulatorParameters(ParameterTable):
     )
     policy: str = parameter(
         EQUAL,
-        "How the rover's own servos share the traction: equal torques, or optimal. Quasi-static "
-        "engine only, and not with follow_commands.",
+        "How the rover's own servos share the traction. Quasi-static engine only, and not with "
+        "follow_commands.",
         choices=CONTROL_POLICIES,
         read_only=True,
     )
@@ -69,8 +69,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     follow_commands: bool = parameter(
         False,
-        "Whether torques from traction_controller/commands drive the rover; the simulator then "
-        "publishes cmd_vel unless another node publishes it.",
+        "Whether torques from traction_controller/commands drive the rover.",
         read_only=True,
     )
     joints: tuple[str, ...] = parameter(
@@ -94,7 +93,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     sensor_noise: float = parameter(
         0.0,
-        "Standard deviation of the measured heights; it is published with them as elevation_std.",
+        "Standard deviation of the measured heights, published as elevation_std.",
         unit="m",
         bounds=(0.0, 1.0),
         read_only=True,
@@ -111,8 +110,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     sensor_field_of_view: float = parameter(
         ALL_AROUND,
-        "Angle over which the sensor sees, half of it to each side of the heading; 6.28 is all "
-        "around.",
+        "Angle over which the sensor sees; 6.28 is all around.",
         unit="rad",
         bounds=(0.01, ALL_AROUND),
         read_only=True,

@@ -13,7 +13,7 @@ MAP_DURABILITIES = (EITHER, TRANSIENT_LOCAL, VOLATILE)
 """Values of the parameter map_durability; `rover_planner.ros.qos` explains them."""
 
 CONTROL_MARGIN = 0.3
-"""Default of control_margin: drives that keep it pass in closed loop, see docs/reliability.md."""
+"""Default of control_margin: drives that keep it pass in closed loop, see docs/validation.md."""
 RELIABLE, BEST_EFFORT = "reliable", "best_effort"
 RELIABILITIES = (RELIABLE, BEST_EFFORT)
 """Values of the parameter input_reliability."""
@@ -33,8 +33,7 @@ def steering_sign_parameter() -> str:
     """Return the field of the parameter steering_sign."""
     return parameter(
         LEFT,
-        "Side to which positive angles of the steering joints turn in messages; left as in "
-        "REP-103.",
+        "Side to which positive angles of steering joints turn in messages; left as in REP-103.",
         choices=tuple(STEERING_SIGNS),
         read_only=True,
     )
@@ -44,9 +43,8 @@ def base_offset_parameter() -> tuple[float, ...]:
     """Return the field of the parameter base_offset [m, rad]."""
     return parameter(
         (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        "x, y, z in m and roll, pitch, yaw in rad of the model's body, midway between the rocker "
-        "pivots, in the robot's frame; starts, goals, paths, plans and odometry are of the "
-        "robot's frame.",
+        "Pose of the model's body in the robot's frame: x, y, z in m, roll, pitch, yaw in rad; "
+        "starts, goals, paths, plans and odometry are of the robot's frame.",
         bounds=(-100.0, 100.0),
         read_only=True,
     )
@@ -57,8 +55,8 @@ def joint_map_parameter() -> tuple[str, ...]:
     return parameter(
         tuple(f"{name}:{name}" for name in SUSPENSION_JOINTS),
         "Names of the robot's joints: model_joint:robot_joint, then :-1 if it turns the other "
-        "way, then :offset with the model's angle in rad where the robot's is 0. A joint without "
-        "entry has the name of the model.",
+        "way, then :offset, the model's angle in rad where the robot's is 0. Others have the "
+        "model's name.",
         read_only=True,
     )
 
@@ -67,8 +65,8 @@ def steering_limit_parameter() -> float:
     """Return the field of the parameter steering_limit [rad]."""
     return parameter(
         0.0,
-        "Largest angle that the steering joints reach, as in the rover's URDF; 0 takes that of "
-        "the rover file. The node refuses a rover file that asks for more.",
+        "Largest angle that the steering joints reach; 0 takes that of the rover file. A rover "
+        "file that asks for more is refused.",
         unit="rad",
         bounds=(0.0, 3.2),
     )
@@ -114,8 +112,7 @@ def cell_height_parameter() -> str:
     """Return the field of the parameter cell_height."""
     return parameter(
         CELL_HEIGHTS[0],
-        "Height of a cell with several points; max keeps obstacles, mean is unbiased, median "
-        "ignores stray points.",
+        "Height of a cell with several points; max keeps obstacles, median ignores stray points.",
         choices=CELL_HEIGHTS,
     )
 
@@ -124,7 +121,7 @@ def max_map_cells_parameter(read_only: bool = False) -> int:
     """Return the field of the parameter max_map_cells [cells]."""
     return parameter(
         MAX_CELLS,
-        "Largest terrain file; a larger one is refused before it is unpacked.",
+        "Largest terrain file.",
         unit="cells",
         bounds=(4, 10**9),
         read_only=read_only,
@@ -135,8 +132,7 @@ def imu_frame_parameter() -> str:
     """Return the field of the parameter imu_frame."""
     return parameter(
         "",
-        "Frame of the IMU; empty is that of the body. An IMU with another frame_id is refused, an "
-        "empty one is this.",
+        "Frame of the IMU; empty is that of the body. Another frame_id is refused.",
         read_only=True,
     )
 
@@ -167,7 +163,7 @@ def input_reliability_parameter() -> str:
     return parameter(
         RELIABLE,
         "Reliability of the subscriptions to maps, paths and tool targets; best_effort also "
-        "hears best-effort publishers, but may lose messages.",
+        "hears best-effort publishers, and may lose messages.",
         choices=RELIABILITIES,
         read_only=True,
     )

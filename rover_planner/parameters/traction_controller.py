@@ -37,7 +37,7 @@ class TractionControllerParameters(ParameterTable):
     )
     realtime_priority: int = parameter(
         0,
-        "Real-time priority of this process (SCHED_FIFO), where the system grants it; 0 for none.",
+        "Real-time priority of this process (SCHED_FIFO), if the system grants it; 0 for none.",
         bounds=(0, 99),
         read_only=True,
     )
@@ -83,15 +83,14 @@ class TractionControllerParameters(ParameterTable):
     )
     stamp_tolerance: float = parameter(
         0.05,
-        "Time that a header stamp may be ahead of the node's clock; a message further ahead is "
-        "not used.",
+        "Time that a stamp may be ahead of the node's clock; messages further ahead are ignored.",
         unit="s",
         bounds=(0.0, 1.0),
     )
     watchdog_timeout: float = parameter(
         0.08,
-        "Time without an update after which the watchdog's thread sends zero torques; at least "
-        "two periods of rate are allowed.",
+        "Time without an update after which the watchdog sends zero torques; at least two periods "
+        "of rate.",
         unit="s",
         bounds=(0.01, 1.0),
     )
@@ -107,8 +106,8 @@ class TractionControllerParameters(ParameterTable):
     )
     torque_rate: float = parameter(
         0.0,
-        "Largest rate of change of a torque while driving; 0 is ten times the largest torque of "
-        "the rover file per second.",
+        "Largest change of a torque while driving; 0 is ten times the rover's largest torque per "
+        "second.",
         unit="N m/s",
         bounds=(0.0, 1e6),
     )
@@ -123,7 +122,7 @@ class TractionControllerParameters(ParameterTable):
     )
     slip_gain: float = parameter(
         0.4,
-        "Torque per difference of a wheel's rate from rolling, in weights times radius squared.",
+        "Torque per difference of a wheel's rate from rolling, over weight times radius squared.",
         unit="s/m",
         bounds=(0.0, 1e3),
     )
@@ -137,7 +136,7 @@ class TractionControllerParameters(ParameterTable):
     )
     base_frame: str = parameter(
         "base_link",
-        "Frame of the body; odometry of another child frame is refused, an empty one is the body.",
+        "Frame of the body; odometry of another child frame is refused.",
         read_only=True,
     )
     base_offset: tuple[float, ...] = base_offset_parameter()

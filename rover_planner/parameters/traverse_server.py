@@ -60,8 +60,8 @@ class TraverseServerParameters(ParameterTable):
     )
     control_margin: float = parameter(
         CONTROL_MARGIN,
-        "Share of friction and torque that a path passable only with traction control leaves to "
-        "the controller; 0 is the physical limit.",
+        "Share of friction and torque that is left to a traction controller; 0 is the physical "
+        "limit.",
         bounds=(0.0, 0.9),
     )
     candidate_count: int = parameter(
@@ -79,7 +79,7 @@ class TraverseServerParameters(ParameterTable):
     planner: str = parameter(
         AUTO,
         "How ~/can_traverse finds a path: candidate curves (fan), a search around obstacles "
-        "(lattice), or the search where all candidates are refused (auto).",
+        "(lattice), or the search if all candidates are refused (auto).",
         choices=(FAN, LATTICE, AUTO),
     )
     search_budget: float = parameter(
@@ -93,13 +93,12 @@ class TraverseServerParameters(ParameterTable):
     )
     search_frontier: bool = parameter(
         False,
-        "Whether a goal beyond the known ground is answered with a way that ends as near to it as "
-        "that allows; the verdict has goal_offset.",
+        "Whether a goal beyond the known ground is answered with a way that ends near to it.",
     )
     plan_spacing: float = parameter(
         0.1,
         "Distance between poses of a plan, which also has those where the class changes; "
-        "0 returns every waypoint, else at least 0.001.",
+        "0 is every waypoint.",
         unit="m",
         bounds=(0.0, 100.0),
     )
@@ -117,15 +116,14 @@ class TraverseServerParameters(ParameterTable):
     base_offset: tuple[float, ...] = base_offset_parameter()
     transform_timeout: float = parameter(
         0.5,
-        "Age from which a transform of /tf is refused, and odometry for clouds in a sensor's "
-        "frame.",
+        "Age from which a transform of /tf is refused, and odometry for clouds of a sensor.",
         unit="s",
         bounds=(0.01, 60.0),
     )
     sensor_mounts: tuple[str, ...] = parameter(
         NO_MOUNTS,
-        "Mounts of sensors on the robot, for clouds in their frames: frame:x:y:z:roll:pitch:yaw, "
-        "m and rad in base_frame. Frames without a mount are looked up on /tf.",
+        "Poses of sensors in base_frame, for clouds in their frames: frame:x:y:z:roll:pitch:yaw, "
+        "m and rad. Other frames are looked up on /tf.",
         read_only=True,
     )
     map_resolution: float = map_resolution_parameter()
@@ -148,13 +146,13 @@ class TraverseServerParameters(ParameterTable):
     )
     map_updates: str = parameter(
         AUTO_UPDATES,
-        "What a received map does to the one that is there: it merges cell by cell (merge), it "
-        "replaces it (replace), or it merges only if a map was loaded from a file (auto).",
+        "Whether a received map merges with the one that is there (merge), replaces it "
+        "(replace), or merges only if a map was loaded from a file (auto).",
         choices=MAP_UPDATES,
     )
     map_merge: str = parameter(
         NEWEST,
-        "Which of two heights of a cell counts: the newer, or the one of smaller deviation.",
+        "Which of two heights of a cell counts: the newer, or that of smaller deviation.",
         choices=MERGE_RULES,
     )
     map_ageing: float = parameter(
@@ -177,12 +175,11 @@ class TraverseServerParameters(ParameterTable):
     )
     fill_under_rover: bool = parameter(
         True,
-        "Whether unknown ground under the standing rover is filled from its six contacts, as "
-        "odometry and joint_states measure them.",
+        "Whether unknown ground under the standing rover is filled from its six contacts.",
     )
     footprint_margin: float = parameter(
         0.0,
-        "Width around the wheels to which ground is also filled where the rover starts.",
+        "Width around the wheels that is also filled where the rover starts.",
         unit="m",
         bounds=(0.0, 10.0),
     )
@@ -201,8 +198,8 @@ class TraverseServerParameters(ParameterTable):
     imu_mounting: tuple[float, ...] = imu_mounting_parameter()
     blind_ground: str = parameter(
         ALLOW,
-        "Paths whose belly passes over ground that was never seen: allow them, over the filled "
-        "start footprint only (allow_footprint), or refuse them.",
+        "Whether the belly may pass over ground that was never seen: allow, over filled ground "
+        "only (allow_footprint), or refuse.",
         choices=BLIND_GROUND,
     )
     unknown_cells: str = parameter(
@@ -215,8 +212,7 @@ class TraverseServerParameters(ParameterTable):
     )
     map_sigmas: float = parameter(
         SIGMAS,
-        "Standard deviations of the heights to allow for if the map has elevation_std; "
-        "0 treats heights as exact.",
+        "Standard deviations to allow for if the map has elevation_std; 0 takes it as exact.",
         bounds=(0.0, 10.0),
     )
     terrain_file: str = parameter(
@@ -226,28 +222,24 @@ class TraverseServerParameters(ParameterTable):
     )
     max_map_age: float = parameter(
         0.0,
-        "Age from which a map is refused as stale_map, by its stamp and its arrival; "
-        "0 allows any age.",
+        "Age from which a map is refused as stale_map; 0 allows any age.",
         unit="s",
         bounds=(0.0, 1e9),
     )
     time_budget: float = parameter(
         5.0,
-        "Time from the arrival of a question to its answer; beyond it the answer is too_long, "
-        "or busy if other questions took the time.",
+        "Time from the arrival of a question to its answer, which else is too_long or busy.",
         unit="s",
         bounds=(0.05, 600.0),
     )
     max_waiting: int = parameter(
         50,
-        "Largest number of questions that wait while one is in work; further ones are refused as "
-        "busy.",
+        "Largest number of questions that wait; further ones are refused as busy.",
         bounds=(0, 1000),
     )
     map_folder: str = parameter(
         "/",
-        "Folder below which ~/load_map reads; links out of it are refused. / is every file that "
-        "the node may read: a robot sets the folder of its maps.",
+        "Folder below which ~/load_map reads; / is every file: a robot sets that of its maps.",
     )
     max_map_bytes: int = parameter(
         1_000_000_000,
@@ -258,8 +250,7 @@ class TraverseServerParameters(ParameterTable):
     max_map_cells: int = max_map_cells_parameter()
     suspension_tolerance: float = parameter(
         0.1,
-        "Largest difference of measured and predicted suspension angles without a warning; "
-        "compared where odometry says that the rover stands.",
+        "Largest difference of measured and predicted suspension angles without a warning.",
         unit="rad",
         bounds=(0.0, 3.2),
     )
@@ -267,7 +258,7 @@ class TraverseServerParameters(ParameterTable):
     monitor: bool = parameter(
         False,
         "Whether the rest of the accepted path is judged again with each map, and ~/stop is "
-        "published; ~/monitor sets it too.",
+        "published.",
     )
     monitor_offset: float = parameter(
         0.5,
@@ -283,16 +274,15 @@ class TraverseServerParameters(ParameterTable):
     )
     monitor_mismatch: float = parameter(
         0.3,
-        "Difference of measured and predicted suspension angles for which ~/stop is published if "
-        "it lasts a second; 0 never stops for it.",
+        "Difference of measured and predicted suspension angles that stops the rover if it lasts "
+        "a second; 0 never.",
         unit="rad",
         bounds=(0.0, 3.2),
     )
 
     hazard_map: bool = parameter(
         False,
-        "Whether the traversability class of each cell and heading is kept up to date and "
-        "published on ~/hazard_map.",
+        "Whether the class of each cell and heading is kept up to date on ~/hazard_map.",
     )
     hazard_headings: int = parameter(
         8, "Number of headings of the hazard map.", bounds=(1, 36), read_only=True

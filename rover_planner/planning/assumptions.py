@@ -55,9 +55,7 @@ class Assumptions:
         Raises:
             RoverError: The policy or the margin is invalid.
         """
-        SweepOptions(policy=self.policy, control_margin=self.control_margin)
-        return replace(
-            options,
+        return options.change(
             policy=self.policy,
             control_margin=self.control_margin,
             soil=self.soil,

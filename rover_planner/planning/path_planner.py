@@ -1,18 +1,17 @@
 """Plans and checks paths of a rover on a map; tries other goals near an unreachable one."""
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
-from rover_physics.rover.turning import wheelbase
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
+from rover_physics.traversability.judge import judge_poses
 from rover_planner.planning.path_geometry import rings_within
 from rover_planner.planning.path_query import (
     Candidate,
@@ -67,8 +66,6 @@ class PathPlanner:
     """The ground, map frame."""
     options: PathQueryOptions
     """How candidates are made and judged."""
-    joint_angles: Mapping[str, float] | None
-    """Angles [rad] of the manipulator's joints by name; None is stowed."""
 
     def search(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> PathSearch:
         """Find a path from start to goal, or to a goal near it.
@@ -101,7 +98,7 @@ class PathPlanner:
         It may if some path fails where the ground under the rover is also ground under a rover
         at an allowed goal. Other paths fail on the way, which leads to the other goals too.
         """
-        near = tolerance + wheelbase(self.rover)
+        near = tolerance + self.rover.wheelbase
         failures = [
             one.poses[one.verdict.first_failure] - goal
             for one in answer.candidates
@@ -115,7 +112,7 @@ class PathPlanner:
         Raises:
             RoverError: The model refuses an option or the poses.
         """
-        return check_path(self.rover, self.terrain, poses, self.options, self.joint_angles)
+        return check_path(self.rover, self.terrain, poses, self.options)
 
     def predict_standing(self, pose: Pose) -> PathPrediction:
         """Predict the rover standing at a pose.
@@ -123,8 +120,8 @@ class PathPlanner:
         Raises:
             RoverError: The model refuses an option or the pose.
         """
-        asked = self.options.sweep_options(self.joint_angles)
-        return sweep_path(self.rover, self.terrain, pose[None, :], asked)
+        poses, options = pose[None, :], self.options.model
+        return judge_poses(self.rover, self.terrain, poses, None, options, sigmas=0)[0]
 
     def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
         """Return the class of each waypoint of a judged path; may evaluate the path once more."""
@@ -133,13 +130,13 @@ class PathPlanner:
             self.terrain,
             candidate.prediction,
             candidate.verdict,
-            self.options.sweep_options(self.joint_angles),
+            self.options.model,
             sigmas=self.options.map_sigmas,
         )
 
     def _query(self, start: Pose, goal: Pose) -> PathAnswer:
         return answer_path_query(
-            self.rover, self.terrain, start, goal, self.options, self.joint_angles
+            self.rover, self.terrain, start, goal, self.options
         )
 
     def _goals_to_stand_on(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Pose]:

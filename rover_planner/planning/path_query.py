@@ -1,27 +1,27 @@
 """Judges candidate paths between two poses, compares risk and energy, and explains the choice."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.names import EQUAL
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path, judge_paths
-from rover_physics.traversability.risk import used_share
+from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.planning.candidates import generate_candidates, path_length
 
 RISK_STEP = 0.05
 """Rounding step of risks [share of a limit]: paths of equal rounded risk differ by energy."""
+MODEL_OPTIONS = SweepOptions(control_margin=CONTROL_MARGIN)
+"""Default options of the model; traction control is planned with a margin."""
 
 
 @dataclass(frozen=True)
@@ -34,32 +34,20 @@ class PathQueryOptions:
     """Lateral distance between neighbouring candidates half-way [m]."""
     waypoint_spacing: float = 0.02
     """Largest distance between waypoints along a path [m]."""
-    policy: str = EQUAL
-    """How the wheels share the traction, one of `TORQUE_POLICIES`."""
-    control_margin: float = CONTROL_MARGIN
-    """Share of friction and torque left to the traction controller where it is needed."""
-    friction: float | None = None
-    """Coulomb friction where the terrain has none; None: that of the rover file."""
-    max_torque: float | None = None
-    """Largest wheel torque [N m]; None: that of the rover file."""
-    soil: str | None = None
-    """Preset soil where the terrain names none; None: Coulomb friction."""
-    payload: float | None = None
-    """Mass at the tip of the manipulator [kg]; None: that of the rover file."""
+    model: SweepOptions = MODEL_OPTIONS
+    """Torque policy, friction, torque, soil, payload and arm of the model."""
     map_sigmas: float = SIGMAS
     """Standard deviations to allow for on an uncertain map; 0 treats heights as exact."""
 
-    def sweep_options(self, joint_angles: Mapping[str, float] | None = None) -> SweepOptions:
-        """Return the options of the model; `joint_angles` [rad] of the arm, None is stowed."""
-        return SweepOptions(
-            policy=self.policy,
-            control_margin=self.control_margin,
-            friction=self.friction,
-            max_torque=self.max_torque,
-            soil=self.soil,
-            payload=self.payload,
-            joint_angles=joint_angles,
-        )
+    def change(self, **changes: Any) -> "PathQueryOptions":
+        """Return the options with other values of their fields, or of those of the model.
+
+        Raises:
+            ModelError: A value of the model is out of range.
+        """
+        own = {name: changes.pop(name) for name in tuple(changes) if name in vars(self)}
+        model = own.pop("model", self.model)
+        return replace(self, **own, model=replace(model, **changes))
 
 
 @dataclass(frozen=True)
@@ -146,7 +134,6 @@ def answer_path_query(
     start,
     goal,
     options: PathQueryOptions | None = None,
-    joint_angles: Mapping[str, float] | None = None,
 ) -> PathAnswer:
     """Evaluate the candidate paths from start to goal and choose the best traversable one.
 
@@ -159,7 +146,6 @@ def answer_path_query(
         start: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
         goal: (3,) x, y [m] and yaw [rad] of the body origin, map frame.
         options: How candidates are generated and judged; None takes the defaults.
-        joint_angles: Angles [rad] of the manipulator's joints by name; None is stowed.
 
     Raises:
         PlanningError: Start, goal or options are invalid.
@@ -167,18 +153,17 @@ def answer_path_query(
     """
     options = options or PathQueryOptions()
     paths = generate_paths(rover, start, goal, options)
-    sweep_options = options.sweep_options(joint_angles)
     judged = judge_paths(
         rover,
         terrain,
         paths,
-        sweep_options,
+        options.model,
         sigmas=options.map_sigmas,
         stop_at_failure=len(paths) > 1,
     )
     return choose(
         tuple(
-            Candidate(poses, prediction, verdict, path_cost(rover, prediction, verdict))
+            Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
             for poses, (prediction, verdict) in zip(paths, judged, strict=True)
         )
     )
@@ -208,7 +193,6 @@ def check_path(
     terrain: Terrain,
     poses: NDArray[np.float64],
     options: PathQueryOptions | None = None,
-    joint_angles: Mapping[str, float] | None = None,
     *,
     stop_at_failure: bool = False,
 ) -> Candidate:
@@ -220,17 +204,16 @@ def check_path(
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
     options = options or PathQueryOptions()
-    asked = options.sweep_options(joint_angles)
     poses = np.array(poses, np.float64)
     prediction, verdict = judge_path(
         rover,
         terrain,
         poses,
-        asked,
+        options.model,
         sigmas=options.map_sigmas,
         stop_at_failure=stop_at_failure,
     )
-    return Candidate(poses, prediction, verdict, path_cost(rover, prediction, verdict))
+    return Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
 
 
 def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
@@ -243,18 +226,13 @@ def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
     return PathAnswer(candidates, -1, max(indices, key=lambda k: candidates[k].reach))
 
 
-def path_cost(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> tuple[float, float]:
+def path_cost(prediction: PathPrediction, verdict: Verdict) -> tuple[float, float]:
     """Return the cost of a path: its risk in steps of RISK_STEP, and its energy [J].
 
     Both are infinite if the path is not traversable or one of them is not a number.
     """
     if not verdict.traversable:
         return (np.inf, np.inf)
-    risk = np.floor(path_risk(rover, verdict) / RISK_STEP + 0.5) * RISK_STEP
+    risk = np.floor(verdict.risk / RISK_STEP + 0.5) * RISK_STEP
     cost = (float(risk), float(prediction.energy[-1]))
     return (np.inf, np.inf) if math.isnan(sum(cost)) else cost
-
-
-def path_risk(rover: Rover, verdict: Verdict) -> float:
-    """Return the used share of the tightest safety limit of a judged path; 1 is at the limit."""
-    return used_share(rover, verdict)

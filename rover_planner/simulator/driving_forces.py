@@ -9,7 +9,7 @@ from rover_physics.errors import ModelError
 from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.layout import LOADS, TRACTIONS
 

@@ -8,7 +8,6 @@ clearance apply in both cases. Wheels that steer turn at the rate of the rover f
 says how the drive waits for them.
 """
 
-from dataclasses import fields, replace
 
 import numpy as np
 
@@ -16,16 +15,17 @@ from rover_physics.forces.soil import coulomb_slip
 from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.steered_step import sweep_steered
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steered_drive import SteeredDrive, WheelAims
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceWriter
 from rover_physics.traction.wheel_course import WheelCourse
-from rover_physics.traversability.verdict import find_reasons
+from rover_physics.traversability.verdict import explain_rows
 from rover_planner.errors import PlanningError
 from rover_planner.simulator.driving_forces import (
     DrivingForces,
@@ -42,8 +42,6 @@ CREEP = 1e-4
 """Speed below which the rover does not steer [m/s]."""
 MIN_PROGRESS, PATIENCE = 0.02, 2.0
 """A rover that moves less than MIN_PROGRESS [m] within PATIENCE [s] counts as stuck."""
-NO_LIMIT = 1e9
-"""Value that disables a limit."""
 
 
 class QuasiStaticPlant:
@@ -76,8 +74,6 @@ class QuasiStaticPlant:
         self._friction, self._policy, self._soil = friction, policy, soil
         self._writer = BalanceWriter(rover)
         self._mass = self._writer.weight / rover.gravity
-        limits = replace(rover.limits, friction_utilisation=NO_LIMIT, torque_saturation=NO_LIMIT)
-        self._without_force_limits = replace(rover, limits=limits)
         self._drive, self._course = SteeredDrive(rover), WheelCourse(rover)
         self._steered, self._steering_joints = steered_wheels(rover), steering_joints(rover)
         self._angles = np.zeros(6)
@@ -237,16 +233,20 @@ class QuasiStaticPlant:
         If `pulled`, the driving forces decide about grip at a pose. Crossings of steep faces
         between poses are judged with optimal torques.
         """
-        rover, between = self._rover, prediction.between
-        at_end = prediction
-        if pulled:
-            rover = self._without_force_limits
-            at_end = replace(prediction, wheel_loads=np.abs(prediction.wheel_loads))
-        reason = find_reasons(rover, at_end)[1][-1]
-        if not reason and between is not None and len(between.poses):
-            _, on_the_way = find_reasons(self._rover, between)
-            return next((reason for reason in on_the_way if reason), "")
-        return reason
+        between, last = prediction.between, len(prediction.poses) - 1
+        reasons = self._find_reasons(prediction, with_forces=not pulled)
+        if last in reasons:
+            return reasons[last]
+        if between is None or not len(between.poses):
+            return ""
+        return next(iter(self._find_reasons(between, with_forces=True).values()), "")
+
+    def _find_reasons(self, prediction: PathPrediction, with_forces: bool) -> dict[int, str]:
+        """Return the reasons of the rows that break a limit, with or without those of forces."""
+        limits = limits_of(self._rover, prediction.policy)
+        uses = find_uses(limits if with_forces else limits.without_forces(), prediction.results)
+        explained = explain_rows(self._rover, prediction, uses)
+        return {row: reason for row, (_, reason) in explained.items()}
 
     def state(self) -> PlantState:
         """Return the current measurements."""
@@ -277,14 +277,7 @@ class QuasiStaticPlant:
 
 def _last_row(prediction: PathPrediction) -> PathPrediction:
     """Return a prediction that has only the last waypoint."""
-    n = len(prediction.poses)
-    rows = {
-        field.name: getattr(prediction, field.name)[-1:]
-        for field in fields(prediction)
-        if isinstance(getattr(prediction, field.name), np.ndarray)
-        and len(getattr(prediction, field.name)) == n
-    }
-    return replace(prediction, **rows, between=None)
+    return prediction.select(slice(-1, None))
 
 
 def _suspension(prediction: PathPrediction) -> Floats:

@@ -8,13 +8,11 @@ import numpy as np
 from rover_physics.errors import ModelError
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
-from rover_physics.traversability.judge_path import judge_path
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
 from rover_planner.studies.study_file import STEP_TOLERANCE, Study, StudyDrive
 
 SPACING = 0.02
@@ -63,7 +61,7 @@ def evaluate(study: Study, rover: Rover) -> Score:
 
 def load_shares(rover: Rover) -> Floats:
     """Return the shares (6,) of the weight on the wheels, at rest on level ground."""
-    loads = sweep_path(rover, _flat(rover), np.zeros((1, 3))).wheel_loads[0]
+    loads = judge_poses(rover, _flat(rover), np.zeros((1, 3)))[0].wheel_loads[0]
     return np.asarray(loads / loads.sum())
 
 
@@ -202,7 +200,11 @@ def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | 
     reach = 0.75 * _length(rover)
     x = np.linspace(-reach, reach, _count_steps(2.0 * reach) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
-    prediction = sweep_path(
-        able, step_ground(rover, height), poses, SweepOptions(policy=policy, friction=friction)
+    judged = judge_paths(
+        able,
+        step_ground(rover, height),
+        [poses],
+        SweepOptions(policy=policy, friction=friction),
+        check_entrapment=False,
     )
-    return judge(able, prediction).reason
+    return judged[0][1].reason

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 
 import rover_physics
-from rover_physics.prediction.evaluation import RESULT
+from rover_physics.results.record import RESULT
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.errors import PlanningError
 from rover_planner.survey.geotiff import GeoTiffMap

@@ -5,14 +5,6 @@ import numpy as np
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.prediction.map_sweep import write_score
 from rover_physics.terrain.ground import elevation_of, find_block_max
-from rover_physics.traversability.first_failure import find_suspects
-
-
-@exact_kernel
-def mark_suspects(results, limits, suspect):
-    """Write into suspect (n,) whether RESULTs (n,) may break one of SuspectLimits."""
-    for row in range(results.size):
-        suspect[row] = find_suspects(results[row : row + 1], limits)[0] >= 0
 
 
 @exact_kernel

@@ -6,22 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.status import PoseStatus
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
-from rover_physics.traversability.verdict import CODES
+from rover_physics.traversability.verdict import codes_of_verdicts
 
 NOT_SURVEYED = 255
 """Class and limit of a cell that is not surveyed yet, or whose chunk failed."""
 NO_LIMIT = 0
-"""Value of `first_limit` where no limit fails; 1 + k stands for CODES[k]."""
+"""Value of `first_limit` where no limit fails; 1 + k stands for code k of verdicts."""
 CLASS_NUMBERS = {name: number for number, name in enumerate(TRAVERSABILITY_CLASSES)}
 """Classes as kept, from best to worst."""
-LIMIT_NUMBERS = {"": NO_LIMIT} | {code: 1 + k for k, code in enumerate(CODES)}
-"""Codes of limits as kept."""
-STATUS_NUMBERS = np.array(
-    [LIMIT_NUMBERS.get(status.name.lower(), NO_LIMIT) for status in sorted(PoseStatus)], np.uint8
-)
-"""Limit of each PoseStatus."""
 
 Layers = Mapping[str, NDArray]
 """Layers by name, all of one shape."""
@@ -47,6 +40,11 @@ QUANTITIES = (
     Quantity("tilt", True, "rad", 4),
     Quantity("belly_clearance", False, "m", 5),
 )
+
+
+def number_limits() -> dict[str, int]:
+    """Return the number of each code of a verdict, as kept."""
+    return {"": NO_LIMIT} | {code: 1 + k for k, code in enumerate(codes_of_verdicts())}
 
 
 def bits_type(headings: int) -> np.dtype:

@@ -18,9 +18,9 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.disk.kept_layer import KeptLayer, damaged
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
-    LIMIT_NUMBERS,
     NOT_SURVEYED,
     fill_of,
+    number_limits,
     types_of_layers,
 )
 from rover_planner.survey.layout import Index, SurveyLayout
@@ -83,7 +83,7 @@ class StoreNotes:
             "crs": frame.crs,
             "map_file": self.map_file,
             "classes": {str(number): name for name, number in CLASS_NUMBERS.items()},
-            "limits": {str(number): name for name, number in LIMIT_NUMBERS.items()},
+            "limits": {str(number): name for name, number in number_limits().items()},
             "not_surveyed": NOT_SURVEYED,
         }
 

@@ -1,35 +1,35 @@
 """The survey of one tile: the rover at each of its cells and headings, and what is kept of it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from rover_physics.names import CONTROL_POLICIES, TORQUE_POLICIES
+from rover_physics.names import TORQUE_POLICIES
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.crossing import select_results
 from rover_physics.prediction.map_sweep import NUMBERS
-from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import evaluator, predict_poses
+from rover_physics.prediction.sweep import evaluator
+from rover_physics.results.uses import find_codes
 from rover_physics.rover.model import Rover
-from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.check import NOT_COMPUTABLE
 from rover_physics.traversability.classification import IMPASSABLE
-from rover_physics.traversability.first_failure import suspect_limits_of
-from rover_physics.traversability.judge_poses import judge_poses
-from rover_physics.traversability.limit_checks import check_limits
-from rover_planner.survey.kernels import mark_suspects, mark_unknown_below, write_scores
+from rover_physics.traversability.judge import judge_poses
+from rover_physics.traversability.pose_classes import (
+    RoverOnMap,
+    classify_poses,
+    hopeless_codes,
+)
+from rover_planner.survey.kernels import mark_unknown_below, write_scores
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
-    LIMIT_NUMBERS,
     NO_LIMIT,
     QUANTITIES,
-    STATUS_NUMBERS,
     fill_of,
+    number_limits,
     pack_bits,
     types_of_layers,
 )
@@ -39,11 +39,6 @@ BATCH = 4096
 """Approximate number of poses whose results are in memory at a time."""
 STRAIGHT, ON_THE_SPOT = 0.0, np.inf
 """Curvatures [1/m]."""
-OF_THE_GROUND = ("steering", "off_map", "unknown_ground", "not_settled", "suspension", "tilt")
-OF_THE_POSE = (*OF_THE_GROUND, "tip_over", "belly")
-"""Codes of limits that fail under every torque policy if they do under one: of all maps, and of
-those with exact heights."""
-
 Outline = tuple[float, float, float, float]
 """Rear, front, right and left edge [m], body frame."""
 
@@ -77,7 +72,7 @@ def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     types = types_of_layers(request.headings, request.turns)
     layers = {name: np.full(cells, fill_of(name), kind) for name, kind in types.items()}
     layers["worst_class"][:] = layers["best_class"][:] = CLASS_NUMBERS[IMPASSABLE]
-    layers["first_limit"][:] = LIMIT_NUMBERS["unknown_ground"]
+    layers["first_limit"][:] = number_limits()["unknown_ground"]
     return layers
 
 
@@ -101,7 +96,8 @@ class TileJudge:
         self._request, self._terrain = request, terrain
         self._rover, self._policy = request.rover, request.options.policy
         self._has_gaps = bool(np.isnan(terrain.elevation).any())
-        self._is_uncertain = bool(terrain.elevation_std is not None and request.sigmas)
+        self._on_map = RoverOnMap(self._rover, terrain, request.options, request.sigmas)
+        self._numbers = number_limits()
 
     @quiet
     def survey(self, places: np.ndarray) -> dict[str, np.ndarray]:
@@ -138,8 +134,9 @@ class TileJudge:
         model = pack_model(self._rover, self._terrain, options)
         bends = np.full(len(poses), bend)
         results = evaluator(model)(poses, motions=motions_of(model, poses, bends))
-        limits = find_limits(self._rover, model, poses, results)
-        if self._is_uncertain:
+        codes = find_codes(model.limits, results)
+        limits = np.array([self._numbers[code] for code in codes], np.uint8)
+        if self._on_map.is_uncertain:
             rows = np.flatnonzero(limits == NO_LIMIT)
             if len(rows):
                 _, verdict = judge_poses(
@@ -150,25 +147,26 @@ class TileJudge:
                     options,
                     sigmas=self._request.sigmas,
                 )
-                limits[rows] = [LIMIT_NUMBERS[code] for code in verdict.codes]
+                limits[rows] = [self._numbers[code] for code in verdict.codes]
         return results, limits
 
     def _classify(self, poses: np.ndarray, limits: np.ndarray, refused: np.ndarray) -> np.ndarray:
         """Return the class (n,) of poses whose limits under the asked policy are known."""
-        policies: Sequence[str] = CONTROL_POLICIES if self._is_uncertain else TORQUE_POLICIES
-        classes = np.full(len(poses), CLASS_NUMBERS[IMPASSABLE], np.uint8)
-        hopeless = OF_THE_GROUND if self._is_uncertain else OF_THE_POSE
-        is_open = ~refused & ~np.isin(limits, [LIMIT_NUMBERS[code] for code in hopeless])
-        for policy in policies:
-            rows = np.flatnonzero(is_open)
-            if not len(rows):
-                break
-            if policy == self._policy:
-                passes = limits[rows] == NO_LIMIT
-            else:
-                passes = self.judge(policy, poses[rows], STRAIGHT)[1] == NO_LIMIT
-            classes[rows[passes]] = TORQUE_POLICIES.index(policy)
-            is_open[rows[passes]] = False
+        own = TORQUE_POLICIES.index(self._policy)
+        worst = CLASS_NUMBERS[IMPASSABLE]
+        classes = np.where(limits == NO_LIMIT, own, worst).astype(np.uint8)
+        hopeless = [self._numbers[code] for code in hopeless_codes(self._on_map.is_uncertain)]
+        is_open = ~refused & ~np.isin(limits, hopeless)
+        others = [k for k in range(len(TORQUE_POLICIES)) if k != own]
+        # A pose that passes is of another class only if a simpler drive passes, too.
+        for passes, policies in ((True, range(own)), (False, others)):
+            rows = np.flatnonzero(is_open & ((limits == NO_LIMIT) == passes))
+            if len(rows) and len(policies):
+                asked = [TORQUE_POLICIES[k] for k in policies]
+                found = classify_poses(self._on_map, poses[rows], asked)
+                better = (found >= 0) & (found < classes[rows])
+                classes[rows[better]] = found[better]
+        classes[refused] = worst
         return classes
 
     def _find_turns(self, poses: np.ndarray, passes: np.ndarray) -> np.ndarray:
@@ -189,38 +187,9 @@ class TileJudge:
         return unknown
 
 
-def find_limits(rover: Rover, model: PackedModel, poses: np.ndarray, results: Any) -> np.ndarray:
-    """Return the number (n,) of the first limit that fails at single poses, NO_LIMIT if none.
-
-    The limits are those of `judge`, without its texts.
-
-    Args:
-        rover: The rover.
-        model: Rover, terrain and options.
-        poses: (n, 3) x, y [m] and yaw [rad].
-        results: (n,) RESULT of the poses.
-    """
-    limits, suspect = np.zeros(len(poses), np.uint8), np.empty(len(poses), bool)
-    mark_suspects(view_read_only(results), suspect_limits_of(rover, model), suspect)
-    rows = np.flatnonzero(suspect)
-    if not len(rows):
-        return limits
-    prediction = predict_poses(model, poses[rows], select_results(results, rows))
-    found = STATUS_NUMBERS[prediction.status.astype(np.intp)]
-    settled = prediction.status == PoseStatus.SETTLED
-    for check in check_limits(rover, prediction):
-        if check.breaks:
-            broken = check.broken() & settled & (found == NO_LIMIT)
-            unknown = np.isnan(check.values.reshape(len(rows), -1)).any(axis=1)
-            found[broken] = LIMIT_NUMBERS[check.code]
-            found[broken & unknown] = LIMIT_NUMBERS[NOT_COMPUTABLE]
-    limits[rows] = found
-    return limits
-
-
 def _refuse_unknown(limits: np.ndarray, refused: np.ndarray) -> np.ndarray:
     """Return the limits with unknown ground where it comes first."""
-    number = LIMIT_NUMBERS["unknown_ground"]
+    number = number_limits()["unknown_ground"]
     later = (limits == NO_LIMIT) | (limits > number)
     return np.where(refused & later, np.uint8(number), limits)
 

@@ -12,7 +12,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES, classify_judged
-from rover_physics.traversability.judge_poses import judge_poses
+from rover_physics.traversability.judge import judge_poses
 from rover_planner.planning.navigation import hazard_map, pose_classes
 from rover_planner.planning.navigation.class_kernels import IMPASSABLE, UNKNOWN
 from rover_planner.planning.navigation.hazard_map import HazardMap

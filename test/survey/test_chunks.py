@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
 
-from rover_physics.traversability.judge_poses import judge_poses
+from rover_physics.traversability.judge import judge_poses
 from rover_planner.survey.chunk_survey import compute_chunk, estimate_memory
 from rover_planner.survey.layers import unpack_bits
 from rover_planner.survey.layout import SurveyLayout, choose_chunk, find_halo

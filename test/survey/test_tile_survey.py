@@ -7,7 +7,7 @@ import pytest
 
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import classify_judged
-from rover_physics.traversability.judge_poses import judge_poses
+from rover_physics.traversability.judge import judge_poses
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     LIMIT_NUMBERS,

@@ -1,4 +1,4 @@
-"""On a slope of 20 degrees in MuJoCo a rover is held, as docs/reliability.md says."""
+"""On a slope of 20 degrees in MuJoCo a rover is held, as docs/validation.md says."""
 
 import importlib
 

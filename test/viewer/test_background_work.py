@@ -12,7 +12,7 @@ import pytest
 from rover_physics.errors import RoverError
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.terrain.grid import load_terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.command.view import choose_ends
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.viewer.state.background_work import PATIENCE, BackgroundWork, Progress

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics.names import WHEELS
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.viewer.panel.dashboard import describe_verdict, draw_dashboard
 from rover_planner.viewer.panel.history import History
 from rover_planner.viewer.panel.plots import PLOTS, add_cursor

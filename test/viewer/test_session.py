@@ -12,7 +12,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.command.prediction_files import (
     read_prediction,
     read_recorded_assumptions,

@@ -16,13 +16,12 @@ from rclpy.node import Node
 from msg_adapters.results.hazard_grids import classes_to_grid
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.pose_classes import UNKNOWN, RoverOnMap
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.navigation.class_kernels import UNKNOWN
 from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
-from rover_planner.planning.navigation.pose_classes import RoverOnMap
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover
 from rover_planner.ros.logs.transition_log import TransitionLog
@@ -172,7 +171,7 @@ class HazardTopics:
                 return
             query = settings.query
             hazards.take(
-                RoverOnMap(settings.rover, known.terrain, query.sweep_options(), query.map_sigmas)
+                RoverOnMap(settings.rover, known.terrain, query.model, query.map_sigmas)
             )
             self._patience = MAX_PAUSE
             self._let_questions_go_first()  # in work it would take time from the slice

@@ -110,7 +110,7 @@ class ReachQuery:
             situation.terrain,
             situation.path.poses[-1],
             self._target,
-            settings.query.sweep_options(),
+            settings.query.model,
             force=self._force,
             moment=self._moment,
         )

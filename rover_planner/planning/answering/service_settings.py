@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
@@ -89,12 +90,14 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             count=parameters.candidate_count,
             spacing=parameters.candidate_spacing,
             waypoint_spacing=parameters.waypoint_spacing,
-            policy=parameters.policy,
-            control_margin=parameters.control_margin,
-            friction=parameters.friction or None,
-            max_torque=parameters.max_torque or None,
-            soil=parameters.soil or None,
-            payload=payload,
+            model=SweepOptions(
+                policy=parameters.policy,
+                control_margin=parameters.control_margin,
+                friction=parameters.friction or None,
+                max_torque=parameters.max_torque or None,
+                soil=parameters.soil or None,
+                payload=payload,
+            ),
             map_sigmas=parameters.map_sigmas,
         ),
         largest_gap=parameters.max_gap if parameters.unknown_cells == INTERPOLATE else 0.0,

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import FAN, LATTICE
@@ -124,7 +124,6 @@ class Situation:
             planner.terrain,
             *ends,
             planner.options,
-            planner.joint_angles,
             self._blind if self.settings.blind_ground != ALLOW else None,
         )
         answer = find_way(question, self.settings.lattice, self.edge_memory, self._look)
@@ -199,9 +198,8 @@ class Situation:
     def _planner(self) -> PathPlanner:
         """Return a planner for the map, the settings and the measured arm angles."""
         assert self.terrain is not None
-        return PathPlanner(
-            self.settings.rover, self.terrain, self.settings.query, self._manipulator_angles()
-        )
+        options = self.settings.query.change(joint_angles=self._manipulator_angles())
+        return PathPlanner(self.settings.rover, self.terrain, options)
 
     def _compare_suspension(
         self, predict: Callable[[NDArray[np.float64]], PathPrediction]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_planner.planning.verdict_report import SuspensionReport
 
 

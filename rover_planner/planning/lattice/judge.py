@@ -1,7 +1,7 @@
 """Asks the model about pieces of path and about single nodes, and counts the work."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_poses import judge_poses
+from rover_physics.traversability.judge import judge_poses
 from rover_physics.traversability.pieces import judge_pieces
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.lattice.blind_check import BlindCheck
@@ -39,8 +39,6 @@ class Judge:
     """The ground, map frame."""
     options: PathQueryOptions
     """How paths are judged."""
-    joint_angles: Mapping[str, float] | None = None
-    """Angles [rad] of the manipulator's joints by name; None is stowed."""
     blind: BlindCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
     poses: int = field(default=0, init=False)
@@ -56,7 +54,7 @@ class Judge:
             self.rover,
             self.terrain,
             pieces,
-            self.options.sweep_options(self.joint_angles),
+            self.options.model,
             sigmas=self.options.map_sigmas,
         )
         judged = [
@@ -95,7 +93,7 @@ class Judge:
             self.terrain,
             poses,
             np.zeros(len(poses)),
-            self.options.sweep_options(self.joint_angles),
+            self.options.model,
             sigmas=self.options.map_sigmas,
         )[1]
 
@@ -114,7 +112,6 @@ class Judge:
             self.terrain,
             poses,
             self.options,
-            self.joint_angles,
             stop_at_failure=True,
         )
         return checked if self.blind is None else self.blind.hold(checked)

@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.navigation.class_kernels import IMPASSABLE, UNKNOWN
+from rover_physics.traversability.pose_classes import (
+    IMPASSABLE,
+    UNKNOWN,
+    RoverOnMap,
+    classify_poses,
+)
 from rover_planner.planning.navigation.footprint import find_footprint
-from rover_planner.planning.navigation.pose_classes import RoverOnMap, classify_poses
 from rover_planner.worlds.maps.changes import (
     Shift,
     Window,

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from rover_physics.rover.turning import wheelbase
 from rover_planner.planning.lattice.connections import Connection
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.judge import Judge
@@ -26,7 +25,7 @@ def connect_frontier(judge: Judge, nodes: Nodes, goal: np.ndarray) -> list[Conne
     by_distance = everywhere[np.argsort(away, kind="stable")]
     found: list[Connection] = []
     chosen: list[np.ndarray] = []
-    apart, places = 0.25 * wheelbase(judge.rover), max(1, _BATCH // HEADINGS)
+    apart, places = 0.25 * judge.rover.wheelbase, max(1, _BATCH // HEADINGS)
     for first in range(0, len(by_distance), places):
         some = by_distance[first : first + places]
         asked = (some[:, None] + np.arange(HEADINGS)).ravel()

@@ -47,7 +47,6 @@ def _is_alike(asked: WayQuestion, question: WayQuestion, known: JudgedEdges, nod
         known.edges.nodes == nodes
         and asked.rover == question.rover
         and asked.options == question.options
-        and asked.joint_angles == question.joint_angles
         and _rule_of(asked) == _rule_of(question)
         and old.resolution == new.resolution
         and old.origin == new.origin

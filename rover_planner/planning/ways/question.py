@@ -1,6 +1,5 @@
 """A question for a way between two poses."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
@@ -25,7 +24,5 @@ class WayQuestion:
     """(3,) as `start`."""
     options: PathQueryOptions
     """How paths are judged."""
-    joint_angles: Mapping[str, float] | None = None
-    """Angles [rad] of the manipulator's joints by name; None is stowed."""
     blind: BlindCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""

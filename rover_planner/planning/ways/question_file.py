@@ -1,7 +1,7 @@
 """Files that hold a question for a way with its map, so that it can be asked again elsewhere."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +22,29 @@ _ENTRY, _MOST = "way_question", 1_000_000
 
 
 @dataclass(frozen=True)
+class _Options:
+    """`PathQueryOptions` as the entry holds them, with the options of the model beside them."""
+
+    count: int
+    spacing: float
+    waypoint_spacing: float
+    policy: str
+    control_margin: float
+    friction: float | None
+    max_torque: float | None
+    soil: str | None
+    payload: float | None
+    map_sigmas: float
+
+
+@dataclass(frozen=True)
 class _Content:
     """What the entry holds."""
 
     rover: dict[str, Any]
     start: tuple[float, float, float]
     goal: tuple[float, float, float]
-    options: PathQueryOptions
+    options: _Options
     joint_angles: dict[str, float] | None
     settings: LatticeSettings
 
@@ -39,13 +55,15 @@ def write_question(path: Path, question: WayQuestion, settings: LatticeSettings)
     Raises:
         TerrainError: The file cannot be written.
     """
+    options = asdict(question.options)
+    options |= options.pop("model")
     text = json.dumps(
         {
             "rover": asdict(question.rover),
             "start": np.asarray(question.start).tolist(),
             "goal": np.asarray(question.goal).tolist(),
-            "options": asdict(question.options),
-            "joint_angles": None if question.joint_angles is None else dict(question.joint_angles),
+            "options": {field.name: options[field.name] for field in fields(_Options)},
+            "joint_angles": question.options.model.arm_angles,
             "settings": asdict(settings),
         }
     )
@@ -77,7 +95,8 @@ def read_question(path: Path, max_cells: int = MAX_CELLS) -> tuple[WayQuestion, 
         terrain=terrain,
         start=asked.start,
         goal=asked.goal,
-        options=asked.options,
-        joint_angles=asked.joint_angles,
+        options=PathQueryOptions().change(
+            **asdict(asked.options), joint_angles=asked.joint_angles
+        ),
     )
     return question, asked.settings

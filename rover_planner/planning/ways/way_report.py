@@ -3,12 +3,10 @@
 from typing import Any
 
 from rover_physics.numerics.plain_values import to_plain
-from rover_physics.rover.model import Rover
-from rover_planner.planning.path_query import path_risk
 from rover_planner.planning.ways.way_search import FOUND, WayAnswer
 
 
-def report_way(rover: Rover, answer: WayAnswer) -> dict[str, Any]:
+def report_way(answer: WayAnswer) -> dict[str, Any]:
     """Return the report on a search; numbers that are not known are None.
 
     Lengths are in m, energy in J, times in s. Risk is the used share of the tightest safety limit.
@@ -23,7 +21,7 @@ def report_way(rover: Rover, answer: WayAnswer) -> dict[str, Any]:
             "length": None if path is None else path.length,
             "energy": None if prediction is None else float(prediction.energy[-1]),
             "time": None if prediction is None else float(prediction.time[-1]),
-            "risk": None if path is None else path_risk(rover, path.verdict),
+            "risk": None if path is None else path.verdict.risk,
             "cost": answer.cost,
             "expanded": answer.expanded,
             "edges_judged": answer.edges_judged,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.rover.turning import tightest_radius, wheelbase
+from rover_physics.rover.turning import tightest_radius
 from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import generate_candidates
@@ -143,10 +143,9 @@ class _WaySearch:
             question.rover,
             question.terrain,
             question.options,
-            question.joint_angles,
             question.blind,
         )
-        cell = settings.cell or 0.25 * wheelbase(question.rover)
+        cell = settings.cell or 0.25 * question.rover.wheelbase
         self._nodes, self._is_limited = choose_window(question, cell)
         self._memory = memory or EdgeMemory()
         self._repeatable, self._to_frontier = True, False
@@ -180,7 +179,7 @@ class _WaySearch:
 
     def _warn(self) -> str:
         """Return what is wrong with the lattice, in words."""
-        cell, coarse = self._nodes.cell, COARSE * wheelbase(self._question.rover)
+        cell, coarse = self._nodes.cell, COARSE * self._question.rover.wheelbase
         if cell <= coarse:
             return ""
         return (
@@ -208,7 +207,7 @@ class _WaySearch:
         question, nodes = self._question, self._nodes
         spacing = question.options.waypoint_spacing
         known = self._memory.recall(question, nodes)
-        friction = question.options.friction or question.rover.friction
+        friction = question.options.model.friction or question.rover.friction
         climb = steepest_climb(question.rover, friction)
         terrain = cut_out(question, nodes)
         ground = estimate_ground(question.rover, terrain, nodes)

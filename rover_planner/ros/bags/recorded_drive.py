@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import SIDES
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 
 STEP = 0.05
 """Distance between recorded poses [m]; what lies between counts as noise of odometry."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import LIMIT_NUMBERS, bits_type, pack_bits, unpack_bits
+from rover_planner.survey.layers import bits_type, number_limits, pack_bits, unpack_bits
 from rover_planner.survey.layout import Index
 from rover_planner.survey.reach.kept_area import (
     DISTANCE,
@@ -95,7 +95,7 @@ def say_why_none(store: SurveyStore, start: Index) -> str:
         start: Row and column of the start.
     """
     number = int(store.layer("first_limit")[start])
-    names = {number: name for name, number in LIMIT_NUMBERS.items()}
+    names = {number: name for name, number in number_limits().items()}
     return f"no heading is passable at the start: {names.get(number) or 'not surveyed'}"
 
 

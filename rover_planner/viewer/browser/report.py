@@ -10,9 +10,9 @@ import numpy as np
 
 import rover_physics
 from rover_physics.names import WHEELS
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
-from rover_physics.traversability.limit_checks import check_limits
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.state.context import Context
 from rover_planner.viewer.state.scenario import Judgement
@@ -92,13 +92,13 @@ def _find_row(
     rover: Rover, prediction: PathPrediction, waypoint: int
 ) -> tuple[PathPrediction, int, str]:
     """Return the prediction and its row in which a waypoint's limit is broken, and its name."""
-    between = prediction.between
-    here = any(check.breaks for check in check_limits(rover, prediction.select([waypoint])))
-    if between is not None and prediction.settled[waypoint] and not here:
-        for row in np.flatnonzero(between.waypoint == waypoint).tolist():
-            one = between.select([row])
-            if not one.settled[0] or any(c.breaks for c in check_limits(rover, one)):
-                return between, row, f"on the way to waypoint {waypoint}"
+    between, limits = prediction.between, limits_of(rover, prediction.policy)
+    passes = find_uses(limits, prediction.results).find_first()[waypoint] < 0
+    if between is not None and passes:
+        broken = find_uses(limits, between.results).find_first() >= 0
+        rows = np.flatnonzero((between.waypoint == waypoint) & broken)
+        if rows.size:
+            return between, int(rows[0]), f"on the way to waypoint {waypoint}"
     return prediction, waypoint, f"waypoint {waypoint}"
 
 

@@ -97,7 +97,7 @@ class GroundPainter:
 
 
 def _options_of(asked: Scenario) -> SweepOptions:
-    return asked.options.sweep_options(asked.arm_angles)
+    return asked.asked_options.model
 
 
 def _paint(request: PaintRequest, report: Report) -> Iterator[PaintedGround]:

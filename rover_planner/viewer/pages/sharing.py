@@ -80,8 +80,8 @@ class Sharing:
             ground=self._identify(now.terrain),
             start=now.start,
             goal=now.goal,
-            policy=now.options.policy,
-            soil=now.options.soil or "",
+            policy=now.options.model.policy,
+            soil=now.options.model.soil or "",
             path=session.shown.index + 1,
             time=round(self._playback.time, 3),
             layer=self._ground_tab.layer,
@@ -114,7 +114,7 @@ class Sharing:
             loaded = wanted.loaded
         _check_joints(link, loaded)
         same = (link.start, link.goal) == (wanted.start, wanted.goal)
-        options = dataclasses.replace(wanted.options, policy=link.policy, soil=link.soil or None)
+        options = wanted.options.change(policy=link.policy, soil=link.soil or None)
         _check_options(options)
         return dataclasses.replace(
             wanted,
@@ -165,10 +165,9 @@ def _write_short(link: Link) -> str:
 
 
 def _check_options(options: PathQueryOptions) -> None:
-    """Check torques and soil by their names, before the page shows them as chosen."""
-    options.sweep_options()
-    if options.soil is not None:
-        soil_named(options.soil)
+    """Check the soil by its name, before the page shows it as chosen."""
+    if options.model.soil is not None:
+        soil_named(options.model.soil)
 
 
 def _check_joints(link: Link, rover: Rover) -> None:

@@ -76,8 +76,8 @@ def build_ground_mesh(
     if layer.score is not None:
         coarse_x, coarse_y, _ = subsample(terrain, MAX_PREDICTED)
         at = (coarse_x, coarse_y)
-        values = predict_layer(layer, rover, terrain, heading, at, options)
-        beyond = _resample_nearest(layer.find_beyond(rover, values), at, (x, y))
+        values, broken = predict_layer(layer, rover, terrain, heading, at, options)
+        beyond = _resample_nearest(broken, at, (x, y))
         low, high = colour_span(layer, rover, values)
         if layer.has_classes:
             values = np.where(values == 1.0, values, np.nan)
@@ -92,11 +92,10 @@ def build_ground_mesh(
         low, high = colour_span(layer, rover, values)
         colours = map_colours(values, low, high)
     texture = _texture(shade_hills(colours, x, y, heights), x, y, beyond)
-    limit = None if layer.limit is None else layer.limit(rover)
     classes = (("keeps all limits", GOOD),) if layer.has_classes else ()
     return GroundMesh(
         build_textured_mesh(x, y, heights, texture),
-        ColourScale(low, high, layer.unit, limit, classes),
+        ColourScale(low, high, layer.unit, layer.find_limit(rover), classes),
     )
 
 

@@ -33,8 +33,9 @@ def describe_scenario(scenario: Scenario, ground: str) -> Context:
     """Return what a scenario is about, on a ground with a name."""
     rover, terrain, options = scenario.rover, scenario.terrain, scenario.options
     changed = "" if rover == scenario.loaded else " (changed)"
-    soil = options.soil or f"firm, friction {rover.friction:g}"
+    soil = options.model.soil or f"firm, friction {rover.friction:g}"
     if terrain.soil_names:
         soil = f"{', '.join(terrain.soil_names)} on the map"
     mode = "planning" if scenario.recorded is None else "replay"
-    return Context(f"{rover.name}{changed}", ground, soil, POLICY_TITLES[options.policy], mode)
+    policy = POLICY_TITLES[options.model.policy]
+    return Context(f"{rover.name}{changed}", ground, soil, policy, mode)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from rover_physics.limits.table import LIMITS
 from rover_physics.names import SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.path_prediction import PathPrediction
-from rover_physics.traversability.verdict import UNNEEDED_IN_A_FALL
+from rover_physics.results.path_prediction import PathPrediction
 
 MAX_PLACES = 3
 """Most places that are named in a sentence."""
@@ -64,7 +64,10 @@ def _tell_falls(own: PathPrediction, parts: list[PathPrediction]) -> str:
             places.setdefault(place, []).append(name)
     if not places:
         return ""
-    limits = [code.replace("_", " ") for code in UNNEEDED_IN_A_FALL]
+    limits = [
+        code.replace("_", " ")
+        for code in dict.fromkeys(row.code for row in LIMITS if row.rests_in_a_fall)
+    ]
     shown = "; ".join(
         f"{' and '.join(sorted(names))} {place}"
         for place, names in list(places.items())[:MAX_PLACES]

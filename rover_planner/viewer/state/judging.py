@@ -147,7 +147,7 @@ def _search_ways(judgement: Judgement, report: Report, memory: EdgeMemory) -> It
     report(WAY, 1, 1)
     asked = judgement.scenario
     ends = asked.start, asked.goal
-    question = WayQuestion(asked.rover, asked.terrain, *ends, asked.options, asked.arm_angles)
+    question = WayQuestion(asked.rover, asked.terrain, *ends, asked.asked_options)
     first = find_way(question, replace(asked.search, ends_at_first=True), memory)
     yield _add_way(judgement, first)
     left = asked.search.budget - first.seconds
@@ -182,7 +182,7 @@ def _judge_under(policy: str, scenario: Scenario, candidate: Candidate) -> Polic
     if candidate.verdict.policy == policy:
         return _own_verdict(candidate)
     try:
-        options = replace(scenario.options, policy=policy)
+        options = scenario.options.change(policy=policy)
         other = _check(replace(scenario, options=options), candidate.poses)
     except RoverError as error:
         return PolicyVerdict(policy, None, str(error))
@@ -195,8 +195,7 @@ def _check(scenario: Scenario, poses: Floats) -> Candidate:
         scenario.rover,
         scenario.terrain,
         poses,
-        scenario.options,
-        scenario.arm_angles,
+        scenario.asked_options,
         stop_at_failure=True,
     )
 

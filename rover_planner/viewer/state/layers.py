@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.limits.table import LIMITS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.map_sweep import PoseScores, score_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
+from rover_physics.status import PoseStatus
 
 STEEP = 35.0
 """Slope of the last colour [deg]."""
@@ -22,25 +24,22 @@ class Layer:
 
     unit: str
     """Unit for the scale, empty for none."""
-    score: Callable[[Rover, PoseScores], Floats] | None = None
+    score: Callable[[PoseScores], NDArray[Any]] | None = None
     """Values from scores of the rover at the cells; None for layers of the ground alone."""
     span: Callable[[Rover], tuple[float, float]] | None = None
     """Values of the first and last colour; None: the smallest and largest value."""
-    limit: Callable[[Rover], float] | None = None
-    """Limit of the values; None for none."""
-    is_lowest: bool = False
-    """Whether the limit is the smallest good value, not the largest."""
+    code: str = ""
+    """Code of the limit of the values; empty for none."""
+    factor: float = 1.0
+    """The limit in SI units times this is in `unit`."""
     has_classes: bool = False
     """Whether values are classes: 1 keeps the limits, 0 breaks one."""
 
-    def find_beyond(self, rover: Rover, values: Floats) -> NDArray[np.bool_]:
-        """Return where values break the limit; NaN breaks none."""
-        if self.has_classes:
-            return np.asarray(values == 0.0)
-        if self.limit is None:
-            return np.zeros(values.shape, bool)
-        limit = self.limit(rover)
-        return np.asarray(values < limit if self.is_lowest else values > limit)
+    def find_limit(self, rover: Rover) -> float | None:
+        """Return the limit of the values, None if there is none."""
+        row = next((row for row in LIMITS if row.code == self.code), None)
+        bound = None if row is None else row.find_bound(rover)
+        return self.factor * bound if isinstance(bound, float | int) else None
 
 
 HEIGHT, SLOPE = "height", "slope"
@@ -49,48 +48,47 @@ LAYERS: Mapping[str, Layer] = {
     SLOPE: Layer("deg", span=lambda _rover: (0.0, STEEP)),
     "passable or not": Layer(
         "",
-        lambda rover, scores: np.where(scores.status == 0, scores.within_limits(rover), np.nan),
+        lambda scores: np.where(scores.status == 0, scores.passable, np.nan),
         lambda _rover: (0.0, 1.0),
         has_classes=True,
     ),
     "friction utilisation": Layer(
         "",
-        lambda _rover, scores: np.asarray(scores.friction_utilisation, dtype=float),
+        lambda scores: scores.friction_utilisation,
         lambda rover: (0.0, rover.limits.friction_utilisation),
-        lambda rover: rover.limits.friction_utilisation,
+        "friction",
     ),
     "torque saturation": Layer(
         "",
-        lambda _rover, scores: np.asarray(scores.torque_saturation, dtype=float),
+        lambda scores: scores.torque_saturation,
         lambda rover: (0.0, rover.limits.torque_saturation),
-        lambda rover: rover.limits.torque_saturation,
+        "torque",
     ),
     "stability margin": Layer(
         "",
-        lambda _rover, scores: np.asarray(scores.tip_over_ratio, dtype=float),
+        lambda scores: scores.tip_over_ratio,
         lambda rover: (rover.limits.tip_over_ratio, max(1.0, rover.limits.tip_over_ratio + 0.1)),
-        lambda rover: rover.limits.tip_over_ratio,
-        is_lowest=True,
+        "tip_over",
     ),
     "smallest wheel load": Layer(
         "N",
-        lambda _rover, scores: np.asarray(scores.least_load, dtype=float),
+        lambda scores: scores.least_load,
         lambda rover: (0.0, rover.weight / 6.0),
-        lambda _rover: 0.0,
-        is_lowest=True,
+        "wheel_lift",
     ),
     "tilt": Layer(
         "deg",
-        lambda _rover, scores: np.degrees(scores.tilt),
+        lambda scores: np.degrees(scores.tilt),
         lambda rover: (0.0, float(np.degrees(rover.limits.tilt))),
-        lambda rover: float(np.degrees(rover.limits.tilt)),
+        "tilt",
+        180.0 / np.pi,
     ),
     "belly clearance": Layer(
         "cm",
-        lambda _rover, scores: 100.0 * np.asarray(scores.belly_clearance, dtype=float),
+        lambda scores: 100.0 * scores.belly_clearance.astype(float),
         lambda rover: _belly_span(rover),
-        lambda rover: 100.0 * rover.limits.belly_clearance,
-        is_lowest=True,
+        "belly",
+        100.0,
     ),
 }
 """The layers by name."""
@@ -120,8 +118,8 @@ def predict_layer(
     heading: float | Floats,
     at: tuple[Floats, Floats],
     options: SweepOptions,
-) -> Floats:
-    """Return the values (ny, nx) of a predicted layer with the rover at each point.
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return a predicted layer with the rover at each point.
 
     Args:
         layer: A layer with a score.
@@ -131,13 +129,19 @@ def predict_layer(
         at: x (nx,) and y (ny,) of the points [m].
         options: Options of the model.
 
+    Returns:
+        Values (ny, nx), NaN where the rover does not settle, and where they break their limit.
+
     Raises:
         RoverError: The model refuses an option.
     """
     assert layer.score is not None
     x, y = np.meshgrid(*at)
     poses = np.stack([x, y, _headings(x, y, heading)], axis=-1)
-    return np.asarray(layer.score(rover, score_poses(rover, terrain, poses, options)))
+    scores = score_poses(rover, terrain, poses, options)
+    of_layer = [layer.has_classes or row.code == layer.code for row in scores.limits.rows]
+    broken = (scores.uses[..., of_layer] > 1.0).any(axis=-1)
+    return np.asarray(layer.score(scores), float), broken & (scores.status == PoseStatus.SETTLED)
 
 
 def _headings(x: Floats, y: Floats, heading: float | Floats) -> Floats:

@@ -38,6 +38,11 @@ class Scenario:
     search: LatticeSettings = field(default_factory=LatticeSettings)
     """How a way around obstacles is searched."""
 
+    @property
+    def asked_options(self) -> PathQueryOptions:
+        """How candidates are judged with the arm as it is."""
+        return self.options.change(joint_angles=self.arm_angles)
+
     def has_paths_of(self, other: "Scenario") -> bool:
         """Return whether the candidate paths are the same but for changed numbers of the rover."""
         return (

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import Key
-from rover_physics.prediction.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
@@ -144,7 +144,7 @@ class ViewSession:
 
     def sweep_options(self) -> SweepOptions:
         """Return the options of the model of the last judgement."""
-        return self.options.sweep_options(self.arm_angles)
+        return self.finished.scenario.asked_options.model
 
     # What is wanted. All return whether the change was accepted; if not, `refusal` says why. In
     # the background a change may be accepted and still be refused when it is judged.
@@ -184,7 +184,7 @@ class ViewSession:
 
     def change_options(self, **changes: object) -> bool:
         """Change fields of PathQueryOptions and plan again."""
-        return self._want(options=dataclasses.replace(self.wanted.options, **changes))  # type: ignore[arg-type]
+        return self._want(options=self.wanted.options.change(**changes))
 
     def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
         """Take another rover, changed from a loaded one (default: not), and plan again.
@@ -351,7 +351,7 @@ class ViewSession:
         first = next((k for k, reason in enumerate(reasons) if reason), -1)
         driven = prediction if first < 0 else prediction.cut(first + 1)
         verdict = dataclasses.replace(
-            judge(self.wanted.rover, driven),
+            hold_against_limits(self.wanted.rover, driven),
             traversable=first < 0,
             reasons=tuple(reasons),
             first_failure=first,

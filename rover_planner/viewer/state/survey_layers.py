@@ -23,9 +23,9 @@ from rover_planner.survey.chunk_survey import open_map
 from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
-    LIMIT_NUMBERS,
     NOT_SURVEYED,
     QUANTITIES,
+    number_limits,
     unpack_bits,
 )
 from rover_planner.survey.palette import CLASS_COLOURS, CLASS_LABELS, SOME_HEADINGS, UNKNOWN_LABEL
@@ -157,14 +157,14 @@ class ShownSurvey:
         shown = (best if name == BEST_CLASS else worst).copy()
         if name == CLASS:
             shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
-        off_ground = [LIMIT_NUMBERS[code] for code in ("off_map", "unknown_ground")]
+        off_ground = [number_limits()[code] for code in ("off_map", "unknown_ground")]
         shown[(best == impassable) & np.isin(limits, off_ground)] = NOT_SURVEYED
         return shown
 
     def _colour_limits(self) -> ColouredGround:
         """Return the colours of the first limits that fail."""
         limits = self._read(self._store.layer("first_limit"))
-        names = {number: code.replace("_", " ") for code, number in LIMIT_NUMBERS.items()}
+        names = {number: code.replace("_", " ") for code, number in number_limits().items()}
         labels = tuple(names[k] or "none: all headings pass" for k in sorted(names))
         return _colour_classes(limits, labels, list_limit_colours())
 
@@ -283,7 +283,7 @@ def list_limit_colours() -> tuple[Colour, ...]:
 
     palette = np.round(255.0 * colormaps["tab20"](np.arange(20))[:, :3]).astype(int).tolist()
     colours = [from_css(CLASS_COLOURS[0])]
-    for k in range(len(LIMIT_NUMBERS) - 1):
+    for k in range(len(number_limits()) - 1):
         red, green, blue = palette[k % len(palette)]
         colours.append((red, green, blue))
     return tuple(colours)

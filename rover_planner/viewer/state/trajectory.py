@@ -7,7 +7,7 @@ import numpy as np
 
 from rover_physics.names import SERVO
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.viewer.state.exemptions import tell_exemptions

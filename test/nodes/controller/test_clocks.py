@@ -10,7 +10,7 @@ from support.waiting import wait_until
 
 BOUND = 1.5
 """Longest time from the cause to zero or hold [s]: the timeouts below, and
-what a busy machine adds; docs/reliability.md has what was measured with the defaults."""
+what a busy machine adds; docs/validation.md has what was measured with the defaults."""
 TIGHT = {
     "joint_states_timeout": 0.3,
     "imu_timeout": 0.3,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import attitude_of
 

@@ -5,7 +5,7 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import bouldered, fractal
 
 LSR1 = load_rover("lsr1")

@@ -32,7 +32,7 @@ from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.soil_file import load_soils
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import fractal, mirrored, plane, random_poses, smooth
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")

@@ -10,7 +10,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.long_path import judge_long_path
 from support.rough_grounds import plane
 

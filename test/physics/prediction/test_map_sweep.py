@@ -11,7 +11,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.limit_checks import tilt_of
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, rocky
 
 ROVER = load_rover("lsr1")

@@ -16,7 +16,7 @@ from rover_physics.rover.model import Steering
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import fractal, mirrored, plane, random_poses, smooth
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")

@@ -10,8 +10,8 @@ from rover_physics.prediction.servo_path import add_up_rate
 from rover_physics.prediction.sweep import sweep_in_full, sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge_path import judge_path
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bouldered, plane
 

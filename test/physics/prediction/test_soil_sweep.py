@@ -15,7 +15,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
 from rover_physics.traversability.torque_ranges import find_torque_ranges
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import balance_residuals, turned_round
 
@@ -41,7 +41,7 @@ def with_soil(ground: Terrain, *names: str, index=0) -> Terrain:
 
 
 def bekker_wong(name: str, N: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sinkage [m], resistance and largest thrust [N] by the formulas of notes/soil.md."""
+    """Return sinkage [m], resistance and largest thrust [N] by the formulas of docs/soil.md."""
     soil, r, b = load_soils()[name], LSR1.wheel.radius, LSR1.wheel.width
     stiffness = soil.k_c + b * soil.k_phi
     sinkage = (3.0 * N / ((3.0 - soil.n) * stiffness * np.sqrt(2.0 * r))) ** (

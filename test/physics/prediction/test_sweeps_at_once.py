@@ -9,7 +9,7 @@ import numpy as np
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from support.grounds import make_terrain, rocky
 
 ROVER = load_rover("lsr1")

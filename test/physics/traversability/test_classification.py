@@ -22,8 +22,8 @@ from rover_physics.traversability.classification import (
     classify_path,
     deciding_waypoint,
 )
-from rover_physics.traversability.judge_path import judge_path
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane, random_poses, rocky
 

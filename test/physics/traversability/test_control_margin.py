@@ -16,7 +16,7 @@ from rover_physics.traversability.classification import (
     WITH_TRACTION_CONTROL,
     classify_path,
 )
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_planner.parameters.shared import CONTROL_MARGIN
 from support.reference_drives import drive_ground, drive_path, unlimited

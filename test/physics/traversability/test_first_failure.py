@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from rover_physics.prediction import crossing
 from rover_physics.prediction.path_kernels import Wheels
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability import first_failure
 from rover_physics.traversability.first_failure import sweep_until_failure
-from rover_physics.traversability.judge_path import judge_path, judge_paths
+from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict, judge
 from support.rough_grounds import bouldered, fractal, rocky
 

@@ -7,11 +7,11 @@ import pytest
 
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction import parts
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.long_path import judge_long_path
 from support.rough_grounds import bouldered
 

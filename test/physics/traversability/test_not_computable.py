@@ -22,10 +22,10 @@ from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import judge_bounds
 from rover_physics.traversability.classification import classify_path
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.reach import judge_reach
 from rover_physics.traversability.torque_ranges import find_torque_ranges
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import path_cost
 from support.rough_grounds import plane
 

@@ -5,7 +5,7 @@ import pytest
 
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge_path import judge_paths
+from rover_physics.traversability.judge import judge_paths
 from rover_physics.traversability.pieces import judge_pieces
 from rover_physics.traversability.risk import SAFE, find_exposure, used_share
 from support.rough_grounds import fractal, rocky

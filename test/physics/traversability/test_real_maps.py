@@ -7,7 +7,7 @@ from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import quarter_turn
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")

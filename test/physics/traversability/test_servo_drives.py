@@ -7,7 +7,7 @@ import pytest
 
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import (
     PASSED,
     Curve,

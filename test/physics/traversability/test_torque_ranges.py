@@ -13,7 +13,7 @@ from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.torque_ranges import find_torque_ranges
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_cases import reference_ground
 from support.rough_grounds import fractal, mirrored, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_matrix, free_balance_matrix

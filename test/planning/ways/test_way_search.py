@@ -8,7 +8,7 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.errors import PlanningError
 from rover_planner.planning.lattice.ground_estimate import FULL_DOUBT, estimate_ground
 from rover_planner.planning.lattice.judge import Judge

@@ -9,8 +9,8 @@ from rover_physics.names import OPTIMAL, SERVO, WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.judge_path import judge_path
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.viewer.state.reasons.before_after import (
     ChangeHistory,

@@ -10,7 +10,7 @@ import pytest
 
 from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_physics.traversability.judge_path import judge_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.command.view import choose_ends
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.way_search import LatticeSettings

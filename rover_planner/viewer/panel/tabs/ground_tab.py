@@ -94,8 +94,8 @@ class GroundTab:
     def show_options(self, options: PathQueryOptions) -> None:
         """Choose policy and soil as they are judged."""
         titles = {policy: title for title, policy in POLICIES.items()}
-        self._policy.value = titles[options.policy]
-        self._soil.value = options.soil or NO_SOIL
+        self._policy.value = titles[options.model.policy]
+        self._soil.value = options.model.soil or NO_SOIL
 
     def choose_layer(self, layer: str, heading: float, *, along: bool = False) -> None:
         """Choose the layer that colours the ground.

@@ -1,12 +1,14 @@
 """The limits that a verdict holds a path against: name, unit, value and direction of each."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from rover_physics.forces.soil import MODERATE_SINKAGE
-from rover_physics.names import SERVO
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.limits.table import Limit as LimitRow
+from rover_physics.limits.table import Sense
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.uses import limits_of
 from rover_physics.rover.model import Rover
 
 GROUND = "ground"
@@ -73,24 +75,29 @@ class Limit:
 def list_limits(rover: Rover, prediction: PathPrediction) -> dict[str, Limit]:
     """Return the limits by code for a prediction, in the order in which they become reasons.
 
-    Those of friction and torque are less the control margin. With speed servos they limit the
-    rover as a whole, so that they have no number. Sinkage is left out where nothing sinks.
+    Those of friction and torque are less the control margin. Sinkage is left out where nothing
+    sinks.
     """
-    limits, kept = rover.limits, 1.0 - prediction.control_margin
-    on_servos = prediction.policy == SERVO
-    sinks = bool(np.any(prediction.sinkage > 0.0))
-    found = [
-        Limit(GROUND, "ground"),
-        Limit("suspension", "joints"),
-        Limit("tilt", "tilt", float(np.degrees(limits.tilt)), "deg", 180.0 / np.pi, digits=1),
-        Limit("tip_over", "margin", limits.tip_over_ratio, is_lowest=True),
-        Limit("wheel_lift", "load", None if on_servos else 0.0, "N", is_lowest=True, digits=1),
-        Limit("friction", "friction", None if on_servos else kept * limits.friction_utilisation),
-        Limit("torque", "torque", None if on_servos else kept * limits.torque_saturation),
-        Limit("wheel_drop", "drop", 100.0 * limits.wheel_drop, "cm", 100.0, digits=1),
-        Limit("belly", "belly", 100.0 * limits.belly_clearance, "cm", 100.0, True, 1),
-    ]
-    if sinks:
-        deepest = 100.0 * MODERATE_SINKAGE * 2.0 * rover.wheel.radius
-        found.insert(5, Limit("sinkage", "sinkage", deepest, "cm", 100.0, digits=1))
-    return {limit.code: limit for limit in found}
+    asked = limits_of(rover, prediction.policy)
+    found = {GROUND: Limit(GROUND, "ground")}
+    for code in dict.fromkeys(row.code for row in asked.rows):
+        if code == "sinkage" and not np.any(prediction.sinkage > 0.0):
+            continue
+        rows = [
+            (row, bound)
+            for row, bound in zip(asked.rows, asked.bounds, strict=True)
+            if row.code == code
+        ]
+        found[code] = _show(rows, 1.0 - prediction.control_margin)
+    return found
+
+
+def _show(rows: list[tuple[LimitRow, Any]], kept: float) -> Limit:
+    """Return the limit that rows of one code are to people: a number if it is one row's."""
+    row, bound = rows[0]
+    if len(rows) > 1 or row.sense == Sense.RANGE:
+        return Limit(row.code, row.title)
+    unit = row.shown or row.unit
+    bound *= unit.factor * (kept if row.keeps_margin else 1.0)
+    is_lowest = row.sense in (Sense.LEAST, Sense.SHARE)
+    return Limit(row.code, row.title, bound, unit.name, unit.factor, is_lowest, unit.digits)

@@ -2,17 +2,19 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import find_column, numbers_of
+from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.check import Check
-from rover_physics.traversability.limit_checks import check_limits
-from rover_physics.traversability.verdict import UNNEEDED_IN_A_FALL, Verdict
+from rover_physics.traversability.classification import find_wheel
+from rover_physics.traversability.verdict import Verdict
 from rover_planner.viewer.state.reasons.limits import GROUND, Limit, list_limits
 
 
@@ -121,17 +123,12 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
     parts = [prediction]
     if prediction.between is not None and len(prediction.between.poses):
         parts.append(prediction.between)
-    checks = [{check.code: check for check in check_limits(rover, part)} for part in parts]
     status = np.concatenate([part.status for part in parts])[order]
-    falls = np.concatenate([part.falling.any(axis=1) for part in parts])[order]
     lanes = [_ground_lane(limits[GROUND], status)]
     for code, limit in limits.items():
         if code != GROUND:
-            lane = _lane(limit, [found[code] for found in checks], order)
-            exempt = falls if code in UNNEEDED_IN_A_FALL else np.zeros_like(falls)
-            lane.use[exempt] = Use.EXEMPT
-            lane.use[status != PoseStatus.SETTLED] = Use.UNKNOWN
-            lanes.append(lane)
+            lanes.append(_lane(rover, limit, parts, order))
+            lanes[-1].use[status != PoseStatus.SETTLED] = Use.UNKNOWN
     found_limits = PathLimits(rows, tuple(lanes), length)
     _add_refusals(found_limits, verdict)
     return found_limits
@@ -184,41 +181,36 @@ def _ground_lane(limit: Limit, status: NDArray[np.int8]) -> Lane:
     return Lane(limit, np.full(m, np.nan), np.where(stands, 0.0, np.nan), np.full(m, -1), use)
 
 
-def _lane(limit: Limit, checks: list[Check], order: NDArray[np.intp]) -> Lane:
-    """Return the lane of a limit from the checks of the waypoints and of the other poses."""
-    with np.errstate(all="ignore"):
-        left = np.concatenate([check.margins() for check in checks])[order]
-        wheel = np.concatenate([check.wheels() for check in checks])[order]
-        broken = np.concatenate([check.broken() for check in checks])[order]
-        values = np.concatenate([_pick(check, limit) for check in checks])[order]
-        used = _share_used(limit, left)
-    if limit.bound == 0.0 and limit.code != "wheel_lift":
-        used = np.zeros_like(used)
-    use = np.where(broken, Use.BROKEN, Use.KEPT).astype(np.int8)
-    return Lane(limit, limit.factor * values, used, wheel.astype(np.int64), use)
+def _lane(
+    rover: Rover, limit: Limit, parts: list[PathPrediction], order: NDArray[np.intp]
+) -> Lane:
+    """Return the lane of a limit at the waypoints and at the other poses."""
+    columns = [_read_limit(rover, limit, part) for part in parts]
+    joined = (np.concatenate(column)[order] for column in zip(*columns, strict=True))
+    values, used, wheel, exempt = joined
+    use = np.where(used > 1.0, Use.BROKEN, Use.KEPT)
+    use = np.where(exempt, Use.EXEMPT, use).astype(np.int8)
+    return Lane(limit, limit.factor * values, used, wheel, use)
 
 
-def _pick(check: Check, limit: Limit) -> Floats:
-    """Return the value (n,) of a check that is compared with its limit; NaN without a number."""
-    if limit.bound is None:
-        return np.full(len(check.values), np.nan)
-    if check.values.ndim == 1:
-        return np.asarray(check.values, dtype=float)
-    wheels = np.maximum(check.wheels(), 0)
-    return np.asarray(np.take_along_axis(check.values, wheels[:, None], axis=1)[:, 0], dtype=float)
+def _read_limit(rover: Rover, limit: Limit, part: PathPrediction) -> tuple[NDArray[Any], ...]:
+    """Return value, use, wheel and exemption (n,) of a limit; those of its row that is used most.
 
-
-def _share_used(limit: Limit, left: Floats) -> Floats:
-    """Return the share of a limit that is used from the share that is left, as a check gives it.
-
-    A joint in the middle of its range has half of the range left. A smallest good value is used by
-    limit over value, as `risk.used_share` does.
+    The value is NaN if the limit is no number, the wheel -1 for none.
     """
-    if limit.code == "suspension":
-        return np.asarray(1.0 - 2.0 * left)
-    if limit.is_lowest and limit.code != "wheel_lift":
-        return np.asarray(np.where(left > -1.0, 1.0 / (1.0 + left), np.inf))
-    return np.asarray(1.0 - left)
+    uses = find_uses(limits_of(rover, part.policy), part.results)
+    rows = np.array([k for k, row in enumerate(uses.limits.rows) if row.code == limit.code])
+    every = np.arange(len(part.poses))
+    asked = np.where(np.isnan(uses.use[:, rows]), -np.inf, uses.use[:, rows])
+    decides = rows[asked.argmax(axis=1)]
+    used, element = uses.use[every, decides], uses.element[every, decides]
+    values = np.full(len(every), np.nan)
+    if limit.bound is not None:
+        column = find_column(uses.limits.rows[rows[0]].reads)[0]
+        values = numbers_of(part.results)[every, column + np.maximum(element, 0)]
+    wheel = np.array([find_wheel(part, uses, i, int(k)) for i, k in enumerate(decides)], np.int64)
+    rests = bool(uses.limits.records["rests_in_a_fall"][rows].all())
+    return values, used, wheel, np.asarray(part.falling.any(axis=1) & rests)
 
 
 def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:

@@ -1,0 +1,1 @@
+"""What is predicted at a pose, and how much of each limit it uses."""

@@ -1,0 +1,192 @@
+"""The main calls of the package: paths or poses in, predictions and verdicts out."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
+from rover_physics.names import EQUAL
+from rover_physics.numerics.interruption import check_interruption
+from rover_physics.numerics.quiet import quiet
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.path_motion import motions_of
+from rover_physics.prediction.sweep import check_poses, evaluator, predict_poses, sweep_paths
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.bounded_verdict import judge_worst_case
+from rover_physics.traversability.entrapment import course_of, refuse_if_trapped
+from rover_physics.traversability.verdict import Verdict, hold_against_limits, with_refusals
+
+
+def judge_path(
+    rover: Rover,
+    terrain: Terrain,
+    poses: ArrayLike,
+    options: SweepOptions = DEFAULT_OPTIONS,
+    *,
+    sigmas: float | None = SIGMAS,
+    stop_at_failure: bool = False,
+) -> tuple[PathPrediction, Verdict]:
+    """Predict a path and judge it, including entrapment.
+
+    If the terrain has a layer `elevation_std`, the prediction has bounds, and the verdict also
+    refuses waypoints that break a limit in the worst case within them. The layer adds refusals and
+    removes none.
+
+    With a control margin, policy "optimal" also refuses poses that leave less than that of
+    friction or torque, except those that are passable with equal torques.
+
+    Args:
+        rover: The rover.
+        terrain: The ground; its friction and soil layers override the options.
+        poses: (n, 3) waypoints, x, y [m] and yaw [rad] of base_link, map frame, n >= 1.
+        options: Torque policy, friction, soil, arm and direction.
+        sigmas: Number of standard deviations by which the map's heights may be wrong; 0 or None
+            takes the map as exact.
+        stop_at_failure: Whether to leave out the waypoints beyond the first failure (default: all
+            waypoints are predicted and judged). It saves their time and changes neither whether
+            the path is traversable nor code, reason and waypoint of the first failure.
+
+    Returns:
+        The prediction, and the verdict on it. With `stop_at_failure`, both end at the first
+        failure or at a waypoint beyond it, and only the first refusal is sure to be the same as
+        without.
+
+    Raises:
+        PoseError: Poses of wrong shape, or not finite.
+        ModelError: An option that this rover cannot have, or `sigmas` below 0.
+        SoilError: A soil that is not a preset.
+    """
+    return judge_paths(
+        rover, terrain, [poses], options, sigmas=sigmas, stop_at_failure=stop_at_failure
+    )[0]
+
+
+@quiet
+def judge_paths(
+    rover: Rover,
+    terrain: Terrain,
+    paths: Sequence[ArrayLike],
+    options: SweepOptions = DEFAULT_OPTIONS,
+    *,
+    sigmas: float | None = SIGMAS,
+    stop_at_failure: bool = False,
+    check_entrapment: bool = True,
+) -> list[tuple[PathPrediction, Verdict]]:
+    """Judge several paths at once, faster than one by one; see `judge_path`.
+
+    Without `check_entrapment`, ways out are not looked for: pieces of a longer path are judged,
+    and the whole of it later.
+    """
+    check_sigmas(sigmas)
+    model = pack_model(rover, terrain, options)
+    checked = [check_poses(poses) for poses in paths]
+    judged = []
+    for swept in sweep_paths(terrain, model, checked, stop_at_failure):
+        check_interruption()
+        verdict = hold_against_limits(rover, swept.prediction)
+        if check_entrapment and verdict.code != "wheel_drop":
+            course = course_of(rover, swept, options)
+            verdict = refuse_if_trapped(rover, terrain, course, verdict, options)
+        judged.append(judge_bounds(rover, terrain, swept.prediction, verdict, options, sigmas))
+    return judged
+
+
+@quiet
+def judge_poses(
+    rover: Rover,
+    terrain: Terrain,
+    poses: ArrayLike,
+    curvature: ArrayLike | None = None,
+    options: SweepOptions = DEFAULT_OPTIONS,
+    *,
+    sigmas: float | None = SIGMAS,
+) -> tuple[PathPrediction, Verdict]:
+    """Predict and judge single poses that form no path; what lies between them is not looked at.
+
+    Crossings, falls, drops and entrapment are left out. Time, energy and distance are 0 where the
+    rover settled.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        poses: (n, 3) x, y [m] and yaw [rad] of base_link, map frame, n >= 1.
+        curvature: (n,) curvature of the motion of base_link at each pose [1/m], positive to the
+            left, 0 straight ahead, inf or -inf on the spot. None: straight ahead.
+        options: As for `judge_path`.
+        sigmas: As for `judge_path`.
+
+    Raises:
+        PoseError: Poses or curvatures of wrong shape, or not numbers.
+        ModelError, SoilError: As `judge_path`.
+    """
+    check_sigmas(sigmas)
+    model, places = pack_model(rover, terrain, options), check_poses(poses)
+    bends = np.zeros(len(places)) if curvature is None else curvature
+    motions = motions_of(model, places, bends)
+    return _judge_in_motion(rover, terrain, places, motions, options, sigmas)
+
+
+def _judge_in_motion(
+    rover: Rover,
+    terrain: Terrain,
+    places: np.ndarray,
+    motions: np.ndarray,
+    options: SweepOptions,
+    sigmas: float | None,
+) -> tuple[PathPrediction, Verdict]:
+    """Judge single poses (n, 3) with motions (n, 3) as of `path_motions`."""
+    model = pack_model(rover, terrain, options)
+    prediction = predict_poses(model, places, evaluator(model)(places, motions=motions))
+    verdict = hold_against_limits(rover, prediction)
+    return judge_bounds(rover, terrain, prediction, verdict, options, sigmas)
+
+
+def judge_bounds(
+    rover: Rover,
+    terrain: Terrain,
+    prediction: PathPrediction,
+    verdict: Verdict,
+    options: SweepOptions,
+    sigmas: float | None,
+) -> tuple[PathPrediction, Verdict]:
+    """Return a prediction with its bounds and the verdict with their refusals.
+
+    On a map with exact heights both stay as they are.
+    """
+    bounds = bound_path(rover, terrain, prediction, options, sigmas)
+    if bounds is None:
+        return prediction, verdict
+    worst = judge_worst_case(rover, prediction, bounds, verdict)
+    if options.kept_margin > 0.0:
+        worst = _pass_with_equal_torques(rover, terrain, prediction, verdict, worst, options)
+    return replace(prediction, bounds=bounds), worst
+
+
+def _pass_with_equal_torques(
+    rover: Rover,
+    terrain: Terrain,
+    prediction: PathPrediction,
+    verdict: Verdict,
+    worst: Verdict,
+    options: SweepOptions,
+) -> Verdict:
+    """Return the worst case without refusals of waypoints that equal torques pass in theirs.
+
+    `verdict` is the one without bounds, of which all refusals stay.
+    """
+    codes, reasons = list(worst.codes), list(worst.reasons)
+    rows = [i for i, code in enumerate(codes) if code and not verdict.codes[i]]
+    if not rows:
+        return worst
+    equal = replace(options, policy=EQUAL)
+    places, motions = prediction.poses[rows], np.ascontiguousarray(prediction.motion[rows])
+    _, other = _judge_in_motion(rover, terrain, places, motions, equal, worst.map_sigmas)
+    for i, code in zip(rows, other.codes, strict=True):
+        if not code:
+            codes[i] = reasons[i] = ""
+    return with_refusals(worst, codes, reasons)
