@@ -43,18 +43,12 @@ class Guard:
             )
         return text
 
-    def around(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a callback that reports errors instead of raising them."""
-
-        @functools.wraps(callback)
-        def guarded(*values: Any) -> Any:
-            try:
-                return callback(*values)
-            except Exception as error:
-                self.report(getattr(callback, "__name__", "a callback"), error)
-                return None
-
-        return guarded
+    def call(self, function: Callable[[], object]) -> None:
+        """Call a function; report its error instead of raising it."""
+        try:
+            function()
+        except Exception as error:
+            self.report(getattr(function, "__name__", "a callback"), error)
 
 
 class GuardedExecutor(SingleThreadedExecutor):

@@ -26,4 +26,4 @@ class Handover:
 
     def _call_all(self) -> None:
         while self._waiting:
-            self._guard.around(self._waiting.popleft())()
+            self._guard.call(self._waiting.popleft())

@@ -53,4 +53,4 @@ class PacedSender:
 
     def _send_next(self) -> None:
         self._count += 1
-        self._guard.around(self._waiting.popleft())()
+        self._guard.call(self._waiting.popleft())

@@ -116,9 +116,8 @@ def test_an_entity_that_cannot_be_read_blocks_a_node_only_without_the_guard(ros,
 def test_an_error_is_logged_once_with_its_trace_and_counted():
     log = Log()
     guard = Guard(log)
-    fails = guard.around(lambda: 1 / 0)
     for _ in range(5):
-        fails()
+        guard.call(lambda: 1 / 0)
     assert guard.total == 5 and len(log.lines) == 1
     assert "Traceback" in log.lines[0] and "ZeroDivisionError" in log.lines[0]
     assert guard.recent(20.0) and not Guard(log).recent(20.0)
