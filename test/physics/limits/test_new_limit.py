@@ -1,0 +1,115 @@
+"""A new limit is one row of the table and a number in the rover file: all that judges obeys it."""
+
+import numpy as np
+import pytest
+
+from rover_physics.errors import RoverFileError
+from rover_physics.limits import table
+from rover_physics.limits.table import NEWTONS, Limit
+from rover_physics.prediction.map_sweep import score_poses
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_contents import rover_to_dict
+from rover_physics.rover.rover_file import load_rover, rover_from_dict
+from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_physics.traversability.pieces import judge_pieces
+from rover_physics.traversability.pose_classes import (
+    IMPASSABLE,
+    PASSABLE,
+    RoverOnMap,
+    classify_poses,
+)
+from rover_planner.survey.layers import NO_LIMIT, number_limits
+from rover_planner.survey.request import SurveyRequest
+from rover_planner.survey.tile_survey import survey_tile
+from rover_planner.viewer.state.reasons.path_limits import Use, find_path_limits
+from support.grounds import make_terrain, waves
+
+HEAVIEST = Limit(
+    "wheel_load",
+    "wheel_loads",
+    "{element} wheel carries too much: {compared}",
+    "heaviest",
+    key="wheel_load",
+    unit=NEWTONS,
+    needs_forces=True,
+)
+"""The largest load of a wheel [N], as a team might add it."""
+GROUND = make_terrain(waves)
+X = np.arange(-1.5, 1.5, 0.05)
+PATH = np.column_stack([X, np.full_like(X, 0.3), np.zeros_like(X)])
+
+
+@pytest.fixture
+def with_row(monkeypatch):
+    """Add the row to the table."""
+    monkeypatch.setattr(table, "LIMITS", (*table.LIMITS, HEAVIEST))
+
+
+def rover_with(newtons: float):
+    """Return a rover whose file has the number."""
+    contents = rover_to_dict(load_rover("lsr1"))
+    contents["limits"]["wheel_load"] = newtons
+    return rover_from_dict(contents, "a test")
+
+
+@pytest.fixture
+def strict(with_row):
+    """Return a rover that carries less than some waypoints of the path ask of a wheel."""
+    loads = judge_path(load_rover("lsr1"), GROUND, PATH)[0].wheel_loads.max(axis=1)
+    return rover_with(float(np.median(loads)))
+
+
+def test_without_the_row_the_number_is_an_unknown_key():
+    with pytest.raises(RoverFileError, match=r"unknown key limits\.wheel_load"):
+        rover_with(20.0)
+
+
+def test_without_the_number_the_limit_is_not_asked(with_row):
+    assert judge_path(load_rover("lsr1"), GROUND, PATH)[1].traversable
+
+
+def test_the_number_survives_the_file(strict):
+    again = rover_from_dict(rover_to_dict(strict), "again")
+    assert again == strict and again.limits.further["wheel_load"] > 0.0
+    with pytest.raises(RoverFileError, match=r"limits\.wheel_load is .many."):
+        rover_with("many")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
+def test_the_verdict_obeys_it_and_names_the_wheel(strict, policy):
+    prediction, verdict = judge_path(strict, GROUND, PATH, SweepOptions(policy=policy))
+    limit = strict.limits.further["wheel_load"]
+    beyond = prediction.wheel_loads.max(axis=1) > limit
+    assert beyond.any() and not beyond.all()
+    assert [code == "wheel_load" for code in verdict.codes] == beyond.tolist()
+    assert "wheel carries too much: " in verdict.reason and f"limit {limit:.2f}" in verdict.reason
+    first = judge_path(strict, GROUND, PATH, SweepOptions(policy=policy), stop_at_failure=True)[1]
+    assert (first.first_failure, first.reason) == (verdict.first_failure, verdict.reason)
+
+
+def test_edges_of_the_search_and_scores_obey_it(strict):
+    codes = judge_path(strict, GROUND, PATH)[1].codes
+    pieces = [PATH[k : k + 2] for k in range(len(PATH) - 1)]
+    found = [piece.code for piece in judge_pieces(strict, GROUND, pieces)]
+    assert found == [a or b for a, b in zip(codes, codes[1:], strict=False)]
+    assert score_poses(strict, GROUND, PATH).passable.tolist() == [not code for code in codes]
+
+
+def test_hazard_map_and_survey_obey_it(strict):
+    codes = judge_poses(strict, GROUND, PATH)[1].codes
+    refused = np.array([code == "wheel_load" for code in codes])
+    classes = classify_poses(RoverOnMap(strict, GROUND, SweepOptions()), PATH, ["equal"])
+    assert (classes == np.where(refused, IMPASSABLE, PASSABLE)).all()
+    request = SurveyRequest(rover=strict, headings=1, options=SweepOptions())
+    layers = survey_tile(request, GROUND, PATH[:, :2])
+    expected = np.where(refused, number_limits()["wheel_load"], NO_LIMIT)
+    assert (layers["first_limit"] == expected).all()
+
+
+def test_the_page_has_a_lane_for_it(strict):
+    prediction, verdict = judge_path(strict, GROUND, PATH)
+    lane = find_path_limits(strict, prediction, verdict).lane("wheel_load")
+    assert lane.limit.title == "heaviest"
+    assert lane.limit.bound == strict.limits.further["wheel_load"]
+    assert lane.use.tolist() == [Use.KEPT] * verdict.first_failure + [Use.BROKEN]
+    assert lane.wheel[-1] == prediction.wheel_loads[verdict.first_failure].argmax()
