@@ -16,7 +16,6 @@ from rover_physics.status import BoundStatus
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_physics.traversability.bounded_verdict import judge_bounds
 from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import fractal, plane, rocky
 from support.uncertain_grounds import (
     arc_across,

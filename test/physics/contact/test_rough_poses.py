@@ -5,12 +5,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.prediction.sweep import sweep_path
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, fractal, random_poses
 from support.rover_geometry import wheel_gaps
 

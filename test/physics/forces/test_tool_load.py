@@ -12,7 +12,6 @@ from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import mirrored, plane, smooth
 from support.rover_geometry import attitude_of, balance_residuals, balance_sums, place_rover
 

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.verdict import hold_against_limits
 from support.best_torques import least_utilisation
 from support.reference_cases import reference_ground
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth

@@ -13,7 +13,6 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import arm_angles, body_mass_and_com, link_points
 from rover_physics.rover.model import Part
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
