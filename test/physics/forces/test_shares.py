@@ -1,4 +1,4 @@
-"""Balance with turned wheels: it holds for any angles, and nothing that it leaves free is lost."""
+"""Balance with turned wheels: any angles carry the weight, and no free force is lost."""
 
 from dataclasses import replace
 
@@ -10,13 +10,11 @@ from hypothesis import strategies as st
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES, balance_forces
 from rover_physics.prediction.evaluation import new_work
 from rover_physics.prediction.sweep import sweep_path, sweep_poses
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.model import Rover, Steering
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from support.rough_grounds import fractal, plane, random_poses, smooth
-from support.rover_geometry import balance_residuals, contact_frames
+from support.rough_grounds import plane, random_poses, smooth
+from support.rover_geometry import contact_frames
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 curvatures = st.one_of(st.floats(-20.0, 20.0), st.sampled_from([np.inf, -np.inf, 1 / 0.31]))
@@ -43,17 +41,6 @@ def sums_of(work, forces: np.ndarray) -> np.ndarray:
     on_wheels = np.einsum("wk,wkx->wx", forces, work.balance.frames)
     arms = work.contacts.point - work.placement.origin
     return np.concatenate([on_wheels.sum(axis=0), np.cross(arms, on_wheels).sum(axis=0)])
-
-
-@few
-@given(st.integers(0, 10_000), curvatures, st.sampled_from(["equal", "optimal"]))
-def test_all_nine_balance_equations_hold_with_turned_wheels(seed, curvature, policy):
-    poses, ground = random_poses(seed, 3, 0.5), (smooth(seed) if seed % 2 else fractal(seed % 20))
-    bends, options = np.full(3, curvature), SweepOptions(policy=policy)
-    prediction = sweep_poses(LSR1, ground, poses, bends, options)
-    for i in np.flatnonzero(prediction.settled):
-        assert np.abs(balance_residuals(LSR1, prediction, i)).max() <= 1e-9
-    assert not (prediction.status == PoseStatus.NO_EQUILIBRIUM).any()
 
 
 @few
