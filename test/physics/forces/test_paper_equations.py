@@ -3,8 +3,8 @@
 The paper: Hacot, Dubowsky and Bidaud, "Analysis and Simulation of a Rocker-Bogie Exploration
 Rover". Misprints are mended as docs/physics.md lists them. (1) to (7) are tested twice: in 3-D, to
 rounding error, on rough ground; and as the paper has them, for small roll, with the error that its
-own simplifications explain. (8) to (15) are tested as the paper has them, with weightless links; in
-3-D, with all weights, they are the nine sums of test_equilibrium.py.
+own simplifications explain. (8) to (15) are tested as the paper has them, with weightless links;
+in 3-D, with all weights, they are the nine sums of test_equilibrium.py.
 """
 
 from dataclasses import replace
@@ -192,7 +192,7 @@ def frame_of(prediction: PathPrediction, i: int) -> np.ndarray:
 
 
 def planar_sides(rover: Rover, prediction: PathPrediction, i: int) -> Sides:
-    """Cut both rockers off the body: (12) to (15) as planar sums, links without weight or width."""
+    """Cut both rockers off the body: (12) to (15) in the plane, links without weight or width."""
     placed, frame = place_rover(rover, prediction, i), frame_of(prediction, i)
     angle, N, T, S = (
         getattr(prediction, name)[i]
