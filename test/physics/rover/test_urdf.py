@@ -52,18 +52,13 @@ def written(rover: Rover, folder: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_a_rover_comes_back_from_its_urdf(name, tmp_path):
+def test_a_rover_comes_back_from_its_urdf_and_its_file(name, tmp_path):
     rover = load_rover(name)
     read = rover_from_urdf(*written(rover, tmp_path))
     assert_alike(rover, read.rover, 1e-9)
-    assert read.asymmetry < 1e-9
-
-
-def test_a_written_rover_file_loads_as_the_same_rover(tmp_path):
-    for name in preset_names():
-        rover = load_rover(name)
-        save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
-        assert load_rover(tmp_path / "rover.yaml") == rover
+    assert read.asymmetry < 1e-9 and read.levelling == Levelling()
+    save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
+    assert load_rover(tmp_path / "rover.yaml") == rover
 
 
 def test_links_have_inertias_that_a_body_can_have_and_wheels_collide_as_cylinders(tmp_path):
@@ -229,11 +224,6 @@ def test_wheels_that_are_not_level_are_brought_onto_level_ground(nose_down, turn
     assert rover.suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
 
 
-def test_level_wheels_are_not_touched(tmp_path):
-    for name in preset_names():
-        assert rover_from_urdf(*written(load_rover(name), tmp_path)).levelling == Levelling()
-
-
 def test_a_rocker_may_be_fixed_if_the_map_has_its_limits(tmp_path):
     text = foreign_urdf()
     for side in "RL":
@@ -319,8 +309,8 @@ def test_xacro_and_circles_are_refused():
 
 
 def test_a_file_of_many_links_is_refused_at_once():
-    text = "".join(f'<link name="l{k}"/>' for k in range(100_000))
-    with pytest.raises(RoverFileError, match="has 100000 <link>; at most 2000 are read"):
+    text = "".join(f'<link name="l{k}"/>' for k in range(5000))
+    with pytest.raises(RoverFileError, match="has 5000 <link>; at most 2000 are read"):
         parse_robot(f"<robot>{text}</robot>".encode())
 
 
