@@ -11,6 +11,7 @@ from rover_physics.numerics.interruption import check_interruption, interruptibl
 from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
 from support.grounds import make_terrain, waves
+from support.uncertain_grounds import with_std
 
 
 class StoppedError(Exception):
@@ -34,12 +35,9 @@ def along_x(count: int) -> np.ndarray:
     return poses
 
 
-def test_without_a_check_there_is_one_slice():
+def test_slices_cover_all_items_once_and_in_order_and_without_a_check_there_is_one():
     check_interruption()
     assert list(slices(10**6)) == [slice(0, 10**6)]
-
-
-def test_slices_cover_all_items_once_and_in_order():
     with interruptible(lambda: None):
         parts = list(slices(3000))
     assert parts[0].start == 0 and parts[-1].stop == 3000 and len(parts) > 1
@@ -55,13 +53,7 @@ def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
 
 def test_slices_change_no_bit_of_a_prediction_or_its_bounds(monkeypatch):
     rover, poses = load_rover("lsr1"), along_x(300)
-    ground = make_terrain(waves)
-    ground = type(ground)(
-        ground.elevation,
-        ground.resolution,
-        ground.origin,
-        elevation_std=np.full(ground.elevation.shape, 0.002),
-    )
+    ground = with_std(make_terrain(waves), 0.002)
     whole = sweep_path(rover, ground, poses)
     whole_bounds = bound_path(rover, ground, whole)
     monkeypatch.setattr(interruption, "FIRST_SLICE", 7)

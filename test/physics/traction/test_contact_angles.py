@@ -27,6 +27,9 @@ LSR1 = load_rover("lsr1")
 def follow(rover, motions, duration):
     estimator = MotionContactEstimator(rover)
     estimates = [estimator.update(motion, duration) for motion in motions]
+    covariances = np.array([estimate.covariance for estimate in estimates])
+    assert np.allclose(covariances, covariances.swapaxes(1, 2), atol=1e-12)
+    assert np.linalg.eigvalsh(covariances).min() > 0.0
     angles = np.array([estimate.angles for estimate in estimates])
     deviations = np.sqrt([np.diag(estimate.covariance) for estimate in estimates])
     return angles, deviations
@@ -38,18 +41,14 @@ def rms(errors):
 
 @pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])
 @pytest.mark.parametrize("rover", [LSR1, load_rover("m2020")], ids=lambda rover: rover.name)
-def test_on_an_even_slope_the_angles_are_known_before_the_rover_has_moved(rover, slope):
-    prediction, motions, _ = drive_states(rover, plane(*slope, half=4.0))
+def test_on_an_even_slope_the_angles_are_known_at_rest_and_in_motion(rover, slope):
+    prediction, motions, duration = drive_states(rover, plane(*slope, half=4.0))
     still = replace(motions[0], wheel_rates=np.zeros(6), body_rates=np.zeros(3))
     estimate = MotionContactEstimator(rover).update(still, 0.02)
     assert estimate.angles == pytest.approx(prediction.contact_angle[0], abs=0.01)
-
-
-@pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])
-def test_on_an_even_slope_the_angles_are_found_to_a_hundredth(slope):
-    prediction, motions, duration = drive_states(LSR1, plane(*slope, half=2.5))
-    angles, _ = follow(LSR1, motions, duration)
-    assert np.abs(angles - prediction.contact_angle)[400:].max() < 0.01
+    if rover is LSR1:
+        angles, _ = follow(rover, motions, duration)
+        assert np.abs(angles - prediction.contact_angle)[400:].max() < 0.01
 
 
 @pytest.mark.parametrize(
@@ -94,15 +93,6 @@ def test_at_rest_nothing_is_learnt_or_forgotten():
     rested = estimator.update(still, 100.0)
     assert np.array_equal(rested.angles, moved.angles)
     assert np.array_equal(rested.covariance, moved.covariance)
-
-
-def test_covariances_stay_symmetric_and_positive():
-    _, motions, duration = drive_states(LSR1, rocky(2))
-    estimator = MotionContactEstimator(LSR1)
-    for motion in motions:
-        covariance = estimator.update(motion, duration).covariance
-        assert np.allclose(covariance, covariance.T, atol=1e-12)
-        assert np.linalg.eigvalsh(covariance).min() > 0.0
 
 
 def test_without_a_source_the_angles_are_zero_and_as_uncertain_as_ground_is():
