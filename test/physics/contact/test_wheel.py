@@ -104,12 +104,6 @@ def test_before_or_behind_an_edge_the_wheel_rests_on_the_edge(distance, yaw):
     assert wheel.angle == pytest.approx(np.cos(yaw) * np.arcsin(distance / RADIUS), abs=5e-3)
 
 
-def test_out_of_reach_of_an_edge_the_wheel_stands_on_the_ground():
-    wheel = WheelOn(block(0.06), [-0.12, 0.0, RADIUS], SearchScope.FULL)
-    assert wheel.gap == pytest.approx(0.0, abs=1e-12)
-    assert wheel.angle == pytest.approx(0.0, abs=1e-6)
-
-
 @few
 @given(
     st.sampled_from([smooth, fractal, rocky]),

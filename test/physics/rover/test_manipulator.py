@@ -93,43 +93,33 @@ def test_impossible_angles_and_payloads_are_refused_by_name(rover, held, said):
         body_mass_and_com(rover, held.get("angles"), payload=held.get("payload"))
 
 
-def test_a_payload_too_heavy_for_the_rover_tips_it_on_flat_ground():
+def test_a_payload_too_heavy_for_the_rover_tips_it_and_a_file_that_has_it_is_refused():
     prediction = sweep_path(LSR1, LEVEL, POSE, SweepOptions(joint_angles=pose_of(), payload=20.0))
     assert prediction.tip_over_ratio[0] < 0.0
     assert judge(LSR1, prediction).code == "tip_over"
-
-
-def test_a_rover_that_tips_over_on_flat_ground_by_itself_is_refused():
     heavy = replace(LSR1, manipulator=replace(ARM, stowed=(0.0, 0.0, 0.0), payload=20.0))
     with pytest.raises(ModelError, match="tips over on flat ground"):
         sweep_path(heavy, LEVEL, POSE)
 
 
 def test_an_arm_stretched_aside_loads_that_side_and_takes_from_the_margin():
-    left = sweep_path(
-        LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=np.pi / 2))
-    )
-    right = sweep_path(
-        LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=-np.pi / 2))
+    left, right = (
+        sweep_path(LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=yaw)))
+        for yaw in (np.pi / 2, -np.pi / 2)
     )
     assert left.wheel_loads[0, 3:].sum() > right.wheel_loads[0, 3:].sum() + 1.0
     assert left.tip_over_ratio[0] < right.tip_over_ratio[0] - 0.01  # downhill is left
 
 
 def test_arm_and_payload_are_as_a_body_with_their_mass_and_centre():
-    ground = plane(0.2, 0.1)
-    mass, com = body_mass_and_com(LSR1, pose_of(yaw=0.5, shoulder=-0.3), payload=0.6)
-    body = Part(mass, tuple(com))
-    alike = replace(LSR1, manipulator=None, masses=replace(LSR1.masses, body=body))
-    held = {"joint_angles": pose_of(yaw=0.5, shoulder=-0.3), "payload": 0.6}
-    arm, lump = (
-        sweep_path(LSR1, ground, POSE, SweepOptions(**held)),
-        sweep_path(alike, ground, POSE),
-    )
+    ground, joints = plane(0.2, 0.1), pose_of(yaw=0.5, shoulder=-0.3)
+    mass, com = body_mass_and_com(LSR1, joints, payload=0.6)
+    masses = replace(LSR1.masses, body=Part(mass, tuple(com)))
+    held = SweepOptions(joint_angles=joints, payload=0.6)
+    lump = sweep_path(replace(LSR1, manipulator=None, masses=masses), ground, POSE)
+    # The lump's margins are relative to its own on level ground.
+    arm, level = (sweep_path(LSR1, where, POSE, held) for where in (ground, LEVEL))
     assert arm.wheel_loads == pytest.approx(lump.wheel_loads, abs=1e-9)
-    level = sweep_path(
-        LSR1, LEVEL, POSE, SweepOptions(**held)
-    )  # the lump's margins are relative to this
     for name in ("tip_over_ratio", "tip_over_force_angle"):
         relative = getattr(arm, name) / getattr(level, name)
         assert relative == pytest.approx(getattr(lump, name), abs=1e-5), name

@@ -236,13 +236,7 @@ def test_a_stowed_arm_outside_its_limits_and_pivots_of_a_bogie_behind_are_refuse
         (b"name: a\ngravity: 9.81\nname: b\n", r"duplicate key name in lines 1 and 3"),
         (b"", "the file is .*; it must be a mapping with name"),
         (b"- 1\n", "the file is .*; it must be a mapping with name"),
-        (b"7\n", "the file is .*; it must be a mapping with name"),
-        (b"wheel: {radius: 0.1", "not valid YAML"),
-        (b"a: b: c", "not valid YAML"),
-        (b"!!python/object:os.system {}", "not valid YAML"),
         (b"{[1]: 2}", "not valid YAML"),
-        (b"d: 2026-99-99", "not valid YAML"),
-        (b"\xff\xfe\x00name", "not a text file in UTF-8"),
     ],
 )
 def test_a_file_without_the_contents_of_a_rover_is_refused_in_one_line(tmp_path, content, said):

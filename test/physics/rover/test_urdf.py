@@ -75,10 +75,6 @@ def test_links_have_inertias_that_a_body_can_have_and_wheels_collide_as_cylinder
         assert abs(cylinder.place[1, 2]) == pytest.approx(1.0)
 
 
-PARTS = ("Body", "RockerR", "RockerL", "BogieR", "BogieL")
-"""Links with a mass in `foreign_urdf`, 10, 2, 2, 1 and 1 kg, at their origins."""
-
-
 def foreign_urdf() -> str:
     """Return a URDF as CAD programs write: x forward, y right, z down, wheels on short axles."""
 
@@ -150,7 +146,7 @@ def read_foreign(folder: Path, text: str = "", **keys: Any) -> Rover:
 
 def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
     rover = read_foreign(tmp_path)
-    suspension = rover.suspension
+    suspension, masses = rover.suspension, rover.masses
     assert suspension.rocker_pivot == pytest.approx((0.0, 0.3, 0.0))
     assert suspension.bogie_pivot == pytest.approx((0.2, 0.3, -0.05))
     assert suspension.rocker_wheel == "rear"
@@ -161,15 +157,12 @@ def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
     assert suspension.bogie_limits == pytest.approx((-0.4, 0.5))
     assert (rover.wheel.radius, rover.wheel.width) == (0.1, 0.06)
     assert (rover.wheel.max_torque, rover.wheel.max_speed) == (3.0, 2.0)
-
-
-def test_masses_add_up_and_keep_their_first_moments(tmp_path):
-    rover = read_foreign(tmp_path)
+    # Masses add up and keep their first moments.
     assert rover.total_mass == pytest.approx(10.0 + 2 * 2.0 + 2 * 1.0 + 6 * 0.5)
-    assert rover.masses.body.mass == pytest.approx(10.0)
-    assert rover.masses.body.com == pytest.approx((-0.1, 0.0, -0.5))
+    assert masses.body.mass == pytest.approx(10.0)
+    assert masses.body.com == pytest.approx((-0.1, 0.0, -0.5))
     # The file has a wheel's mass on its axle, the model in the middle of its tread.
-    assert rover.masses.rocker.com == pytest.approx((0.0, 0.3 - 0.5 * 0.05 / 2.0, 0.0))
+    assert masses.rocker.com == pytest.approx((0.0, 0.3 - 0.5 * 0.05 / 2.0, 0.0))
 
 
 def test_a_heavier_wheel_loads_the_link_that_carries_it(tmp_path):

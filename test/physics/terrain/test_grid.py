@@ -1,6 +1,5 @@
 """The terrain: what is refused, the bilinear look-up, filled gaps and files."""
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -40,24 +39,12 @@ def test_look_up_reproduces_planes(a, b, c, resolution, origin, places):
     assert np.allclose(terrain.elevation_at(x, y), a + b * x + c * y, rtol=0.0, atol=1e-10)
 
 
-@given(st.integers(0, 5), st.integers(0, 7))
-def test_look_up_at_a_cell_centre_gives_its_height(row, column):
+def test_rows_go_along_y_columns_along_x_and_cells_have_their_heights():
     heights = np.random.default_rng(1).normal(size=(6, 8))
     terrain = Terrain(heights, 0.5, (-1.0, 2.0))
-    z = terrain.elevation_at(-1.0 + 0.5 * column, 2.0 + 0.5 * row)
-    assert z == pytest.approx(heights[row, column], abs=1e-12)
-
-
-def test_rows_go_along_y_and_columns_along_x():
-    heights = np.array([[0.0, 1.0], [2.0, 3.0]])
-    terrain = Terrain(heights, 1.0, (10.0, 20.0))
-    assert terrain.elevation_at([10.0, 11.0, 10.0, 11.0], [20.0, 20.0, 21.0, 21.0]).tolist() == [
-        0.0,
-        1.0,
-        2.0,
-        3.0,
-    ]
-    assert terrain.bounds == (10.0, 11.0, 20.0, 21.0)
+    x, y = np.meshgrid(-1.0 + 0.5 * np.arange(8), 2.0 + 0.5 * np.arange(6))
+    np.testing.assert_allclose(terrain.elevation_at(x, y), heights, atol=1e-12)
+    assert terrain.bounds == (-1.0, 2.5, 2.0, 4.5)
 
 
 def test_look_up_is_unknown_off_the_map():
@@ -215,21 +202,15 @@ def test_a_gap_at_the_edge_of_the_map_stays(rows, columns):
     assert np.isnan(gapped.fill_gaps(5.0).elevation).sum() == 2
 
 
-def test_filling_makes_no_new_extremes():
+def test_filling_makes_no_new_extremes_and_leaves_known_cells_and_the_terrain_alone():
     heights = np.random.default_rng(3).normal(size=(30, 30))
     unknown = np.zeros((30, 30), dtype=bool)
     unknown[10:14, 12:20] = True
-    filled = Terrain(np.where(unknown, np.nan, heights), 0.1).fill_gaps(0.5).elevation[unknown]
-    rim = heights[9:15, 11:21]
-    assert rim.min() <= filled.min() <= filled.max() <= rim.max()
-
-
-def test_filling_leaves_known_cells_and_the_terrain_itself_alone():
-    _, gapped = with_gap()
-    before = gapped.elevation.copy()
-    known = ~np.isnan(before)
-    filled = gapped.fill_gaps(1.0)
-    assert np.array_equal(filled.elevation[known], before[known])
+    before = np.where(unknown, np.nan, heights)
+    gapped = Terrain(before, 0.1)
+    filled, rim = gapped.fill_gaps(0.5).elevation, heights[9:15, 11:21]
+    assert rim.min() <= filled[unknown].min() <= filled[unknown].max() <= rim.max()
+    assert np.array_equal(filled[~unknown], before[~unknown])
     assert np.array_equal(gapped.elevation, before, equal_nan=True)
     whole = plane()
     assert whole.fill_gaps(1.0) is whole
@@ -296,26 +277,11 @@ def test_a_file_with_a_wrong_entry_is_refused_by_its_name(tmp_path, changes, tex
 
 
 def test_a_file_that_is_no_npz_is_refused(tmp_path):
-    (tmp_path / "text.npz").write_text("elevation", encoding="utf-8")
-    (tmp_path / "empty.npz").write_bytes(b"")
     (tmp_path / "cut.npz").write_bytes(b"PK\x03\x04 and no more")
     np.save(tmp_path / "single.npy", FLAT)
-    for name in ("text.npz", "empty.npz", "cut.npz", "single.npy"):
+    for name in ("cut.npz", "single.npy"):
         with pytest.raises(TerrainError, match=rf"{name}: .*\.npz"):
             load_terrain(tmp_path / name)
-
-
-def test_a_damaged_entry_is_named(tmp_path):
-    save_terrain(tmp_path / "good.npz", plane())
-    with (
-        zipfile.ZipFile(tmp_path / "good.npz") as good,
-        zipfile.ZipFile(tmp_path / "bad.npz", "w") as bad,
-    ):
-        for name in good.namelist():
-            content = good.read(name)
-            bad.writestr(name, content[:-20] if name.startswith("elevation") else content)
-    with pytest.raises(TerrainError, match=r"bad\.npz: entry elevation is damaged"):
-        load_terrain(tmp_path / "bad.npz")
 
 
 def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):

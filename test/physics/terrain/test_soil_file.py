@@ -122,9 +122,6 @@ def test_what_is_no_mapping_of_soils_or_no_coulomb_soil_is_refused(data, text):
         soils_from_dict(data, "x")
 
 
-def test_a_file_that_cannot_be_read_is_refused(tmp_path):
+def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(SoilError, match=r"none\.yaml: cannot be read"):
         load_soils(tmp_path / "none.yaml")
-    (tmp_path / "twice.yaml").write_text("a: {}\na: {}\n", encoding="utf-8")
-    with pytest.raises(SoilError, match="duplicate key a in lines 1 and 2"):
-        load_soils(tmp_path / "twice.yaml")

@@ -101,19 +101,6 @@ def test_without_a_source_the_angles_are_zero_and_as_uncertain_as_ground_is():
     assert np.diag(estimate.covariance) == pytest.approx(np.full(6, SLOPE_DEVIATION**2))
 
 
-@pytest.mark.parametrize("drift", [0.0, 0.05, -0.05])
-def test_the_map_tells_the_angles_whatever_height_odometry_says(drift):
-    ground = fractal(1)
-    prediction, _, _ = drive_states(LSR1, ground)
-    finder, errors = MapContactFinder(LSR1, ground), []
-    for i in range(0, 1201, 20):
-        x, y, z = prediction.position[i]
-        found = finder.find(state_of(LSR1, prediction, i), np.array([x, y, z + drift, 0.0]), 0.0)
-        assert found.source == "map"
-        errors.append(found.angles - prediction.contact_angle[i])
-    assert np.median(np.abs(errors)) < 0.03
-
-
 def test_at_the_foot_of_a_face_it_is_the_face_that_counts():
     ground = drive_ground("step", 0.16)
     pose = np.array([-0.4 - 0.1, 0.0, 0.3, 0.0])

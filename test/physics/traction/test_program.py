@@ -7,7 +7,6 @@ import pytest
 
 from rover_physics.errors import ModelError
 from rover_physics.prediction.sweep import sweep_path
-from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.layout import (
@@ -27,7 +26,7 @@ from rover_physics.traction.program_inputs import ProgramInputs, TractionWeights
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from support.best_torques import can_stand
 from support.rough_grounds import plane
-from support.rover_geometry import balance_matrix
+from support.rover_geometry import balance_matrix, place_rover
 from support.traction_states import rough_states, state_of
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
@@ -159,23 +158,13 @@ def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
     x = rows.force_unit * rows.complete(np.linspace(-0.1, 0.1, 6))
     lateral = rows.lateral_forces(x)
     forces = np.column_stack([x[TRACTIONS], lateral, x[LOADS]])
-    places, com = wheel_contacts_and_com(rover)
+    placed = place_rover(rover, sweep_path(rover, plane(0.0, 0.0, half=4.0), [[0.0, 0.0, 0.0]]), 0)
+    masses, centres, *_ = zip(*placed.masses, strict=True)
+    com = np.average(centres, axis=0, weights=masses)
+    places = placed.wheels - [0.0, 0.0, rover.wheel.radius]
     assert np.sum(forces, axis=0) == pytest.approx(rover.weight * np.array([push, 0.0, 1.0]))
     moments = np.cross(places - com, forces).sum(axis=0)
     assert moments == pytest.approx(np.zeros(3), abs=1e-9 * rover.weight)
-
-
-def wheel_contacts_and_com(rover):
-    """Return the lowest points (6, 3) of the wheels and the centre of mass (3,), flat ground."""
-    suspension, masses, mass = rover.suspension, rover.masses, rover.wheel.mass
-    left = np.array([suspension.wheels[name] for name in ("rear", "middle", "front")])
-    centres = np.vstack([left * [1.0, -1.0, 1.0], left])
-    body, com = body_mass_and_com(rover)
-    first = body * np.asarray(com) + mass * centres.sum(axis=0)
-    for part in (masses.rocker, masses.bogie):  # one on each side
-        first = first + 2.0 * part.mass * np.array([part.com[0], 0.0, part.com[2]])
-    total = body + 6.0 * mass + 2.0 * (masses.rocker.mass + masses.bogie.mass)
-    return centres - [0.0, 0.0, rover.wheel.radius], first / total
 
 
 def test_straight_up_a_plane_all_wheels_use_the_same_share_and_too_little_friction_is_told():

@@ -92,15 +92,18 @@ def test_the_rolling_motion_is_that_of_the_curve():
     assert rolling.directions.tolist() == [1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
 
 
-def test_the_map_tells_the_contact_angles_of_turned_wheels():
+@pytest.mark.parametrize("drift", [0.0, 0.05, -0.05])
+def test_the_map_tells_the_contact_angles_whatever_height_odometry_says(drift):
     errors = []
     for seed, curvature in enumerate(CURVATURES):
         ground, prediction = curved_poses(LSR1, seed, curvature)
         finder = MapContactFinder(LSR1, ground)
         for i in np.flatnonzero(prediction.settled):
             pose = np.array([*prediction.position[i], prediction.poses[i, 2]])
+            pose[2] += drift
             directions = np.where(prediction.wheel_speed[i] < 0.0, -1.0, 1.0)
             found = finder.find(state_of(LSR1, prediction, i), pose, 0.0, directions)
+            assert found.source == "map"
             errors.append(found.angles - prediction.contact_angle[i])
     assert np.median(np.abs(errors)) < 0.03
 
