@@ -36,7 +36,7 @@ def test_in_mujoco_the_step_is_passed_with_the_program_and_not_with_equal_torque
     assert drive(STEP, controller).passed is passes
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_promise_is_kept_where_one_wheel_needs_nearly_all_its_torque():
     bump = Case("bump_one_side", 0.113, friction=0.99, max_torque=0.903)
     assert find_margin(bump) >= 0.1

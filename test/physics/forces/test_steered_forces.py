@@ -1,56 +1,16 @@
-"""Settling with turned wheels, against MuJoCo: places, attitudes and forces."""
+"""Forces on turned wheels, against MuJoCo."""
 
 import numpy as np
 
-from rover_physics.prediction.evaluation import evaluate_pose, new_results, new_work, set_pose
+from rover_physics.prediction.evaluation import evaluate_pose, new_work, set_pose
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.record import new_results
 from rover_physics.rover.rover_file import load_rover
-from support.reference_cases import angle_errors, steered_predictions
-from support.rover_geometry import wheel_gaps
+from support.reference_cases import steered_predictions
 
 LSR1 = load_rover("lsr1")
-
-
-def test_there_are_21_cases_with_turned_wheels_and_all_settle():
-    cases = steered_predictions()
-    assert sum(len(case.poses) for case, _ in cases) == 21
-    assert all(prediction.settled.all() for _, prediction in cases)
-
-
-def test_the_wheels_are_turned_as_the_arc_asks():
-    for case, prediction in steered_predictions():
-        np.testing.assert_allclose(prediction.steering_angle, case.steering, atol=1e-12)
-
-
-def test_centres_of_turned_wheels_are_where_mujoco_has_them():
-    errors = np.concatenate(
-        [
-            np.linalg.norm(prediction.wheel_centres - case.wheel_centres, axis=2).ravel()
-            for case, prediction in steered_predictions()
-        ]
-    )
-    assert np.median(errors) <= 0.5e-3
-    assert np.percentile(errors, 95) <= 2.5e-3
-
-
-def test_attitudes_and_suspension_angles_with_turned_wheels_are_those_of_mujoco():
-    errors = angle_errors(steered_predictions())
-    assert np.median(errors) <= 0.5e-3
-    assert np.percentile(errors, 95) <= 5e-3
-
-
-def test_turned_wheels_touch_by_an_independent_dense_look():
-    gaps = np.concatenate(
-        [
-            wheel_gaps(LSR1, case.terrain, prediction, i)
-            for case, prediction in steered_predictions()
-            for i in range(len(prediction.poses))
-        ]
-    )
-    assert (np.abs(gaps) <= 1e-4).mean() >= 0.98
-    assert np.abs(gaps).max() <= 1e-3
 
 
 def force_errors(own_lateral: bool) -> np.ndarray:
