@@ -38,11 +38,11 @@ def run_topic(topic: str, checkout: Path = ROOT) -> list[Figure]:
     return [Figure(**{k: v for k, v in row.items() if k != "met"}) for row in rows]
 
 
-def compare(topic: str, other: Path, rounds: int) -> list[Figure]:
-    """Return the ratios of a topic's figures, here over another checkout, run in turns."""
-    found: dict[Path, list[list[Figure]]] = {ROOT: [], other: []}
+def compare(topic: str, other: Path, rounds: int, this: Path = ROOT) -> list[Figure]:
+    """Return the ratios of a topic's figures, this checkout's over another's, run in turns."""
+    found: dict[Path, list[list[Figure]]] = {this: [], other: []}
     for turn in range(rounds):
-        for checkout in (ROOT, other) if turn % 2 else (other, ROOT):
+        for checkout in (this, other) if turn % 2 else (other, this):
             found[checkout].append(run_topic(topic, checkout))
     here, there = (_medians(figures) for figures in found.values())
     return [

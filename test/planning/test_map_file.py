@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.hostile_files import make_oddities
+from support.hostile_files import make_oddities
 from rover_physics.errors import RoverError, TerrainError
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters

@@ -10,7 +10,7 @@ from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, PointCloud2
 
-from benchmarks.driven_rover import JOINTS
+from support.driven_rover import JOINTS
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics.errors import ModelError
 from rover_physics.names import SUSPENSION_JOINTS

@@ -5,7 +5,7 @@ import time
 import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from benchmarks.driven_rover import NANOSECONDS
+from support.driven_rover import NANOSECONDS
 from support.waiting import wait_until
 
 BOUND = 1.5

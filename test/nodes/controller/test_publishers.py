@@ -6,7 +6,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
-from benchmarks.driven_rover import DrivenRover
+from support.driven_rover import DrivenRover
 from rover_planner.nodes.traction_controller import TractionController
 from support.ros_fixtures import PATIENT, RosRun
 from support.waiting import wait_until

@@ -88,7 +88,7 @@ def test_a_stop_is_not_delayed_to_the_next_update(rover, start_controller):
 
 
 def test_a_late_subscriber_gets_the_state(ros, rover, controller):
-    from benchmarks.driven_rover import DrivenRover
+    from support.driven_rover import DrivenRover
 
     late = ros.spin(DrivenRover(ros.context))
     wait_until(

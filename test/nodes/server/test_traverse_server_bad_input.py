@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import PointCloud2, PointField
 
-from benchmarks.hostile_files import archive_of, make_oddities, npy
+from support.hostile_files import archive_of, make_oddities, npy
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.terrain.grid import save_terrain

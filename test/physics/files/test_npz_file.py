@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from benchmarks.hostile_files import archive_of, npy
+from support.hostile_files import archive_of, npy
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import MAX_DIRECTORY, NpzReader, open_npz
 

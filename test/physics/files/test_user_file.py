@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.hostile_files import make_oddities
+from support.hostile_files import make_oddities
 from rover_physics.errors import RoverError, RoverFileError
 from rover_physics.files.user_file import read_regular_file, write_file
 from rover_physics.rover.rover_file import load_rover
