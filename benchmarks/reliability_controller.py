@@ -27,12 +27,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from benchmarks.driven_rover import CONTROLLER, NANOSECONDS, DrivenRover
 from benchmarks.measure import Figure, show, write
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import sensor_qos
 from rover_planner.ros.realtime import take_priority
+from support.driven_rover import CONTROLLER, NANOSECONDS, DrivenRover
 from support.ros_fixtures import RosRun, call, domain_id
 from support.waiting import wait_until
 

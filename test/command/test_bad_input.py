@@ -199,9 +199,9 @@ def test_files_of_another_kind_are_one_line(capfd, files, name, content):
 @pytest.mark.parametrize(
     ("entry", "names"),
     [
-        (b"no array", "entry poses is no array"),
-        (b"", "entry poses is no array"),
-        (b"\x93NUMPY\x01\x00\x05\x00(((((", "entry poses has the header '((((('"),
+        (b"no array", "entry poses"),
+        (b"", "entry poses"),
+        (b"\x93NUMPY\x01\x00\x05\x00(((((", "((((("),
     ],
 )
 def test_poses_that_are_no_array_are_refused(files, capfd, entry, names):
