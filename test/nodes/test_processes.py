@@ -16,6 +16,7 @@ from msg_adapters.paths import stamped_pose
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.nodes.traverse_server import main
 from support.grounds import make_terrain, waves
+from support.project.without_disk import fill_disk
 from support.ros_fixtures import domain_id
 from support.waiting import wait_until
 
@@ -27,7 +28,7 @@ def start_process():
     """Return a function that starts a node with parameters; what is left at the end is killed."""
     processes = []
 
-    def start(name, *parameters):
+    def start(name, *parameters, **options):
         arguments = [word for text in parameters for word in ("-p", text)]
         process = subprocess.Popen(
             [sys.executable, "-m", f"rover_planner.nodes.{name}", "--ros-args", *arguments],
@@ -35,6 +36,7 @@ def start_process():
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            **options,
         )
         processes.append(process)
         return process
@@ -136,6 +138,12 @@ def test_a_simulator_that_is_told_to_end_while_it_publishes_ends_cleanly(start_p
     read_until(process, "ready")
     time.sleep(0.3)
     end(process, signal.SIGTERM, count=3)
+
+
+def test_a_server_starts_on_a_full_disk_without_a_log_file_and_says_so(start_process):
+    process = start_process("traverse_server", preexec_fn=fill_disk)
+    told = read_until(process, "ready for rover lsr1")
+    assert told.count("no log file is written: File too large") == 1
 
 
 @pytest.mark.parametrize(
