@@ -171,17 +171,6 @@ def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros, endles
     assert median(delays) < 0.5, delays
 
 
-def test_a_stop_lasts_until_another_path_is_accepted(watched, client):
-    _, rover = watched
-    client.send_terrain(make_terrain(rock_ahead))
-    rover.wait_for_stop()
-    client.send_terrain(make_terrain(waves))
-    time.sleep(0.5)
-    assert rover.stops[-1][0]
-    assert client.can_traverse(START, GOAL).poses
-    rover.wait_for_stop(False)
-
-
 def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
     watched, client, monkeypatch
 ):
