@@ -1,4 +1,4 @@
-"""Hostile files for tests: things that are no regular files, archives and arrays of odd content."""
+"""Hostile files for tests: things that are no regular files, archives and arrays of odd bytes."""
 
 import io
 import os
