@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics import PathPrediction, Terrain, load_rover, sweep_path, sweep_poses
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path, sweep_poses
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
 
 DATA = Path(__file__).resolve().parents[1] / "test" / "data"
 FILES = ("settled_a.npz", "settled_b.npz")

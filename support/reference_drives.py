@@ -8,17 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics import (
-    PathPrediction,
-    Rover,
-    SweepOptions,
-    Terrain,
-    Verdict,
-    load_rover,
-    sweep_path,
-    sweep_poses,
-)
-from rover_physics.traversability.verdict import judge
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path, sweep_poses
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.verdict import Verdict, judge
 
 DRIVES = Path(__file__).resolve().parents[1] / "test" / "data" / "drives.json"
 RESOLUTION = 0.02

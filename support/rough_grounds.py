@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rover_physics import Terrain
+from rover_physics.terrain.grid import Terrain
 
 RESOLUTION = 0.04
 """Cell size of the grounds [m]."""

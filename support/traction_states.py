@@ -2,7 +2,10 @@
 
 import numpy as np
 
-from rover_physics import PathPrediction, Rover, Terrain, sweep_path
+from rover_physics.prediction.path_prediction import PathPrediction
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
 from support.rough_grounds import fractal, random_poses, rocky

@@ -6,8 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from rover_physics import Rover, SweepOptions, Terrain, sweep_path
 from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
 
 ROUNDING = 1e-6

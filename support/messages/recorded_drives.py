@@ -15,8 +15,10 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics import Terrain, load_rover, sweep_path
 from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_physics.prediction.sweep import sweep_path
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
 from rover_planner.cli import main
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
