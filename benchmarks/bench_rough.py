@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.grounds import made_reef, real_maps
 from benchmarks.measure import REPEATS, Figure, median_time
-from rover_physics import PoseStatus, Rover, Terrain, load_rover, score_poses, sweep_path
+from rover_physics import PoseStatus, Rover, Terrain, judge_poses, load_rover, score_poses
 from support.reference_cases import reference_ground
 from support.rough_grounds import fractal
 from support.rover_geometry import wheel_gaps
@@ -74,7 +74,8 @@ def measure_gaps(rover: Rover) -> Iterator[Figure]:
         larger = Terrain(
             ground.elevation * size, ground.resolution * scale, (x * scale, y * scale)
         )
-        prediction = sweep_path(rover, larger, poses_anywhere(larger, 20 * LOOKED_AT))
+        poses = poses_anywhere(larger, 20 * LOOKED_AT)
+        prediction, _ = judge_poses(rover, larger, poses, np.zeros(len(poses)))
         settled = np.flatnonzero(prediction.settled)[:LOOKED_AT]
         gaps = np.array([wheel_gaps(rover, larger, prediction, i) for i in settled])
         worst = 1e3 * np.abs(gaps).max(axis=1)

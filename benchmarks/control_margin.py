@@ -1,7 +1,7 @@
 """Drives in MuJoCo over ground that the planner calls passable with traction control.
 
 Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S] [--least M]
-It needs the extra `bench`. Its results are in docs/reliability.md.
+It needs the extra `bench`. Its results are in docs/validation.md.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """What a rover on a slope does when it stops to be driven, by rest policy, in MuJoCo.
 
 Run from the repository: python -m benchmarks.hold [--slope DEG] [--seconds S]
-It needs the extra `bench`. Its results are in docs/reliability.md. The rover rests, is enabled and
+It needs the extra `bench`. Its results are in docs/validation.md. The rover rests, is enabled and
 climbs or descends at its nominal speed, steered along the fall line by a path follower; then an
 input is lost or the command becomes zero, and the steering stays as it is. Torques reach the
 wheels two periods (40 ms) after the measurement.

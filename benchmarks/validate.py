@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from benchmarks.measure import console, print_table
-from rover_physics import SweepOptions, judge_path, load_rover, sweep_path
+from rover_physics import SweepOptions, judge_path, load_rover
 from support.reference_cases import reference_predictions, steered_predictions
 from support.reference_drives import (
     PASSED,
@@ -132,8 +132,8 @@ def print_energy(step: int = 1) -> None:
     for obstacle, row in zip(obstacles, run_in_processes(drive, jobs, None), strict=True):
         if row.passed:
             options = SweepOptions(policy="servo", friction=obstacle.friction)
-            swept = sweep_path(unlimited(obstacle.rover), obstacle.ground, path, options)
-            ours = float(swept.energy[-1])
+            rover, ground = unlimited(obstacle.rover), obstacle.ground
+            ours = float(judge_path(rover, ground, path, options)[0].energy[-1])
             errors.append(abs(ours / row.energy - 1.0))
             rows.append((obstacle.label, f"{row.energy:.1f}", f"{ours:.1f}"))
     rows.append(("median error", "", f"{np.median(errors):.0%}"))
