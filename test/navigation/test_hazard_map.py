@@ -7,7 +7,6 @@ import pytest
 
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.prediction.map_sweep import sweep_map
-from rover_physics.prediction.sweep import sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -111,7 +110,7 @@ def test_questions_can_go_first_every_256_poses():
 def test_at_a_limit_the_full_judgement_decides(excess, monkeypatch):
     ramp = Terrain(0.3 * 0.05 * np.indices((60, 60))[1].astype(float), 0.05, (0.0, 0.0))
     pose = np.array([[1.5, 1.5, 0.0]])
-    tilt = sweep_poses(LSR1, ramp, pose, np.zeros(1)).pitch[0]
+    tilt = judge_poses(LSR1, ramp, pose, np.zeros(1))[0].pitch[0]
     limits = replace(LSR1.limits, tilt=abs(float(tilt)) + np.radians(excess))
     on_map = RoverOnMap(replace(LSR1, limits=limits), ramp, OPTIONS)
     asked = []

@@ -41,7 +41,7 @@ NOT_RUN = {
 }
 """How commands begin that are not run here, and why; a block with one of them is not run."""
 SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
-"""Programs that run until they are told to stop."""
+"""Programs that run until they are told to stop, so that a block has them in the background."""
 LONGEST = 300.0
 """Longest time for a block [s]."""
 
@@ -67,12 +67,6 @@ def find_reason(block: Block) -> str:
     )
 
 
-def test_there_are_blocks_to_run():
-    run = [block for block in BLOCKS if not find_reason(block)]
-    assert {block.language for block in run} == {"sh", "python"}
-    assert "README.md" in {block.page for block in run}
-
-
 @pytest.mark.parametrize("block", BLOCKS, ids=str)
 def test_a_block_names_only_what_there_is(block):
     if block.language == "python":
@@ -82,6 +76,8 @@ def test_a_block_names_only_what_there_is(block):
     assert (checked.returncode, checked.stderr) == (0, "")
     for command in split_commands(block.text):
         check_command(command.words)
+        is_run = not find_reason(block)
+        assert not is_run or command.words[0] not in SERVERS or command.in_background
 
 
 def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
@@ -108,13 +104,6 @@ def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
 def test_what_a_page_says_is_not_run_cannot_run_here(block):
     if block.not_run:
         assert find_reason(block), f"{block} says {block.not_run!r}; no command says so"
-
-
-@pytest.mark.parametrize("block", BLOCKS, ids=str)
-def test_a_server_in_a_block_runs_in_the_background(block):
-    if block.language == "sh" and not find_reason(block):
-        for command in split_commands(block.text):
-            assert command.words[0] not in SERVERS or command.in_background, command.words
 
 
 @pytest.fixture
@@ -270,16 +259,10 @@ def test_what_is_not_there_is_named(text, missing):
     [
         ("false\ntrue\n", "returncode=1"),
         ("sleep 60 &\n", "processes are left"),
-        ("rover_planner predict lsr1 none.npz none.npz out.npz\n", "none.npz"),
+        ("echo yes\n", "yes"),
     ],
 )
-def test_a_block_that_fails_or_leaves_processes_is_found(text, said, reader):
+def test_a_block_that_fails_leaves_processes_or_prints_something_else_is_found(text, said, reader):
     reader.grace = 1.0
     with pytest.raises(AssertionError, match=said):
-        reader.run(Block("page.md", 1, "sh", text, "", None))
-
-
-def test_an_output_that_is_another_one_is_found(reader):
-    block = Block("page.md", 1, "sh", "echo yes\n", "", "no\n")
-    with pytest.raises(AssertionError):
-        reader.run(block)
+        reader.run(Block("page.md", 1, "sh", text, "", "no\n"))

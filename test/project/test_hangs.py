@@ -23,8 +23,8 @@ def run_pytest(*words: str, before: str = "") -> subprocess.CompletedProcess[str
 
 def test_signals_reach_children_where_the_caller_ignores_them():
     """In a shell's background job tests waited for ever for a child that they had interrupted."""
-    chosen = "test/command/test_child_process.py"
-    ran = run_pytest(chosen, "-k", "test_no_child_outlives", before="trap '' INT")
+    chosen = "test_no_child_outlives_a_parent_that_is_signalled[2--2]"
+    ran = run_pytest(f"test/command/test_child_process.py::{chosen}", before="trap '' INT")
     assert ran.returncode == 0, ran.stdout
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from rover_planner.nodes.programs import PROGRAMS
 from support.project.checkout import TOP, copy_checkout, setup_arguments
 
 CORE = """
@@ -36,7 +35,7 @@ rover, ground = load_rover("lsr1"), load_terrain("spirit")
 poses = np.array([[-44.684, -19.499, 3.41], [-44.78, -19.53, 3.41]])
 prediction, verdict = judge_path(rover, ground, poses, SweepOptions(policy="optimal"))
 assert verdict.traversable and prediction.settled.all(), verdict.reason
-assert score_poses(rover, ground, poses).within_limits(rover).all()
+assert score_poses(rover, ground, poses).passable.all()
 assert len(classify_path(rover, ground, poses)) == 2
 assert (find_torque_ranges(rover, ground, poses).lowest < 0.0).all()
 assert not judge_reach(rover, ground, poses[0], (-40.0, -19.5, -2.0)).possible
@@ -91,7 +90,7 @@ def run(environment: Path, folder: Path, name: str, *words: str) -> subprocess.C
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_lowest_versions_are_what_pip_installs(environment, tmp_path):
     ended = run(environment, tmp_path, "pip", "list", "--format=freeze")
     installed = dict(line.lower().split("==") for line in ended.stdout.split())
@@ -100,7 +99,6 @@ def test_the_lowest_versions_are_what_pip_installs(environment, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_the_command_line_runs_with_the_lowest_versions(environment, tmp_path):
     for words, told in (
         (["--help"], "predict"),
@@ -120,21 +118,15 @@ def test_the_command_line_runs_with_the_lowest_versions(environment, tmp_path):
     assert ended.returncode == 2 and ended.stderr.count("\n") == 1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "program", [CORE, pytest.param(MORE, marks=pytest.mark.long)], ids=["core", "more"]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("program", [CORE, MORE], ids=["core", "more"])
 def test_the_library_runs_with_the_lowest_versions(environment, tmp_path, program):
     ended = run(environment, tmp_path, "python", "-c", program)
     assert ended.returncode == 0, ended.stderr
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_a_plain_installation_says_what_its_nodes_need(environment, tmp_path, name):
-    ended = run(environment, tmp_path, name)
-    assert ended.returncode == 2 and ended.stdout == ""
-    assert ended.stderr.count("\n") == 1 and "rover_planner[ros]" in ended.stderr
-    ended = run(environment, tmp_path, name, "--help")
-    assert (ended.returncode, ended.stderr) == (0, "")
-    assert ended.stdout.startswith(f"Usage: {name} ")
+@pytest.mark.long
+def test_a_plain_installation_says_what_its_nodes_need(environment, tmp_path):
+    ended = run(environment, tmp_path, "traverse_server")
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
+    assert "rover_planner[ros]" in ended.stderr

@@ -18,7 +18,7 @@ from support.project.doc_blocks import read_blocks
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 TOOLS = ("setuptools<80", "colcon-common-extensions")
 """colcon links by `setup.py develop --editable`, which setuptools 80 has dropped; Noble has 68."""
 WAIT_FOR_SERVER = "until ros2 node list | grep -q traverse_server; do sleep 1; done"

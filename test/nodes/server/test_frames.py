@@ -92,26 +92,6 @@ def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, last
     assert "start is without a frame_id" in verdict_of(results)["reason"]
 
 
-def test_an_empty_start_is_where_tf_says_the_rover_is(in_odom, client, lasting):
-    client.send_odometry((0.5, 0.5, 0.0), "odom")  # less sure than /tf
-    wait_until(lambda: in_odom.service.fresh_pose() is not None, "odometry")
-    here = Rigid.from_rpy(*START[:2], 0.1, 0.05, 0.02, START[2])
-    send(in_odom, ("odom", "base_link", here))
-    plan, _ = client.next_results(lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "odom")))
-    np.testing.assert_allclose(path_to_poses(plan, "odom")[0], START, atol=1e-9)
-
-
-def test_the_monitor_follows_tf_without_odometry(start_server, client):
-    server = start_server(monitor=True, planner="fan", transform_timeout=60.0)
-    server.service.take_terrain(make_terrain(rocky))
-    send(server, ("map", "base_link", Rigid.from_rpy(*START[:2], 0.0, 0.0, 0.0, START[2])))
-    assert client.can_traverse(START, GOAL).poses
-    wait_until(lambda: server.watch.finding.place is not None, "the place")
-    found = server.watch.finding
-    assert found.place.index == 0 and found.state == "watching"
-    assert server.service.fresh_pose() is None
-
-
 def test_odometry_in_another_frame_is_transformed(mapped, client, lasting):
     send(mapped, ("map", "odom", MAP_ODOM), take="take_static")
     client.send_odometry((1.0, 2.0, 0.5), "odom")

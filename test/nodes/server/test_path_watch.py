@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import stamped_pose
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.nodes.navigation.path_watch import PathWatch
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, wall_at, waves
@@ -171,17 +171,6 @@ def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros, endles
     assert median(delays) < 0.5, delays
 
 
-def test_a_stop_lasts_until_another_path_is_accepted(watched, client):
-    _, rover = watched
-    client.send_terrain(make_terrain(rock_ahead))
-    rover.wait_for_stop()
-    client.send_terrain(make_terrain(waves))
-    time.sleep(0.5)
-    assert rover.stops[-1][0]
-    assert client.can_traverse(START, GOAL).poses
-    rover.wait_for_stop(False)
-
-
 def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
     watched, client, monkeypatch
 ):
@@ -258,7 +247,7 @@ def test_a_question_about_another_place_does_not_replace_the_watched_path(watche
 
 def test_drift_of_the_suspension_is_a_warning_with_its_size_then_a_stop(watched):
     server, rover = watched
-    standing = sweep_path(server.service.settings.rover, server.service.terrain, [START])
+    standing = judge_path(server.service.settings.rover, server.service.terrain, [START])[0]
     right = {"bogie_left": standing.bogie_angle[0, 1], "bogie_right": standing.bogie_angle[0, 0]}
     rover.angles = right
     values = rover.wait_for_status(DiagnosticStatus.OK, key="suspension_drift")

@@ -3,9 +3,7 @@
 import json
 import threading
 import time
-from dataclasses import replace
 
-import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.srv import GetPlan
@@ -83,21 +81,6 @@ def test_a_question_keeps_the_map_it_was_asked_about(start_server, client, ros, 
     wait_until(lambda: client.heard["verdict"], "the verdict")
     verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
     assert verdict["map_hash"] == first != server.service.known_map.fingerprint
-
-
-def test_a_question_waits_for_the_maps_that_came_before_it(server, client):
-    for ground in (waves, wall_at(0.5)):
-        client.send_cloud(terrain_to_point_cloud(make_terrain(ground), "map"))
-        # The cloud and the question travel on two topics: only their arrival has an order.
-        content = make_terrain(ground).elevation
-        wait_until(
-            lambda content=content: (
-                server.service.terrain is not None
-                and np.allclose(server.service.terrain.elevation, content, atol=1e-5)
-            ),
-            "the map",
-        )
-        assert bool(client.can_traverse(START, GOAL).poses) == (ground is waves)
 
 
 def test_a_question_without_time_is_too_long_and_the_next_is_answered(
@@ -195,16 +178,6 @@ def test_map_parameters_act_on_the_map_that_is_there(server, client):
     assert server.service.terrain.resolution == pytest.approx(0.05)
     assert client.set_parameter("map_resolution", 0.1)[0]
     wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.1), "the new cells")
-
-
-def test_a_gap_is_filled_after_the_parameter_says_so(server, client):
-    terrain = make_terrain(waves)
-    elevation = terrain.elevation.copy()
-    elevation[80, 80] = np.nan
-    client.send_terrain(replace(terrain, elevation=elevation))
-    assert np.isnan(server.service.terrain.elevation[80, 80])
-    assert client.set_parameter("unknown_cells", "interpolate")[0]
-    wait_until(lambda: np.isfinite(server.service.terrain.elevation[80, 80]), "the filled gap")
 
 
 def best_effort() -> QoSProfile:

@@ -8,9 +8,10 @@ import pytest
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.parts import sweep_in_parts
 from rover_physics.prediction.servo_path import add_up_rate
+from rover_physics.prediction.sweep import sweep_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path, judge_paths
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bouldered, plane
@@ -141,9 +142,7 @@ def test_energy_and_time_over_steps_hardly_depend_on_the_spacing_of_waypoints():
 def test_the_sum_of_a_rate_counts_poses_between_waypoints_with_their_time():
     options = SweepOptions(policy="servo", friction=0.8)
     ground, path = drive_ground("step", 0.13), drive_path()
-    swept = [
-        one for one, _ in judge_paths(ground, pack_model(ROVER, ground, options), [path], False)
-    ][0]
+    (swept,) = sweep_paths(ground, pack_model(ROVER, ground, options), [path], False)
     time = swept.prediction.time
     ones = swept.results.copy()
     crossings = replace(swept.crossings, results=swept.crossings.results.copy())

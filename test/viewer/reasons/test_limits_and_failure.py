@@ -222,7 +222,7 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
     [candidate] = session.candidates
     assert candidate.verdict.code == "unknown_ground"
     before = prediction.cut(verdict.first_failure + 1)
-    assert candidate.verdict.max_tilt == judge(LSR1, before).max_tilt < 0.2
+    assert candidate.verdict.max_tilt == hold_against_limits(LSR1, before).max_tilt < 0.2
 
 
 def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():

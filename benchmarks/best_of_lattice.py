@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from benchmarks.way_trials.grounds import Case, Pair
-from rover_physics.rover.turning import wheelbase
+from benchmarks.ways import Case, Pair
 from rover_planner.planning.lattice.connections import Connection, connect_goal, connect_start
 from rover_planner.planning.lattice.edges import Edges
 from rover_planner.planning.lattice.headings import HEADINGS
