@@ -46,7 +46,7 @@ class Truth:
         case = self.case
         self.judge, spacing = case.judge, case.options.waypoint_spacing
         pose = np.array([*np.mean(np.reshape(case.terrain.bounds, (2, 2)), axis=1), 0.0])
-        nodes, limited = choose_window(case.question((pose, pose)), 0.25 * wheelbase(case.rover))
+        nodes, limited = choose_window(case.question((pose, pose)), 0.25 * case.rover.wheelbase)
         if limited:
             raise ValueError(f"{case.name} is larger than a window of the search")
         self.edges = Edges(nodes, make_primitives(case.rover, nodes.cell, spacing))

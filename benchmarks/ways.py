@@ -59,7 +59,7 @@ class Case:
     @cached_property
     def options(self) -> PathQueryOptions:
         """The options of `rover_planner plan`."""
-        return PathQueryOptions(policy=self.policy, control_margin=0.0)
+        return PathQueryOptions().change(policy=self.policy, control_margin=0.0)
 
     @property
     def judge(self) -> Judge:
@@ -135,7 +135,7 @@ def try_pair(case: Case, pair: Pair, budget: float) -> dict[str, Any]:
     answer = case.search(pair, budget)
     passes = None
     if answer.path is not None:
-        options = case.options.sweep_options()
+        options = case.options.model
         passes = judge_path(case.rover, case.terrain, answer.path.poses, options)[1].traversable
     return {
         "ground": case.name,
