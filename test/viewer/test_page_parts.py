@@ -23,8 +23,7 @@ from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, straight
-from support.viewer.visits import FAR, shift
+from support.viewer.sessions import FAR, LSR1, shift, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 

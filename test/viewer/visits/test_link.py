@@ -19,7 +19,7 @@ from rover_planner.viewer.browser.link import (
 )
 from rover_planner.viewer.browser.packed_text import pack_text
 from support.grounds import make_terrain, waves
-from support.viewer.visits import FAR, shift
+from support.viewer.sessions import FAR, shift
 
 LINK = Link(
     rover="lsr1",
