@@ -45,14 +45,14 @@ def session_on(height, start=(-2.0, 0.0, 0.0), goal=(1.0, 0.0, 0.0)) -> ViewSess
 
 
 def blocked(x, y):
-    """Return waves with a block on the straight path and, beyond x = 2.8 m, a wall along y."""
-    block, wall = (abs(x - 0.5) < 0.2) & (abs(y) < 0.15), (x > 2.8) & (x < 3.2)
+    """Return waves with a block on the straight path and, from x = 2.6 m on, a wall along y."""
+    block, wall = (abs(x - 0.5) < 0.2) & (abs(y) < 0.15), (x > 2.6) & (x < 2.8)
     return waves(x, y) + 0.25 * block + 0.5 * wall
 
 
 def blocked_session() -> ViewSession:
-    """Return a session of which some paths are refused and some pass; it searches no way."""
-    search = LatticeSettings(budget=0.1)
+    """Return a session of which some paths are refused and some pass; it searches briefly."""
+    search = LatticeSettings(budget=0.5)
     session = ViewSession(
         LSR1, make_terrain(blocked), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), search=search
     )

@@ -67,8 +67,9 @@ def visitor(opened, page):
 
 @pytest.fixture
 def onlooker(visitor):
-    """The same visitor, who sees the whole scene, without viser's notices."""
+    """The same visitor, who sees the whole scene from where it is seen at first."""
     visitor.show_scene()
     visitor.hide_notices()
+    visitor.press("Fit")
     visitor.wait_for_ground()
     return visitor

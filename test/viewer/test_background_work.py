@@ -75,10 +75,12 @@ def wait_for_idle(work) -> None:
     wait_until(lambda: work.progress is None, "the end of the work", 60.0)
 
 
-def test_what_is_judged_in_the_background_is_what_the_library_says(judge, spirit):
+def test_what_is_judged_in_the_background_is_what_the_library_says(judge, spirit, woken):
     judge.ask(JudgeRequest(spirit))
     wait_for_idle(judge)
+    assert judge.has_news
     first, last = judge.take()
+    assert len(woken) == 2 and judge.take() == [] and not judge.has_news
     answer = answer_path_query(LSR1, spirit.terrain, spirit.start, spirit.goal, spirit.options)
     for found in (first.result, last.result):
         assert [c.verdict for c in found.answer.candidates] == [
@@ -104,14 +106,6 @@ def test_of_fifty_requests_of_a_dragged_slider_the_newest_wins(judge, spirit):
     assert len(set(order)) < 50
     last = delivered[-1]
     assert last.error is None and last.result.scenario.rover.friction == frictions[-1]
-
-
-def test_each_result_is_handed_over_once_and_announced(judge, spirit, woken):
-    judge.ask(JudgeRequest(spirit))
-    wait_for_idle(judge)
-    assert judge.has_news
-    assert len(judge.take()) == len(woken) == 2
-    assert judge.take() == [] and not judge.has_news
 
 
 def test_slow_work_gives_way_to_a_newer_request_and_delivers_nothing(busy_judge, spirit):
@@ -147,17 +141,6 @@ def test_a_newer_request_stops_at_once_what_follows_a_result_or_is_hasty(is_hast
     assert work.close()
 
 
-def test_a_slider_that_moves_on_stops_judging_of_all_paths_not_of_the_shown_one(spirit):
-    session = ViewSession(LSR1, spirit.terrain, spirit.start, spirit.goal, spirit.options)
-    session.judge_in_background(lambda: None)
-    is_hasty = session._background._is_hasty
-    session.change_rover([("friction",)], 0.7)
-    assert not is_hasty(session._asked)
-    session.plan_again()
-    assert is_hasty(session._asked)
-    assert session.close()
-
-
 @pytest.mark.timed
 def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, spirit):
     busy_judge.ask(JudgeRequest(SLOW))
@@ -170,6 +153,11 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, spirit):
     assert passed() < STOP_TIME
     wait_for_idle(busy_judge)
     assert {one.request.scenario for one in busy_judge.take()} == {spirit}
+    busy_judge.ask(JudgeRequest(SLOW))
+    wait_until(lambda: busy_judge.progress.what, "the work to begin")
+    passed = start_watch()
+    assert busy_judge.close()
+    assert passed() < STOP_TIME
 
 
 def test_a_request_that_the_model_refuses_is_delivered_as_an_error(judge, spirit):
@@ -200,15 +188,6 @@ def test_no_error_ends_the_thread(error):
     assert work.close()
 
 
-def test_progress_names_paths_and_then_policies_in_their_order(spirit):
-    steps = []
-    for _ in judge_request(JudgeRequest(spirit), lambda *step: steps.append(step)):
-        steps.append("result")
-    paths = [(PATH, k, 5) for k in range(1, 6)]
-    policies = [(POLICY, k, 3) for k in range(1, 4)]
-    assert steps == [*paths, "result", *policies, "result"]
-
-
 def test_progress_is_seen_from_outside_while_the_work_runs(judge):
     seen = []
 
@@ -233,17 +212,6 @@ def test_progress_is_seen_from_outside_while_the_work_runs(judge):
     wait_until(watch, "the end", 120.0)
     named = [text for text in seen if text != "waiting"]
     assert named == [f"{what} {k} of 3" for what in (PATH, POLICY) for k in (1, 2, 3)]
-
-
-@pytest.mark.timed
-def test_work_that_runs_is_closed_soon():
-    work = BackgroundWork(judge_without_end, lambda: None, "closed while it runs")
-    work.ask(JudgeRequest(SLOW))
-    wait_until(lambda: work.progress.what, "the work to begin")
-    passed = start_watch()
-    assert work.close()
-    assert passed() < STOP_TIME
-    assert "closed while it runs" not in {thread.name for thread in threading.enumerate()}
 
 
 def test_a_process_ends_although_work_runs_in_it():
@@ -323,15 +291,14 @@ def test_a_cancelled_session_keeps_its_verdict_marked_old_and_judges_again(sessi
     assert not session.shown.verdict.traversable
 
 
-def test_a_value_that_is_refused_when_it_is_judged_is_not_wanted_any_more(session):
+def test_a_value_that_is_refused_when_it_is_judged_is_not_wanted_any_more_and_errors_are_raised(
+    session,
+):
     shown = session.shown
     assert session.change_options(policy="best")
     finish(session)
     assert "policy" in session.refusal
     assert session.shown is shown and not session.is_outdated
-
-
-def test_an_error_that_is_no_refusal_is_raised_where_it_is_taken(session):
     session.change_options(map_sigmas="many")  # type: ignore[arg-type]
     wait_for_idle(session)
     with pytest.raises(ValueError, match="many"):
