@@ -54,10 +54,15 @@ RECORD_NOTE = """() => {
 }"""
 """Keeps what the note at a box says, and how far it is below the box [px]."""
 
-SMALL_SCENE = (
-    'div[style*="touch-action: none"] > div {width: 16px !important; height: 16px !important}'
-)
-"""Style of a scene of 16 x 16 pixels."""
+SHRINK = """() => {
+    if (document.getElementById('small-scene')) return;
+    const style = document.createElement('style');
+    style.id = 'small-scene';
+    style.textContent = 'div[style*="touch-action: none"] > div '
+        + '{width: 16px !important; height: 16px !important}';
+    document.head.append(style);
+}"""
+"""Lets the browser draw a scene of 16 x 16 pixels."""
 
 OVERLAPS = """() => {
     const boxes = [...document.querySelectorAll('.label-box')].filter(e => e.offsetParent).map(
@@ -97,13 +102,14 @@ def wait_until(condition: Callable[[], Any], what: str) -> Any:
 class Visitor:
     """A simulated user of the page: reads texts and pixels, presses, drags and clicks."""
 
-    def __init__(self, browser: Any, url: str, scale: float = 0.4):
+    def __init__(self, browser: Any, url: str, scale: float = 0.4, sees_scene: bool = True):
         # Few pixels by default, because rendering without a graphics card is slow.
         self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=scale)
-        self._small: Any = None
         self.page_errors: list[str] = []
         self.tab.on("pageerror", lambda error: self.page_errors.append(str(error)))
         self.tab.set_default_timeout(1000.0 * WAIT)
+        if not sees_scene:
+            self.tab.add_init_script(f"document.addEventListener('DOMContentLoaded', {SHRINK})")
         self.tab.goto(url)
         self.tab.wait_for_selector("#dashboard")
 
@@ -112,13 +118,11 @@ class Visitor:
 
         Without a graphics card it then draws 60 times as many pictures.
         """
-        self._small = self._small or self.tab.add_style_tag(content=SMALL_SCENE)
+        self.tab.evaluate(SHRINK)
 
     def show_scene(self) -> None:
         """Let the browser draw the whole scene again."""
-        if self._small:
-            self._small.evaluate("style => style.remove()")
-        self._small = None
+        self.tab.evaluate("() => document.getElementById('small-scene')?.remove()")
 
     def hide_notices(self) -> None:
         """Hide the notices of viser, which may cover what is clicked or seen."""

@@ -44,10 +44,10 @@ def open_browser() -> Iterator[object]:
 
 
 @contextmanager
-def visit(page: PageBase, browser: object, query: str = "") -> Iterator[Visitor]:
+def visit(page: PageBase, browser: object, *, sees_scene: bool = True) -> Iterator[Visitor]:
     """Serve a page to a visitor, and close both."""
     try:
-        visitor = Visitor(browser, page.url + query)
+        visitor = Visitor(browser, page.url, sees_scene=sees_scene)
         yield visitor
         visitor.tab.close()
     finally:

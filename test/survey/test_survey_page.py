@@ -82,13 +82,10 @@ def test_every_layer_has_colours_and_a_meaning(shown):
         assert (found.scale is None) != (not found.keys), name
         assert len(np.unique(found.colours.reshape(-1, 3), axis=0)) > 1, name
     assert shown.colour(HEADINGS, at, at).scale.high == 8
-    assert any("off map" in text for _, text in shown.colour(LIMIT, at, at).keys)
-
-
-def test_the_reachable_area_ends_at_the_wall(shown):
     assert "can go and return" in shown.describe(REACHABLE)
     assert colour_at(shown, REACHABLE, PASSABLE) != UNKNOWN
     assert colour_at(shown, REACHABLE, (5.3, 3.0)) == UNKNOWN
+    assert any("off map" in text for _, text in shown.colour(LIMIT, at, at).keys)
 
 
 def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
@@ -120,14 +117,11 @@ def test_what_differs_from_the_page_is_said(shown):
     ],
 )
 def test_a_survey_of_another_rover_or_map_is_refused(surveyed, rover, heights, said):
+    with pytest.raises(PlanningError, match="60 x 60 cells; --max-cells is 100"):
+        load_map(surveyed, 100)
     terrain = load_map(surveyed, 10_000) if heights is None else Terrain(heights, 0.1)
     with pytest.raises(PlanningError, match=said):
         open_survey(surveyed, rover, terrain)
-
-
-def test_a_map_that_is_too_large_is_refused(surveyed):
-    with pytest.raises(PlanningError, match="60 x 60 cells; --max-cells is 100"):
-        load_map(surveyed, 100)
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def opened(page, browser):
     """A visitor of the page; neither may tell an error at the end."""
     from support.viewer.browser import Visitor
 
-    visitor = Visitor(browser, page.url)
+    visitor = Visitor(browser, page.url, sees_scene=False)
     yield visitor
     assert visitor.page_errors == [] and page.errors.messages == {}
 

@@ -123,14 +123,6 @@ def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monke
     wait_until(lambda: not shown_errors(page), "the notice to go")
 
 
-def test_all_candidates_are_judged_after_a_change_though_drawing_has_stopped(page, monkeypatch):
-    monkeypatch.setattr(page.scene, "show", fail)
-    friction = next(v for v in page.rover_tab._sliders._sliders if v.label == "friction [-]")
-    ask(page, lambda: page._change_value(friction, 0.4))
-    wait_until(lambda: "drawing stopped" in shown_errors(page), "the notice")
-    wait_until(lambda: "0 of 5 candidate paths" in page.drive_tab._details.content, "the answer")
-
-
 def test_an_error_of_a_judgement_is_shown_and_the_old_verdict_is_marked(page):
     ask(page, lambda: page._change_options(map_sigmas="many"))
     wait_until(lambda: "not judged" in shown_errors(page), "the notice")
@@ -144,18 +136,6 @@ def test_an_error_of_a_judgement_is_shown_and_the_old_verdict_is_marked(page):
     wait_until(lambda: "old values" not in page.drive_tab._verdict.content, "the mark to go")
 
 
-def test_a_page_that_fails_between_pictures_says_that_it_stopped_and_starts_again(
-    page, monkeypatch
-):
-    with monkeypatch.context() as patch:
-        patch.setattr(page, "add_due_requests", fail)
-        wait_until(lambda: "stopped" in shown_errors(page), "the notice")
-        assert "ValueError: a line of &lt;no&gt; points" in shown_errors(page)
-    wait_until(lambda: not shown_errors(page), "the notice to go")
-    ask(page, page.playback.play)
-    wait_until(lambda: page.playback.time > 0.0, "the rover to drive")
-
-
 def test_a_closed_page_leaves_no_thread_behind():
     before = set(threading.enumerate())
     page = Page(session_on(ramp), port=0)
@@ -163,11 +143,6 @@ def test_a_closed_page_leaves_no_thread_behind():
     page.close()
     left = {thread.name for thread in set(threading.enumerate()) - before}
     assert not left & {"page", "judge", "ground", "study"}
-
-
-def test_a_path_that_does_not_exist_is_refused_by_its_number(page):
-    ask(page, lambda: page._choose_path(7))
-    assert "no path 8; there are paths 1 to" in page._notice._refusal.content
 
 
 @pytest.mark.slow

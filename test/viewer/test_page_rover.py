@@ -202,8 +202,7 @@ def test_while_a_change_is_judged_every_visitor_sees_so_and_the_old_verdict_is_g
 ):
     session = page.session
     before, shown = session.wanted, session.shown
-    second = Visitor(browser, page.url)
-    second.shrink_scene()
+    second = Visitor(browser, page.url, sees_scene=False)
     visitor.open_tab("Rover")
     with held(session._background):
         visitor.set_slider(FRICTION, "0.7")
@@ -215,9 +214,9 @@ def test_while_a_change_is_judged_every_visitor_sees_so_and_the_old_verdict_is_g
         assert session.shown is shown
         grey = set(range(len(session.candidates)))
         wait_until(lambda: page.scene.paths._old == grey, "grey paths")
-        visitor.press("Play")
+        ask(page, page.playback.play)
         wait_until(lambda: page.playback.time > 0.0, "the rover to drive on")
-        visitor.press("Pause")
+        ask(page, page.playback.pause)
     wait_for_rest(page)
     assert session.rover.friction == 0.7 and session.shown is not shown
     for one in (visitor, second):

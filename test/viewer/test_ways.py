@@ -179,8 +179,14 @@ def test_while_a_way_is_searched_the_verdict_on_the_candidates_is_there(session)
     with searching(session):
         assert not session.is_outdated and len(session.candidates) == 5
         assert not session.shown.verdict.traversable
+        other = 1 if session.shown.index != 1 else 2
+        assert session.show_candidate(other)  # it stays, and the way is listed
     finish(session)
-    assert session.shown.index == 5 and session.shown.verdict.traversable
+    assert session.shown.index == other and len(session.candidates) == 6
+    assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
+    assert session.show_candidate(5)
+    finish(session)
+    assert session.shown.verdict.traversable
 
 
 def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begun_again(session):
@@ -192,18 +198,6 @@ def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begu
     assert session.plan_again()
     finish(session)
     assert session.finished.way.outcome == FOUND
-
-
-def test_a_path_that_is_chosen_during_the_search_stays_and_the_way_is_listed(session):
-    with searching(session):
-        other = 1 if session.shown.index != 1 else 2
-        assert session.show_candidate(other)
-    finish(session)
-    assert session.shown.index == other and len(session.candidates) == 6
-    assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
-    assert session.show_candidate(5)
-    finish(session)
-    assert session.shown.verdict.traversable
 
 
 def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wall():

@@ -127,8 +127,7 @@ def test_a_row_under_the_mouse_highlights_its_path_to_this_visitor_and_a_click_s
         found = visitor.tab.locator(selector)
         return found.evaluate("e => getComputedStyle(e).backgroundColor")
 
-    other = Visitor(browser, page.url)
-    other.shrink_scene()
+    other = Visitor(browser, page.url, sees_scene=False)
     for one in (visitor, other):
         one.open_tab("Ground and path")
     rows = visitor.tab.locator("#candidates tr[data-path]")

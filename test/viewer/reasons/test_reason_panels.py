@@ -18,7 +18,7 @@ from rover_planner.viewer.panel.plots import (
 from rover_planner.viewer.panel.reasons.candidate_table import draw_candidates
 from rover_planner.viewer.panel.reasons.changes import draw_changes
 from rover_planner.viewer.panel.reasons.colour_scale import draw_scale
-from rover_planner.viewer.panel.reasons.lanes import BROKEN, COLOURS, WIDTH, classify, draw_lanes
+from rover_planner.viewer.panel.reasons.lanes import BROKEN, COLOURS, WIDTH, draw_lanes
 from rover_planner.viewer.state import colours
 from rover_planner.viewer.state.colours import (
     MIN_CONTRAST,
@@ -70,14 +70,6 @@ def test_lanes_have_a_strip_for_each_limit_that_is_broken_where_the_path_fails(r
     left, width = map(float, strips[-1])
     assert left <= WIDTH * why.failure.distance / why.limits.end <= left + width + 0.5
     assert why.failure.headline.split(",")[0] in drawing
-
-
-def test_the_classes_of_a_lane_follow_the_used_share(refused):
-    lane = explain(refused.finished).limits.lane("friction")
-    kinds = classify(lane)
-    assert kinds[-1] == BROKEN
-    kept = kinds < BROKEN
-    assert (np.digitize(lane.used[kept], [0.5, 0.8], right=True) == kinds[kept]).all()
 
 
 def test_the_mark_of_a_failure_leaves_the_curves_as_they_are():
@@ -200,8 +192,12 @@ def test_lines_stand_out_from_the_ground_on_every_layer():
 # Layers.
 
 
-def test_layers_with_limits_have_them_on_their_scales():
+def test_layers_with_limits_have_them_on_their_scales_and_classes_have_a_legend():
     ground = make_terrain(waves, half=2.0)
+    text = draw_scale("passable or not", build_ground_mesh(LSR1, ground, "passable or not").scale)
+    for words in ("keeps all limits", "breaks a limit", "cannot stand"):
+        assert words in text
+    assert "gradient(90deg" not in text and "1.00" not in text
     for name, layer in LAYERS.items():
         scale = build_ground_mesh(LSR1, ground, name).scale
         assert (scale.limit is not None) == (layer.limit is not None)
@@ -224,14 +220,6 @@ def test_ground_beyond_a_limit_is_vermillion_and_hatched():
     assert is_red.mean() > 0.3
     assert not ((holds[:, 0] > 1.8 * holds[:, 1]) & (holds[:, 2] < 0.2 * holds[:, 0])).any()
     assert slips[is_red, 0].min() < 0.7 * slips[is_red, 0].max()
-
-
-def test_classes_have_a_legend_instead_of_numbers():
-    scale = build_ground_mesh(LSR1, make_terrain(waves, half=2.0), "passable or not").scale
-    text = draw_scale("passable or not", scale)
-    for words in ("keeps all limits", "breaks a limit", "cannot stand"):
-        assert words in text
-    assert "gradient(90deg" not in text and "1.00" not in text
 
 
 def test_a_layer_along_a_path_has_the_heading_of_its_nearest_waypoint():

@@ -176,9 +176,8 @@ def first_of_each_folder(sliders: list[Slider]) -> list[Slider]:
 )
 def test_sliders_at_both_ends_leave_the_page_alive_and_right(name, choose, browser):
     page = serve(name)
-    with visit(page, browser) as visitor:
+    with visit(page, browser, sees_scene=False) as visitor:
         visitor.tab.set_viewport_size(SMALL)
-        visitor.shrink_scene()
         wait_for_rest(page)
         visitor.open_tab("Rover")
         for folder in ("Wheels", "Masses", "Arm"):  # closed at first
