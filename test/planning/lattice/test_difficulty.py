@@ -6,7 +6,6 @@ import pytest
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.lattice.difficulty import (
-    STEPS_PER_UNIT,
     difficulty_of,
     estimate_difficulty,
     steepest_climb,
@@ -77,18 +76,3 @@ def test_unknown_ground_is_as_difficult_as_the_ground_beside_it():
     elevation[:, : elevation.shape[1] // 2] = np.nan
     found, _ = difficulties(Terrain(elevation, level.resolution, level.origin))
     assert np.ptp(found) == 0.0
-
-
-def test_an_estimate_is_made_once_and_kept_until_it_is_forgotten():
-    known = JudgedEdges(EDGES)
-    slope = make_terrain(lambda x, y: 0.3 * x, half=3.5)
-    level = make_terrain(lambda x, y: 0.0 * x, half=3.5)
-    lists = EDGES.samples, known.difficulty
-    steep, flat = (
-        estimate_difficulty(LSR1, ground, NODES, CLIMB, lists) for ground in (slope, level)
-    )
-    node = NODES.count // 2
-    first = difficulty_of(steep, NODES.shape[1], node, 0)
-    assert difficulty_of(flat, NODES.shape[1], node, 0) == first > 1.0 / STEPS_PER_UNIT
-    known.forget(np.array([node // 16]))
-    assert difficulty_of(flat, NODES.shape[1], node, 0) < first
