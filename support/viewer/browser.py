@@ -30,7 +30,7 @@ ARGUMENTS = [
 """Options of the browser: WebGL without a graphics card, and no network requests."""
 LAPTOP = {"width": 1280, "height": 720}
 """Size of a laptop's window [px]."""
-WAIT = 40.0
+WAIT = 120.0
 """Longest wait for the page [s]; rendering takes seconds on a busy machine."""
 
 RECORD = """text => {

@@ -24,7 +24,7 @@ SHARE = 0.2
 START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
-PATIENCE = 40.0
+PATIENCE = 120.0
 """Longest wait for a page [s]; drawing and judging take seconds on a busy machine."""
 
 

@@ -9,7 +9,7 @@ from rover_planner.viewer.scene.ribbons import BROAD_LINE_WIDTH, LINE_WIDTH
 from rover_planner.viewer.state import colours
 from support.viewer.browser import OVERLAPS, Visitor, needs_browser, wait_until
 from support.viewer.sessions import ask, wait_for_rest
-from support.viewer.visits import find_camera, look_from
+from support.viewer.visits import find_camera, look_from, wait_for_browser
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -184,6 +184,8 @@ def test_rows_and_labels_are_reached_and_selected_by_keys_and_clicks(onlooker, p
         wait_for_highlight(page, onlooker, index + 1)
     assert page.playback.rate == 0.0  # space was the row's, not the drive's
     keyboard.press("Escape")
+    wait_for_rest(page)
+    wait_for_browser(page, onlooker)  # a label that is made anew loses a click
     onlooker.tab.locator("#label-layer [data-path='1']").click()
     wait_until(lambda: page.session.shown.index == 0, "the path of the number")
     onlooker.tab.mouse.move(600, 700)
