@@ -68,7 +68,7 @@ def classes_of_judgements(on_map: RoverOnMap, poses) -> np.ndarray:
 )  # fmt: skip
 def test_a_pose_has_the_class_that_a_path_there_would_have(kind, name):
     cell = 0.1 if name == "m2020" else 0.05
-    noise = {"rough": 1.0, "uncertain": 1.0, "slope": 0.02}.get(kind, 0.3)
+    noise = {"rough": 1.0, "slope": 0.02}.get(kind, 0.3)
     terrain, options = rough(7, (90, 100), cell, noise), OPTIONS
     shape = terrain.elevation.shape
     if kind == "soil":

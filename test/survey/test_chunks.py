@@ -25,7 +25,7 @@ from support.survey_maps import (
 def test_three_chunkings_give_the_same_bits(tmp_path):
     terrain, request = make_rough_map(130, 140), make_request(headings=2)
     whole = layers_of(survey_here(tmp_path / "a", terrain, request, chunk=2000))
-    assert len(np.unique(whole["first_limit"])) > 5
+    assert len(np.unique(whole["first_limit"])) > 3
     for chunk in (64, 128):
         other = survey_here(tmp_path / str(chunk), terrain, request, chunk=chunk)
         assert_same_bits(whole, layers_of(other))

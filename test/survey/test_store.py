@@ -206,7 +206,7 @@ def test_a_damaged_file_is_one_line(finished, capfd, content):
     path = finished / "out"
     for name, words in (
         ("best_class", ["survey", "lsr1", str(finished / "map.npz"), str(path), "--headings=4"]),
-        ("passable_headings", ["reachable", str(path), "--from", "1213,-329"]),
+        ("passable_headings", ["reachable", str(path), "--from", "1213.3,-326.7"]),
     ):
         damaged = path / name / "c" / "2" / "2"
         damaged.write_bytes(damaged.read_bytes()[:-9] if content is None else content)

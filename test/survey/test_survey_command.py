@@ -262,7 +262,7 @@ def test_no_space_left_is_one_line_and_what_is_there_is_whole(tmp_path, writes_l
         survey_here(tmp_path, make_rough_map(120, 120), make_request())
         words += ["--geotiff", tmp_path / "layers"]
     ended = subprocess.run([*map(str, words)], capture_output=True, text=True, timeout=200,
-                           preexec_fn=limit_files(10_000 if writes_layers else 500))  # fmt: skip
+                           preexec_fn=limit_files(10_000 if writes_layers else 1500))  # fmt: skip
     assert ended.returncode == 2 and ended.stderr.count("\n") == 1, ended.stderr
     if writes_layers:
         assert ".tif: cannot be written: File too large" in ended.stderr

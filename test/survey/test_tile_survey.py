@@ -75,9 +75,11 @@ def test_limits_and_classes_are_those_of_predict(ground, policy, std):
     np.testing.assert_array_equal(layers["first_limit"][clear], limits[clear])
     classes = np.array([CLASS_NUMBERS[one.traversability_class] for one in told])
     np.testing.assert_array_equal(layers["best_class"][clear], classes[clear])
-    assert {"tip_over", "belly", "tilt"} <= set(verdict.codes)
-    assert clear.any() and not clear.all() and len(set(classes.tolist())) >= 3
-    if std is not None:
+    assert clear.any() and not clear.all()
+    if std is None:
+        assert {"tip_over", "belly", "tilt"} <= set(verdict.codes)
+        assert len(set(classes.tolist())) >= 3
+    else:
         exact = survey_tile(replace(request, sigmas=0.0), ground, places)["first_limit"]
         assert (layers["first_limit"] != NO_LIMIT).sum() > (exact != NO_LIMIT).sum()
 

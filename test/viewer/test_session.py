@@ -122,15 +122,22 @@ def test_a_recorded_prediction_is_shown_as_it_was_recorded(tmp_path):
     shown = session.shown
     assert shown.verdict.reason == verdict.reason != ""
     assert shown.verdict.first_failure == verdict.first_failure
-    stuck = (*verdict.reasons[:-1], "the wheel is stuck")  # it takes precedence over the model
-    other = ViewSession(LSR1, session.terrain, session.start, session.goal)
-    other.replay(prediction, ("",) * (len(stuck) - 1) + stuck[-1:])
-    assert other.shown.verdict.reason == "the wheel is stuck"
     state = shown.trajectory.state_at(10.0)
     expected = Trajectory(LSR1, prediction, verdict).state_at(10.0)
     assert state is not None and expected is not None
     np.testing.assert_allclose(state.wheel_loads, expected.wheel_loads)
     np.testing.assert_allclose(state.contact_points, expected.contact_points)
+
+
+def test_a_recorded_reason_takes_precedence_over_the_model(tmp_path):
+    prediction, verdict = judge_path(LSR1, make_terrain(waves), straight())
+    write_prediction(tmp_path / "out.npz", prediction, verdict)
+    again, reasons = read_prediction(tmp_path / "out.npz")
+    assert read_recorded_assumptions(tmp_path / "out.npz") is None
+    session = session_on(waves)
+    session.replay(again, (*reasons[:-1], "the wheel is stuck"))
+    assert not session.shown.verdict.traversable
+    assert session.shown.verdict.reason == "the wheel is stuck"
 
 
 def test_a_file_without_predictions_is_refused_by_name(tmp_path):
