@@ -195,7 +195,7 @@ def test_a_failing_page_shows_a_red_banner_over_the_scene_and_goes_on(
 
 def test_buttons_play_pause_step_and_go_back_and_the_picture_follows(onlooker, page, slowly):
     before, group = onlooker.picture(), onlooker.buttons("Playback")
-    assert group() == ["Rewind", "Play", "Fast forward"]
+    wait_until(lambda: group() == ["Rewind", "Play", "Fast forward"], "the buttons at rest")
     onlooker.press("Play")
     wait_until(lambda: group() == ["Rewind", "Pause", "Fast forward"], "the other name")
     wait_until(lambda: onlooker.number("Distance") > 5.0, "the rover to drive")
