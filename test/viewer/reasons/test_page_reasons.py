@@ -13,6 +13,9 @@ from support.viewer.visits import find_camera, look_from, wait_for_browser
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
+FAR_AND_FLAT = (-60.0, -20.0, 2.0), (0.0, 0.0, 0.2)
+"""Place of a camera and where it looks [m]."""
+
 LINE_WIDTHS = """names => names.map((name) => {
     const widths = [];
     const node = window.__viserMutable.nodeRefFromName[name];  // not while it is drawn anew
@@ -103,9 +106,9 @@ def test_lanes_have_the_scale_of_the_plots_and_no_letter_is_lower_than_12_px(
 
 def test_labels_do_not_overlap_on_the_screen(onlooker, page, refused):
     count = len(page.session.candidates) + 3  # start, goal and the failure
-    top, flat = (0.0, 0.01, 12.0), (-6.0, 0.02, 0.4)
-    for place in (top, flat, (0.0, -9.0, 0.3), (-60.0, -20.0, 2.0)):
-        look_from(page, onlooker, place, (0.0, 0.0, 0.2))
+    top, flat, at = (0.0, 0.01, 12.0), (-6.0, 0.02, 0.4), FAR_AND_FLAT[1]
+    for place in (top, flat, (0.0, -9.0, 0.3), FAR_AND_FLAT[0]):
+        look_from(page, onlooker, place, at)
         wait_until(lambda: onlooker.tab.evaluate(OVERLAPS) == [count, []], "labels that are apart")
 
 
@@ -185,6 +188,7 @@ def test_rows_and_labels_are_reached_and_selected_by_keys_and_clicks(onlooker, p
     assert page.playback.rate == 0.0  # space was the row's, not the drive's
     keyboard.press("Escape")
     wait_for_rest(page)
+    look_from(page, onlooker, *FAR_AND_FLAT)  # the label is in front of the sky
     wait_for_browser(page, onlooker)  # a label that is made anew loses a click
     onlooker.tab.locator("#label-layer [data-path='1']").click()
     wait_until(lambda: page.session.shown.index == 0, "the path of the number")
