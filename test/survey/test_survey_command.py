@@ -62,8 +62,8 @@ def whole(tmp_path_factory):
 
 @pytest.fixture
 def ground(tmp_path) -> Path:
-    """Return a map of 4 chunks."""
-    save_terrain(tmp_path / "map.npz", make_rough_map(120, 120))
+    """Return a map, which is not surveyed."""
+    save_terrain(tmp_path / "map.npz", make_rough_map(130, 130))
     return tmp_path / "map.npz"
 
 
