@@ -113,7 +113,7 @@ def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
 
 
 def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():
-    prediction, verdict, why = why_on(wall_at(0.5))
+    prediction, verdict, why = why_on(stepped, friction=0.4)
     failure = why.failure
     assert failure is not None and failure.is_between
     assert verdict.reason.startswith("on the way here")
