@@ -316,7 +316,8 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(
     with pytest.raises(PlanningError, match=r"has had no worker for 0\.3 s; start some"):
         run_survey(prepared.job, prepared.chunks, ClusterSettings(start_cluster(0)))
     capfd.readouterr()
-    out, small = ground.with_name("out"), start_cluster(1, memory_limit="300MB", threads_per_worker=1)
+    out = ground.with_name("out")
+    small = start_cluster(1, memory_limit="300MB", threads_per_worker=1)
     assert main(["survey", "lsr1", str(ground), str(out), "--scheduler", small]) == 2
     err = capfd.readouterr().err
     assert "a worker has 300 MB: give a smaller --chunk" in err and not out.exists()
