@@ -250,5 +250,5 @@ def test_a_visitor_of_a_page_that_ends_is_told(page, visitor):
     assert not visitor.tab.locator("#lost").is_visible()
     ask(page, lambda: page._load(lambda: load_rover("m2020")))
     wait_for_rest(page)
-    page.close()
+    page.close()  # this is the last test of the page
     visitor.wait_for("No connection to the program")
