@@ -1,18 +1,18 @@
-"""A map at the coordinates of a UTM zone in a real browser: sharp, and clicks land where aimed."""
+"""Pages of other maps in a real browser: at the coordinates of a UTM zone, and with a survey."""
 
-from collections.abc import Iterator
 from io import BytesIO
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.browser import Visitor, needs_browser, wait_until
-from support.viewer.sessions import LSR1
-from support.viewer.visits import FAR, look_down_at, open_browser, shift, visit, wait_for_rest
+from support.viewer.sessions import FAR, LSR1, shift, wait_for_rest
+from support.viewer.visits import look_down_at, visit
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -29,18 +29,12 @@ def picture_of(page: Page, visitor: Visitor, by: tuple[float, float]) -> np.ndar
     """Return the pixels of the scene from above, the same place of the ground for any map."""
     wait_for_rest(page)
     visitor.wait_for("paused")
-    hidden = ".over-scene, .mantine-Notifications-root { display: none !important; }"
-    visitor.tab.add_style_tag(content=hidden)
+    visitor.hide_notices()
+    visitor.tab.add_style_tag(content=".over-scene { display: none !important; }")
     look_down_at(page, visitor, np.array([by[0] - 1.0, by[1], 0.0]))
     visitor.wait_for_ground()
     picture = visitor.steady_picture()
     return np.asarray(Image.open(BytesIO(picture)).convert("RGB"), dtype=float)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[object]:
-    with open_browser() as chromium:
-        yield chromium
 
 
 def test_a_far_map_looks_like_a_near_one_and_a_click_lands_where_it_is_aimed(browser):
@@ -70,3 +64,32 @@ def test_a_far_map_looks_like_a_near_one_and_a_click_lands_where_it_is_aimed(bro
         poses = page.session.shown.candidate.poses
         np.testing.assert_allclose(poses[-1, :2], aim, atol=0.05)
         assert not page.errors.messages and visitor.page_errors == []
+
+
+def test_a_survey_is_shown_and_said_to_be_of_another_policy(browser, tmp_path):
+    pytest.importorskip("zarr", reason="install the extra survey")
+    from rover_planner.survey.reach.reachable import find_reachable
+    from rover_planner.viewer.state.survey_layers import REACHABLE, load_map, open_survey
+    from support.survey_maps import make_request, survey_here
+
+    heights = np.zeros((60, 60))
+    heights[:, 44:48] = 1.0
+    store = survey_here(tmp_path, Terrain(heights, 0.1), make_request(headings=8)).store
+    find_reachable(store, 1.5, 1.5)
+    ground = load_map(store.path, 10_000)
+    session = ViewSession(LSR1, ground, (1.5, 1.5, 0.0), (2.5, 1.5, 0.0))
+    page = Page(session, port=0, survey=open_survey(store.path, LSR1, ground))
+    with visit(page, browser) as visitor:
+        visitor.open_tab("Ground and path")
+        visitor.wait_for("impassable")
+        wait_until(lambda: "survey: class" in visitor.text("#scale"), "the legend")
+        before = visitor.picture()
+        visitor.choose("Colour by", REACHABLE)
+        visitor.wait_for("can go and return")
+        wait_until(lambda: visitor.picture() != before, "other colours")
+        visitor.shrink_scene()
+        visitor.choose("Torques", "speed servos")
+        visitor.wait_for("torque policy equal in the survey, servo here")
+        visitor.choose("Colour by", "height")
+        visitor.wait_for("a line every metre")
+        assert not visitor.page_errors
