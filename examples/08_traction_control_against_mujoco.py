@@ -57,7 +57,7 @@ for name, with_traction_control in (("speed servos", False), ("traction control"
     log = drive(with_traction_control)
     slip, _, energy = log[:, 1:].sum(axis=0) * PERIOD
     print(f"{name}: {'arrived' if log[-1, 0] >= END else f'stuck at {log[-1, 0]:.2f} m'}, "
-          f"slid {100 * slip:.1f} cm, {log[:, 2].mean():.2f} N m a wheel, {energy:.1f} J")  # fmt: skip
+          f"slid {100 * slip:.1f} cm, {log[:, 2].mean():.2f} N m, {energy:.1f} J")  # fmt: skip
     axes[0].plot(log[:, 0], 100 * np.cumsum(log[:, 1]) * PERIOD, label=name)
     axes[1].plot(log[:, 0], log[:, 2], linewidth=0.8)
 axes[0].set(ylabel="slip of a wheel so far [cm]")
