@@ -53,6 +53,7 @@ EXTRAS = {
     "dev": [
         "ruff>=0.9,<1",
         "mypy>=1.14,<3",
+        "pytest-cov>=6.0,<8",
     ],
 }
 EXTRAS["all"] = [

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import typer
 
+import rover_physics
 from rover_physics.terrain.grid import load_terrain
 from rover_planner.cli import app, main
 from rover_planner.shell.poses import join_poses
@@ -24,6 +25,11 @@ def test_terrain_says_what_it_wrote(tmp_path, capfd):
     columns = load_terrain(tmp_path / "a.npz").elevation.shape[1]
     told = f"wrote {tmp_path / 'a.npz'}: {columns} x {columns} cells of 0.1 m, 100 % known\n"
     assert capfd.readouterr().out == told
+
+
+def test_the_version_is_printed(capfd):
+    assert main(["--version"]) == 0
+    assert capfd.readouterr().out == f"rover_planner {rover_physics.__version__}\n"
 
 
 def test_help_is_exit_code_0(capfd):
