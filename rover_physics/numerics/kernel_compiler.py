@@ -8,7 +8,6 @@ passes through LLVM, and only that one is kept on disk.
 
 import inspect
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 from numba import _dynfunc
@@ -86,19 +85,9 @@ class Kernel(CPUDispatcher):
         """Compile nothing yet; `options` are those of `numba.njit`."""
         options = {"nopython": True, "boundscheck": None, **options}
         super().__init__(function, {}, options, _WholeCompiler)
-        del self._cache  # Numba's own, which keeps nothing
-
-    # Both are made when they are first used. Most kernels are never called from Python, and of
-    # those on disk none is compiled into another.
-    @cached_property
-    def _cache(self) -> KernelCache:
-        """What njit(cache=True) has, but its own raises where it cannot write."""
-        return KernelCache(self.py_func)
-
-    @cached_property
-    def _part(self) -> CPUDispatcher:
-        """This kernel as other kernels call it."""
-        return CPUDispatcher(self.py_func, {}, self.targetoptions, _PartCompiler)
+        # What njit(cache=True) does, but its own cache raises where it cannot write.
+        self._cache = KernelCache(function)
+        self._part = CPUDispatcher(function, {}, options, _PartCompiler)
 
     @property
     def _numba_type_(self) -> types.Dispatcher:
