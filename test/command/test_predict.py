@@ -7,7 +7,7 @@ import pytest
 
 from rover_physics.files.config_files import find_config
 from rover_physics.names import WHEELS
-from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_physics.traversability import judge_poses
 from rover_planner.cli import main
 from rover_planner.command import predict as predict_command
@@ -142,14 +142,6 @@ def test_options_change_the_prediction(files):
         assert out["friction_utilisation"] == pytest.approx(little / 2)
 
 
-def test_a_preset_terrain_is_found_by_its_name(files, capfd):
-    poses = np.array([[-44.684, -19.499, 3.41], [-44.78, -19.53, 3.41]])
-    np.savez(files / "poses.npz", poses=poses)
-    words = ["predict", "lsr1", "spirit", str(files / "poses.npz"), str(files / "out.npz")]
-    assert main(words) == 0
-    assert capfd.readouterr().out.endswith("2 waypoints, traversable\n")
-
-
 CLASS_SHAPES = {
     "traversability_class": (N,),
     "class_constraint": (N,),
@@ -171,17 +163,6 @@ def test_classes_and_torque_ranges_are_added_on_demand(files):
         assert (out["class_margin"] > 0.5).all()
         low, high = out["torque_range"][..., 0], out["torque_range"][..., 1]
         assert (low < 0.0).all() and (high > 0.0).all()
-
-
-def test_what_speed_servos_pass_is_classified_so_under_any_policy(files):
-    rise = np.tile(0.45 * 0.05 * np.arange(120), (80, 1))
-    save_terrain(files / "terrain.npz", Terrain(rise, 0.05, (0.0, 0.0)))
-    for policy, traversable in (("equal", False), ("servo", True), ("optimal", True)):
-        assert main([*predict_words(files), "--classes", "--policy", policy]) == 0
-        with np.load(files / "out.npz") as out:
-            assert bool(out["traversable"]) == traversable
-            assert set(out["traversability_class"]) == {"passable with speed servos"}
-            assert (out["class_margin"] > 0.0).all()
 
 
 def test_on_soil_the_file_has_sinkage_and_resistance_too(files):

@@ -204,15 +204,6 @@ def test_the_signs_matter(ros, start, tmp_path):
     assert np.hypot(*(plant.simulation.plant.pose() - place)[:2]) < 0.05
 
 
-def test_without_names_the_joints_are_missed(ros, start):
-    ros.spin(KinematicRobot(ros, 0.03, 0.0))
-    names = ["rocker_right:rocker_right"]
-    controller = start(joint_map=names, joints=list(WHEEL_JOINTS))
-    alone = "waiting for joint_states"  # imu and cmd_vel are heard
-    wait_until(lambda: controller._command and controller._command.update.fault == alone, alone)
-    assert controller.state == "fault"
-
-
 @pytest.mark.parametrize(("speed", "yaw_rate"), [(0.03, 0.03), (0.0, 0.05)])
 def test_rates_and_steering_angles_are_those_of_the_commanded_motion(ros, start, speed, yaw_rate):
     robot = ros.spin(KinematicRobot(ros, speed, yaw_rate))

@@ -6,7 +6,7 @@ from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics.terrain.grid import Terrain
 from rover_planner.nodes.maps import map_topics
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos
@@ -121,54 +121,6 @@ def robot(client, grid_map_msgs, tf2_msgs):
     return Robot(client, grid_map_msgs.GridMap, tf2_msgs.TFMessage)
 
 
-def local_map(layers=True) -> Terrain:
-    """Return a rough local map whose numbers float32 holds exactly, with holes."""
-    rng = np.random.default_rng(7)
-    z = rng.integers(-64, 64, (41, 61)) / 512.0
-    z[rng.uniform(size=z.shape) < 0.05] = np.nan
-    known = np.isfinite(z)
-    std = np.where(known, rng.integers(1, 8, z.shape) / 64.0, np.nan)
-    friction = np.where(known, rng.integers(30, 60, z.shape) / 64.0, np.nan)
-    origin = -30 * CELL, -20 * CELL
-    return (
-        Terrain(z, CELL, origin, friction, elevation_std=std)
-        if layers
-        else Terrain(z, CELL, origin)
-    )
-
-
-def test_a_map_in_odom_that_is_shifted_by_whole_cells_merges_to_the_bit(
-    robot, start_server, client, tmp_path
-):
-    save_terrain(tmp_path / "prior.npz", PRIOR)
-    server = start_server(terrain_file=str(tmp_path / "prior.npz"), transform_timeout=30.0)
-    wait_until(robot.is_heard, "the subscriptions")
-    robot.send_transform(Rigid.from_rpy(7 * CELL, -11 * CELL, 0.25, 0.0, 0.0, 0.0))
-    wait_until(lambda: server.frames._tree.knows("odom"), "/tf")
-    local, before = local_map(), server.service.known_map
-    robot.send_map(local)
-    wait_until(lambda: server.service.known_map is not before, "the map")
-    merged = server.service.terrain
-    assert (merged.origin, merged.elevation.shape) == (PRIOR.origin, PRIOR.elevation.shape)
-    row, column = (
-        round((at - start) / CELL)
-        for at, start in zip(
-            (local.origin[1] - 11 * CELL, local.origin[0] + 7 * CELL),
-            PRIOR.origin[::-1],
-            strict=True,
-        )
-    )
-    window = slice(row, row + 41), slice(column, column + 61)
-    known = np.isfinite(local.elevation)
-    np.testing.assert_array_equal(merged.elevation[window][known], local.elevation[known] + 0.25)
-    old = PRIOR.elevation[window][~known]
-    np.testing.assert_array_equal(merged.elevation[window][~known], old)
-    np.testing.assert_array_equal(merged.friction[window][known], local.friction[known])
-    np.testing.assert_array_equal(merged.elevation_std[window][known], local.elevation_std[known])
-    assert server.service.known_map.frame == "map"
-    assert server.service.known_map.cells.count()["elevation_map"] == known.sum()
-
-
 def test_a_turned_map_in_odom_is_the_same_ground_in_the_map_frame(robot, start_server):
     server = start_server(transform_timeout=30.0)
     wait_until(robot.is_heard, "the subscriptions")
@@ -224,16 +176,3 @@ def test_a_map_that_comes_before_its_transform_is_taken_when_that_has_come(
     wait_until(lambda: server.service.terrain is not None, "the map")
     right = PRIOR.elevation.astype(np.float32) + 1.0
     np.testing.assert_allclose(server.service.terrain.elevation, right, atol=1e-12)
-
-
-def test_a_refusal_that_repeats_with_each_map_is_logged_once_in_ten_seconds(
-    robot, start_server, client
-):
-    start_server()
-    wait_until(robot.is_heard, "the subscriptions")
-    for height in range(5):
-        robot.send_map(Terrain(np.full((3, 3), float(height)), CELL))
-        client.wait_for_log(f"{REFUSED}the message is in frame 'odom'")
-    robot.send_map(PRIOR, frame="")
-    client.wait_for_log("without a frame_id")  # comes after the others
-    assert sum("the message is in frame 'odom'" in line for line in client.logs) == 1

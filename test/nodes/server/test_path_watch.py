@@ -36,11 +36,6 @@ def rock_ahead(x, y):
     return waves(x, y) + 0.4 * ((abs(x - 1.2) < 0.15) & (abs(y) < 2.0))
 
 
-def rock_behind(x, y):
-    """Return waves with such a rock behind the rover."""
-    return waves(x, y) + 0.4 * (x < -3.3)
-
-
 class Rover(Node):
     """Publishes odometry and joints of a rover that stands, and hears ~/stop."""
 
@@ -196,32 +191,6 @@ def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
     rover.wait_for_stop(False)
 
 
-def test_a_rock_behind_the_rover_stops_nothing(watched, client):
-    server, rover = watched
-    judged = server.watch.finding.judged
-    client.send_terrain(make_terrain(rock_behind))
-    wait_until(lambda: server.watch.finding.judged > judged, "the judgement on the new map")
-    assert server.watch.finding.state == "watching" and not rover.stops[-1][0]
-
-
-def test_only_the_rest_of_the_path_counts(start_server, client, ros, watched):
-    server, rover = watched
-    for x in (-1.0, 0.0, 1.0, 1.8):
-        rover.pose = (x, 0.0, 0.0)
-
-        def is_there(x=x):
-            place = server.watch.finding.place
-            return place is not None and place.remaining < 2.1 - x
-
-        wait_until(is_there, f"the rover at {x} m")
-    judged = server.watch.finding.judged
-    client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.4 * (abs(x + 1.0) < 0.1)))
-    wait_until(lambda: server.watch.finding.judged > judged, "the judgement on the new map")
-    assert not rover.stops[-1][0]
-    rover.pose = GOAL
-    wait_until(lambda: server.watch.finding.state == "arrived", "the end of the path")
-
-
 def test_a_rover_beside_its_path_or_without_a_pose_is_stopped(watched, client):
     server, rover = watched
     rover.pose = (-2.0, 0.8, 0.0)
@@ -235,14 +204,6 @@ def test_a_rover_beside_its_path_or_without_a_pose_is_stopped(watched, client):
     rover.pose = None
     rover.wait_for_stop()
     rover.wait_for_status(DiagnosticStatus.ERROR, "no_pose")
-
-
-def test_a_question_about_another_place_does_not_replace_the_watched_path(watched, client):
-    server, rover = watched
-    path = server.watch.finding.path_hash
-    assert client.can_traverse((-1.0, 2.0, 0.0), (1.0, 2.0, 0.0)).poses
-    time.sleep(0.5)
-    assert server.watch.finding.path_hash == path and not rover.stops[-1][0]
 
 
 def test_drift_of_the_suspension_is_a_warning_with_its_size_then_a_stop(watched):
