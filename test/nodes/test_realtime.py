@@ -30,10 +30,6 @@ def test_all_threads_take_it_or_the_reason_is_told():
     assert policies == "{True}" if reason == "" else "CAP_SYS_NICE" in reason
 
 
-def test_zero_asks_for_nothing():
-    assert take_priority(0) == ""
-
-
 def test_what_no_system_grants_is_told():
     assert "realtime_priority 1000" in take_priority(1000)
 

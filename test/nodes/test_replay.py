@@ -1,7 +1,6 @@
 """Recorded drives are judged again: from SQLite and MCAP, with maps, joints and odometry."""
 
 import json
-import os
 import re
 from pathlib import Path
 
@@ -173,27 +172,6 @@ def test_an_answer_is_never_written_over(tmp_path, capsys):
     (tmp_path / "out").mkdir()
     assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
     assert "exists already" in capsys.readouterr().err
-
-
-def test_clouds_of_spirits_hazcams_are_replayed(tmp_path, capsys):
-    beside = Path(__file__).resolve().parents[3] / "shared" / "bags"
-    folder = Path(os.environ.get("ROVER_BAG_DIR", beside))
-    bag = folder / "mer_spirit_sol1352_hazcam_mcap"
-    if not bag.is_dir():
-        pytest.skip(f"no bag {bag}; set ROVER_BAG_DIR to its folder")
-    file = tmp_path / "hazcam.yaml"
-    file.write_text(
-        "/**: {ros__parameters: {map_resolution: 0.05, cell_height: mean, max_gap: 0.5, "
-        "unknown_cells: interpolate}}\n"
-    )
-    words = ["--parameters", str(file), "--map-frame", "site"]
-    words += ["--start=-44.4,-19.4,-2.5", "--goal=-45.5,-20.2,-2.5"]
-    answers, total = replay(capsys, bag, tmp_path / "out", *words)
-    assert total["topics"] == {"map": "/hazcam/points"} and total["refused_messages"] == {}
-    assert [answer["traversable"] for answer in answers] == [True, False]
-    assert "cannot stand at the start: unknown ground under a wheel" in answers[1]["reason"]
-    prediction, reasons = read_prediction(tmp_path / "out" / answers[0]["prediction"])
-    assert prediction.settled.all() and not any(reasons)
 
 
 def test_orientation_of_odometry_is_its_heading(tmp_path, capsys):

@@ -192,24 +192,6 @@ def test_the_blocks_of_a_page_run_as_written(page, reader):
             reader.run(block)
 
 
-def page_with(tmp_path, text) -> list[Block]:
-    """Return the blocks of a page of this text, as if it were README."""
-    path = tmp_path / "page.md"
-    path.write_text(text)
-    return read_blocks(path, tmp_path)
-
-
-def test_blocks_are_read_with_marks_and_outputs(tmp_path):
-    first, second = page_with(
-        tmp_path,
-        "# Page\n\n<!-- not run: installs -->\n```sh\npip install .\n```\n\nand\n\n"
-        "```python\nprint(1)\n```\n\n```text\n1\n```\n",
-    )
-    assert (first.language, first.not_run, first.output) == ("sh", "installs", None)
-    assert (second.language, second.not_run, second.output) == ("python", "", "1\n")
-    assert str(first) == "page.md:5" and str(second) == "page.md:11"
-
-
 def test_commands_are_split_as_a_shell_does():
     text = "a --b 'c d' > e &  # it's a comment\nf \\\n  g && h \"i\n  j\" | k; l\n"
     assert split_commands(text) == [

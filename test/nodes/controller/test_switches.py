@@ -135,14 +135,6 @@ def test_a_parameter_change_moves_no_torque_by_a_step(rover, controller):
     assert max(abs(new - old) for old, new in steps) < 6 * 2.0 * 0.1
 
 
-def test_a_node_that_is_stopped_sends_zeros_and_no_more(rover, controller):
-    run_in_executor(controller, controller.stop)
-    wait_until(lambda: rover.torque == 0.0 and rover.brakes[-1], "zeros and the brake")
-    updates, heard = controller.statistics.updates, len(rover.commands)
-    time.sleep(0.1)
-    assert controller.statistics.updates == updates and len(rover.commands) == heard
-
-
 @pytest.mark.slow
 def test_a_process_that_is_told_to_end_sends_zeros_last(rover):
     values = {"enabled_at_start": "true"} | PATIENT

@@ -5,7 +5,6 @@ import threading
 import time
 from statistics import median
 
-import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
@@ -81,18 +80,6 @@ class Rover(Node):
             return last.level == level and text in last.message and key in values and values
 
         return wait_until(said, f"a status with {text!r} and {key}")
-
-
-def wait_for_sight_of(server, pose):
-    """Wait until the monitor has looked at a rover that is at a pose (3,)."""
-
-    def is_at(found):
-        return found is not None and np.array_equal(found, pose)
-
-    wait_until(lambda: is_at(server.service.fresh_pose()), f"odometry of {pose}")
-    for _ in range(2):  # a look may be under way, at what was known before
-        last = server.watch.finding
-        wait_until(lambda last=last: server.watch.finding is not last, "a look")
 
 
 @pytest.fixture
@@ -189,21 +176,6 @@ def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
     time.sleep(0.3)
     server.watch._timer.reset()
     rover.wait_for_stop(False)
-
-
-def test_a_rover_beside_its_path_or_without_a_pose_is_stopped(watched, client):
-    server, rover = watched
-    rover.pose = (-2.0, 0.8, 0.0)
-    rover.wait_for_stop()
-    rover.wait_for_status(DiagnosticStatus.ERROR, "off_path")
-    rover.pose = START
-    wait_for_sight_of(server, START)
-    assert client.can_traverse(START, GOAL).poses
-    rover.wait_for_stop(False)
-    assert client.set_parameter("monitor_timeout", 0.5)[0]
-    rover.pose = None
-    rover.wait_for_stop()
-    rover.wait_for_status(DiagnosticStatus.ERROR, "no_pose")
 
 
 def test_drift_of_the_suspension_is_a_warning_with_its_size_then_a_stop(watched):

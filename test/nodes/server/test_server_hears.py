@@ -176,25 +176,3 @@ def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(server, client,
     assert float(values["last latency [ms]"]) > 0.0
     server.guard.report("a test", ZeroDivisionError("made up"))
     assert "ZeroDivisionError" in wait_for(DiagnosticStatus.ERROR).message
-
-
-def test_two_servers_in_two_namespaces_share_no_name(ros, client):
-    from rover_planner.nodes.traverse_server import TraverseServer
-
-    for name in ("one", "two"):
-        ros.spin(TraverseServer(context=ros.context, namespace=name))
-
-    def names() -> set[str]:
-        return {topic for topic, _ in client.get_topic_names_and_types()}
-
-    wait_until(lambda: "/two/traverse_server/verdict" in names(), "the topics")
-    own = {
-        name
-        for node in ("one", "two")
-        for kind in ("publisher", "subscriber")
-        for name, _ in getattr(client, f"get_{kind}_names_and_types_by_node")(
-            "traverse_server", f"/{node}"
-        )
-    }
-    shared = {name for name in own if not name.startswith(("/one/", "/two/"))}
-    assert shared <= {"/rosout", "/parameter_events", "/clock"}

@@ -96,13 +96,6 @@ def test_a_refused_path_is_forgotten():
     assert judgement.reason == "the last path was refused: bad quaternion"
 
 
-def test_a_pose_alone_is_a_path():
-    service = make_service(make_terrain(waves))
-    service.take_path(np.array([[0.5, 0.2, 1.0]]))
-    report = service.check_last_path().report
-    assert report.traversable and report.path.waypoints == 1 and report.path.length == 0.0
-
-
 def test_the_measured_suspension_is_compared_with_the_predicted_one():
     service = make_service(make_terrain(rocky))
     service.take_path(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]))
@@ -172,43 +165,6 @@ def test_densify_keeps_the_given_poses_and_the_spacing():
 def test_densify_refuses_an_endless_path():
     with pytest.raises(PlanningError, match="more than 100000 waypoints"):
         densify(np.array([[0.0, 0.0, 0.0], [1e300, 0.0, 0.0]]), 0.02)
-
-
-PHYSICAL = {
-    "tilt",
-    "tip_over",
-    "wheel_lift",
-    "friction",
-    "torque",
-    "belly",
-    "suspension",
-    "wheel_drop",
-    "not_settled",
-    "no_equilibrium",
-}
-
-
-@pytest.mark.parametrize(
-    ("start", "goal", "codes"),
-    [
-        ((-4.0, 0.0, 0.0), (6.0, 1.0, 0.0), {""}),
-        ((-4.0, 8.0, 0.0), (2.0, 8.0, 0.0), {""}),
-        ((-3.5, -7.0, 0.0), (3.0, -7.0, 0.0), PHYSICAL),
-        ((4.0, 4.0, 0.8), (15.0, 12.0, 0.8), PHYSICAL),
-        ((18.0, 0.0, 0.0), (24.0, 0.0, 0.0), {"off_map"}),
-    ],
-    ids=["plain", "another plain", "crater rim", "hill", "off the map"],
-)
-def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
-    real_map,
-    start,
-    goal,
-    codes,
-):
-    service = make_service(real_map("erc_marsyard2021_9cm"), planner="fan")
-    judgement = service.answer(start, goal)
-    assert judgement.code in codes, judgement.reason
-    assert judgement.traversable == (not judgement.reason) == (codes == {""})
 
 
 def test_the_real_martian_ground_is_passed_where_it_is_known():
