@@ -45,6 +45,9 @@ SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
 LONGEST = 300.0
 """Longest time for a block [s]."""
 
+LONG_PAGES = ("docs/command_line.md",)
+"""Pages whose blocks take a minute or more."""
+
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
 PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
 
@@ -185,7 +188,13 @@ def reader(tmp_path, programs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", PAGES_TO_RUN)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[pytest.mark.long] if page in LONG_PAGES else [])
+        for page in PAGES_TO_RUN
+    ],
+)
 def test_the_blocks_of_a_page_run_as_written(page, reader):
     for block in BLOCKS:
         if block.page == page and not find_reason(block):
