@@ -19,54 +19,35 @@ from support.command_line import (
     write_ground_and_path,
 )
 
-SHAPES = {
-    "settled": (N,),
-    "position": (N, 3),
-    "roll": (N,),
-    "pitch": (N,),
-    "rocker_angle": (N, 2),
-    "bogie_angle": (N, 2),
-    "wheel_centres": (N, 6, 3),
-    "wheel_loads": (N, 6),
-    "tangential": (N, 6),
-    "lateral": (N, 6),
-    "friction_utilisation": (N, 6),
-    "slip_ratio": (N, 6),
-    "torque_saturation": (N, 6),
-    "tip_over_ratio": (N,),
-    "tip_over_force_angle": (N,),
-    "belly_clearance": (N,),
-    "steering_angle": (N, 6),
-    "wheel_speed": (N, 6),
-    "energy": (N,),
-    "time": (N,),
-    "reason": (N,),
-    "traversable": (),
-    "first_failure": (),
-}
-REPLAY_SHAPES = {
-    "poses": (N, 3),
-    "status": (N,),
-    "contact_points": (N, 6, 3),
-    "contact_angle": (N, 6),
-    "torque": (N, 6),
-    "friction": (N, 6),
-    "sinkage": (N, 6),
-    "motion_resistance": (N, 6),
-    "power": (N,),
-    "motion": (N, 3),
-    "distance": (N,),
-    "wheel_drop": (N, 6),
-    "falling": (N, 6),
-    "speed_share": (N,),
-    "stalls": (N,),
-    "slip_speed": (N, 6),
-    "lift_rate": (N, 6),
-    "lift_height": (N, 6),
-    "deviation": (N, 3),
-    "drift": (N, 2),
-    "assumptions": (),
-}
+
+def by_name(table):
+    """Return the shapes of arrays by their names; the table has names by shape."""
+    return {name: shape for shape, names in table.items() for name in names.split()}
+
+
+SHAPES = by_name(
+    {
+        (): "traversable first_failure",
+        (N,): "settled roll pitch tip_over_ratio tip_over_force_angle belly_clearance energy time "
+        "reason",
+        (N, 2): "rocker_angle bogie_angle",
+        (N, 3): "position",
+        (N, 6): "wheel_loads tangential lateral friction_utilisation slip_ratio torque_saturation "
+        "steering_angle wheel_speed",
+        (N, 6, 3): "wheel_centres",
+    }
+)
+REPLAY_SHAPES = by_name(
+    {
+        (): "assumptions",
+        (N,): "status power distance speed_share stalls",
+        (N, 2): "drift",
+        (N, 3): "poses motion deviation",
+        (N, 6): "contact_angle torque friction sinkage motion_resistance wheel_drop falling "
+        "slip_speed lift_rate lift_height",
+        (N, 6, 3): "contact_points",
+    }
+)
 """What the file holds beside the contract's arrays, for a replay."""
 
 
@@ -142,13 +123,12 @@ def test_options_change_the_prediction(files):
         assert out["friction_utilisation"] == pytest.approx(little / 2)
 
 
-CLASS_SHAPES = {
-    "traversability_class": (N,),
-    "class_constraint": (N,),
-    "class_wheel": (N,),
-    "class_margin": (N,),
-    "torque_range": (N, 6, 2),
-}
+CLASS_SHAPES = by_name(
+    {
+        (N,): "traversability_class class_constraint class_wheel class_margin",
+        (N, 6, 2): "torque_range",
+    }
+)
 
 
 def test_classes_and_torque_ranges_are_added_on_demand(files):

@@ -37,21 +37,29 @@ def tf2_msgs(tmp_path_factory):
         yield messages
 
 
-def test_a_grid_map_with_a_moved_buffer_is_the_map_over_dds(grid_map_msgs, start_server, client):
-    server = start_server()
+def test_layers_of_a_grid_map_with_a_moved_buffer_are_the_map_over_dds(
+    grid_map_msgs, start_server, client
+):
+    server = start_server(
+        planner="fan", elevation_layer="height", variance_layer="none", friction_layer="mu"
+    )
     publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
     wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
-    plain = grid_map_of({"elevation": PRIOR.elevation}, PRIOR.resolution)
+    layers = {"height": PRIOR.elevation, "variance": np.full(PRIOR.elevation.shape, 4.0)}
+    plain = grid_map_of(layers, PRIOR.resolution)
     publisher.publish(to_message(grid_map_msgs.GridMap, move_buffer(plain, 17, 130)))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    np.testing.assert_array_equal(server.service.terrain.elevation, PRIOR.elevation)
-    assert server.service.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
-    known = server.service.known_map
-    assert (known.source, known.frame) == ("elevation_map", "map")
+    first = wait_until(lambda: server.service.known_map, "the map")
+    np.testing.assert_array_equal(first.terrain.elevation, PRIOR.elevation)
+    assert first.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
+    assert (first.source, first.frame) == ("elevation_map", "map")
+    assert first.terrain.elevation_std is None
     _, verdict, _ = ask(client)
     assert verdict["traversable"] == "true" and verdict["blind_share"] == "0.0"
+    slippery = grid_map_of(layers | {"mu": 0.01 + 0.0 * PRIOR.elevation}, PRIOR.resolution)
+    publisher.publish(to_message(grid_map_msgs.GridMap, slippery))
+    wait_until(lambda: server.service.known_map is not first, "the second map")
+    assert ask(client)[1]["code"] == "friction"
     # A map that cannot be used is refused by the name of its topic, and the last one stays.
-    client.logs.clear()
     turned = to_message(grid_map_msgs.GridMap, plain)
     turned.info.pose.orientation.z, turned.info.pose.orientation.w = 0.1, 0.995
     publisher.publish(turned)
@@ -63,22 +71,6 @@ def test_without_grid_map_msgs_the_server_has_no_such_topic(start_server, monkey
     server = start_server()
     topics = {name for name, _ in server.get_topic_names_and_types()}
     assert "/elevation_cloud" in topics and "/elevation_map" not in topics
-
-
-def test_friction_and_deviation_of_a_grid_map_are_used(grid_map_msgs, start_server, client):
-    server = start_server(elevation_layer="height", variance_layer="none", friction_layer="mu")
-    publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
-    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
-    layers = {
-        "height": PRIOR.elevation,
-        "variance": np.full(PRIOR.elevation.shape, 4.0),
-        "mu": np.full(PRIOR.elevation.shape, 0.01),
-    }
-    publisher.publish(to_message(grid_map_msgs.GridMap, grid_map_of(layers, PRIOR.resolution)))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    assert server.service.terrain.elevation_std is None
-    _, verdict, _ = ask(client)
-    assert verdict["code"] == "friction"
 
 
 class Robot:
