@@ -105,21 +105,6 @@ def test_joints_that_do_not_reach_the_steering_limit_end_the_start(start_control
         start_controller(steering_limit=0.5)
 
 
-def test_messages_of_an_arm_between_those_of_the_wheels_change_nothing(rover, controller):
-    arm = JointState(name=["arm_yaw"], position=[0.1], velocity=[0.0])
-    bad = JointState(name=["arm_yaw"], position=[math.nan, 0.0])
-    sender = rover.create_publisher(JointState, "joint_states", sensor_qos())
-    heard = len(rover.commands)
-
-    def send():
-        sender.publish(arm)
-        sender.publish(bad)
-        return rover.pushes_on(heard, 25)
-
-    wait_until(send, "half a second of commands that push")
-    assert rover.faults == []
-
-
 def spoilt_odometry(field):
     odometry = Odometry(child_frame_id="mast" if field == "frame" else "base_link")
     odometry.header.frame_id = "map"

@@ -1,7 +1,6 @@
 """The service knows a map, a path and joint angles, and answers from them without ROS."""
 
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -27,13 +26,6 @@ def make_service(terrain=None, **parameters):
     if terrain is not None:
         service.take_terrain(terrain)
     return service
-
-
-def test_zero_takes_the_rovers_own_friction_and_torque():
-    query = load().query
-    assert query.friction is None and query.max_torque is None
-    query = load(friction=0.4, max_torque=1.5).query
-    assert query.friction == 0.4 and query.max_torque == 1.5
 
 
 def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
@@ -139,16 +131,6 @@ def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     moved = service.check_last_path().candidate.prediction.wheel_loads
     assert np.abs(moved - stowed).max() > 0.05
     assert moved[:, [2, 5]].sum() > stowed[:, [2, 5]].sum()
-
-
-@pytest.mark.parametrize(("ground", "opening"), [(rocky, "chose"), (wall_at(0.5), "number")])
-def test_candidates_are_counted_from_one_in_words_and_numbers(ground, opening):
-    service = make_service(make_terrain(ground))
-    search = service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)).report.search
-    assert 1 <= search.chosen_candidate <= search.candidates
-    found = re.search(rf"\b{opening} (\d+)", search.explanation)
-    assert found is not None, search.explanation
-    assert int(found[1]) == search.chosen_candidate
 
 
 def test_densify_keeps_the_given_poses_and_the_spacing():
