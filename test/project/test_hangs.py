@@ -1,4 +1,4 @@
-"""A test run ends: where signals are ignored, and where a test hangs."""
+"""A test run ends where its caller ignores signals."""
 
 import os
 import subprocess

@@ -21,7 +21,7 @@ class SimulatedRover:
     """A rover on a ground that its map does not show; time runs as fast as it is computed."""
 
     def __init__(self, ground):
-        self.plant = QuasiStaticPlant(LSR1, ground, (-1.5, 0.0, 0.0))
+        self.plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
         self.follower = PathFollower(self.plant.pose()[None], 0.3)
         self.asked = []
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
-from rclpy.duration import Duration
 from sensor_msgs.msg import PointField
 
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -75,21 +74,3 @@ def test_a_cloud_of_a_camera_gives_the_map_of_the_same_cloud_in_the_map_frame(
     np.testing.assert_allclose(found.origin, right.origin, atol=1e-9)
     np.testing.assert_allclose(found.elevation, right.elevation, atol=2e-6)
     assert np.isfinite(found.elevation).mean() > 0.99
-
-
-def test_a_cloud_whose_pose_is_stale_missing_or_unknown_is_refused_with_the_reason(
-    camera_server, client, lasting
-):
-    points, now = points_of(make_terrain(rocky)), client.get_clock().now()
-    refused = "elevation_cloud refused, there is no map yet: "
-    client.send_cloud(cloud_of(points, "front_camera", now.to_msg()))
-    client.wait_for_log(refused + "neither /tf nor odometry says where 'base_link' is in 'map'")
-    send_odometry(client, (now - Duration(seconds=100.0)).to_msg())
-    wait_until(lambda: camera_server.service.fresh_pose() is not None, "odometry")
-    client.send_cloud(cloud_of(points + 1.0, "front_camera", now.to_msg()))
-    client.wait_for_log(
-        refused + "by odometry: the transform from 'base_link' to 'map' is stale: it is 10"
-    )
-    client.send_cloud(cloud_of(points, "rear_camera", now.to_msg()))
-    client.wait_for_log(refused + "the message is in frame 'rear_camera'; it must be in 'map', or")
-    assert camera_server.service.terrain is None
