@@ -77,7 +77,7 @@ bench: $(BENCH_READY) kernels ## measure times and memory, as a table and bench_
 	@$(BIN)/python -m benchmarks.run
 
 .PHONY: fuzz
-fuzz: $(READY) kernels ## throw 12,000 malformed and hostile inputs at services and running nodes
+fuzz: $(READY) kernels ## throw 6,000 malformed and hostile inputs at running nodes
 	@$(BIN)/python -m benchmarks.fuzz
 
 .PHONY: clean

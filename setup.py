@@ -49,7 +49,7 @@ EXTRAS = {
         "playwright>=1.48,<2",
         "mujoco>=3.2,<5",
     ],
-    "bench": ["mujoco>=3.2,<5", "ompl>=2.0,<3"],
+    "bench": ["mujoco>=3.2,<5"],
     "dev": [
         "ruff>=0.9,<1",
         "mypy>=1.14,<3",

@@ -145,6 +145,11 @@ REQUESTS: dict[str, tuple[type, Callable[[], Any]]] = {
 """Type of each service of the server, and a good request."""
 
 
+def serialise(message: Any) -> bytes:
+    """Return the bytes of a message as they go over the wire."""
+    return bytes(serialize_message(message))
+
+
 class Mutator:
     """Damages messages, in the same way for the same seed."""
 
@@ -160,11 +165,8 @@ class Mutator:
         faults = self.rng.integers(MOST_FAULTS + 1) if message.get_fields_and_field_types() else 0
         for _ in range(int(faults)):
             owner, name = self._choose_field(message)
-            value = self._spoil(getattr(owner, name))
-            try:
-                setattr(owner, name, value)
-            except (AssertionError, OverflowError):
-                continue  # its type cannot carry that value
+            kind = owner.get_fields_and_field_types()[name]
+            setattr(owner, name, self._spoil(getattr(owner, name), kind))
         return message
 
     def damage_bytes(self, data: bytes) -> bytes:
@@ -186,18 +188,21 @@ class Mutator:
             return self._choose_field(value)
         return message, name
 
-    def _spoil(self, value: Any) -> Any:
-        """Return another value of a field."""
+    def _spoil(self, value: Any, kind: str) -> Any:
+        """Return another value of a field of a type, such as uint8."""
         if isinstance(value, bool):
             return not value
         if isinstance(value, str):
             return self.pick(NAMES)
         if isinstance(value, int):
-            return self.pick(WHOLE)
+            bits = 8 if kind in ("byte", "octet", "char") else int(kind.removeprefix("u")[3:])
+            low = 0 if kind[0] in "ubo" else -(2 ** (bits - 1))
+            return self.pick([one for one in WHOLE if low <= one < low + 2**bits])
         if isinstance(value, float):
             return self.pick(NUMBERS)
         if isinstance(value, list) and value:
-            return self.pick((value[: len(value) // 2], value + value[:1], value[::-1]))
+            odd = [*value[1:], self.pick(NAMES) if isinstance(value[0], str) else value[0]]
+            return self.pick((value[: len(value) // 2], value + value[:1], value[::-1], odd))
         if isinstance(value, array.array | np.ndarray) and len(value):
             return self._spoil_array(value)
         return value
@@ -281,7 +286,7 @@ class Fuzzer:
     def _publish(self, topic: str) -> None:
         message = self._mutator.damage(MESSAGES[topic]())
         if self._mutator.rng.random() < DAMAGED_SHARE:
-            message = self._mutator.damage_bytes(bytes(serialize_message(message)))
+            message = self._mutator.damage_bytes(serialise(message))
         self._publishers[topic].publish(message)
 
     def _request(self, name: str) -> None:

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Path as PathMessage
 from nav_msgs.srv import GetPlan
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -24,7 +23,6 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from std_srvs.srv import Trigger
 
@@ -117,8 +115,6 @@ class Client:
 
     def __init__(self, ros: RosRun, name: str):
         self.node = ros.spin(Node(name, context=ros.context))
-        self.verdicts: list[DiagnosticArray] = []
-        """Messages of ~/verdict since `hear_verdicts`."""
         plans = (SERVER, ECHO)
         self._plans = {n: self.node.create_client(GetPlan, f"/{n}/can_traverse") for n in plans}
         self._check = self.node.create_client(
@@ -139,17 +135,6 @@ class Client:
         call(self._parameters, SetParameters.Request(), 2.0, ATTEMPTS)
         call(self._check, Trigger.Request(), 2.0, ATTEMPTS)
         return self
-
-    def hear_verdicts(self) -> None:
-        """Collect the messages of ~/verdict from now on."""
-        deep = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.node.create_subscription(
-            DiagnosticArray, f"/{SERVER}/verdict", self.verdicts.append, deep
-        )
-        # A verdict that nobody hears gives way to the next one. The server knows the subscription
-        # when it knows what this node created after it.
-        after = self.node.create_client(SetParameters, f"/{SERVER}/set_parameters")
-        call(after, SetParameters.Request(), 2.0, ATTEMPTS)
 
     def publish(self, path: PathMessage) -> None:
         """Publish a path on ~/path."""

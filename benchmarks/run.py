@@ -38,11 +38,11 @@ def run_topic(topic: str, checkout: Path = ROOT) -> list[Figure]:
     return [Figure(**{k: v for k, v in row.items() if k != "met"}) for row in rows]
 
 
-def compare(topic: str, other: Path, rounds: int) -> list[Figure]:
-    """Return the ratios of a topic's figures, here over another checkout, run in turns."""
-    found: dict[Path, list[list[Figure]]] = {ROOT: [], other: []}
+def compare(topic: str, other: Path, rounds: int, this: Path = ROOT) -> list[Figure]:
+    """Return the ratios of a topic's figures, this checkout's over another's, run in turns."""
+    found: dict[Path, list[list[Figure]]] = {this: [], other: []}
     for turn in range(rounds):
-        for checkout in (ROOT, other) if turn % 2 else (other, ROOT):
+        for checkout in (this, other) if turn % 2 else (other, this):
             found[checkout].append(run_topic(topic, checkout))
     here, there = (_medians(figures) for figures in found.values())
     return [
@@ -61,15 +61,22 @@ def _medians(rounds: list[list[Figure]]) -> dict[str, float]:
     }
 
 
+def check_topics(topics: list[str] | None) -> list[str] | None:
+    """Return the topics; refuse one that is not there."""
+    for topic in topics or ():
+        if topic not in TOPICS:
+            raise typer.BadParameter(f"no topic {topic!r}; topics are {', '.join(TOPICS)}")
+    return topics
+
+
 def main(
-    topics: Annotated[list[str] | None, typer.Argument(help="Default: all.")] = None,
+    topics: Annotated[
+        list[str] | None, typer.Argument(help="Default: all.", callback=check_topics)
+    ] = None,
     against: Annotated[Path | None, typer.Option(help="Another checkout.")] = None,
     rounds: Annotated[int, typer.Option(min=1, help="Rounds with --against.")] = 3,
 ) -> None:
     """Run topics, print a table, and write it to bench_output/results.json."""
-    for topic in topics or ():
-        if topic not in TOPICS:
-            raise typer.BadParameter(f"no topic {topic!r}; topics are {', '.join(TOPICS)}")
     figures: list[Figure] = []
     for topic in topics or TOPICS:
         console(stderr=True).print(f"measuring: {topic}")

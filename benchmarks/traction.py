@@ -30,16 +30,20 @@ ROUGH = ("rocks", "relief")
 """Kinds of rough ground."""
 QUICK_STEP = 5
 """With --quick, every so many-th obstacle is driven over."""
-SUMS = {"slip": ("slip [m]", 3), "torque": ("torque [N m]", 3), "energy": ("energy [J]", 1),
-        "mean_utilisation": ("utilisation", 2)}  # fmt: skip
-"""What is summed up, with heading and digits."""
+SUMS = {
+    "slip": ("slip [m]", 3, np.sum),
+    "torque": ("torque [N m]", 3, np.mean),
+    "energy": ("energy [J]", 1, np.sum),
+    "mean_utilisation": ("utilisation", 2, np.mean),
+}
+"""What is summed up: heading, digits, and whether the sum or the mean of all obstacles."""
 
 Drives = dict[tuple[Obstacle, str], Drive]
 """Drives by obstacle and controller."""
 
 
 def sum_up(drives: Drives, kinds: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return, by controller, means over the obstacles of these kinds that all passed."""
+    """Return sums and means by controller, over the obstacles of these kinds that all passed."""
     obstacles = [o for o, name in drives if name == SERVO and o.kind in kinds]
     common = [o for o in obstacles if all(drives[o, name].passed for name in CONTROLLERS)]
     sums = {}
@@ -51,8 +55,8 @@ def sum_up(drives: Drives, kinds: Sequence[str]) -> dict[str, dict[str, Any]]:
                 o.label for o in obstacles if drives[o, SERVO].passed > drives[o, name].passed
             ],
             **{
-                key: float(np.mean([getattr(drives[o, name], key) for o in common] or [np.nan]))
-                for key in SUMS
+                key: float(join([getattr(drives[o, name], key) for o in common] or [np.nan]))
+                for key, (_, _, join) in SUMS.items()
             },
         }
     return sums
@@ -83,11 +87,11 @@ def print_sums(sums: dict[str, dict[str, Any]], title: str) -> None:
     rows = [
         (
             name, f"{row['passed']} of {row['of']}", ", ".join(row["lost"]),
-            *(compare(row, key, digits) for key, (_, digits) in SUMS.items()),
+            *(compare(row, key, digits) for key, (_, digits, _) in SUMS.items()),
         )
         for name, row in sums.items()
     ]  # fmt: skip
-    headings = ("controller", "passed", "lost", *(heading for heading, _ in SUMS.values()))
+    headings = ("controller", "passed", "lost", *(heading for heading, _, _ in SUMS.values()))
     print_table(title, headings, rows)
 
 
@@ -122,8 +126,8 @@ def main(
     everything = sum_up(drives, [obstacle.kind for obstacle in obstacles])
     rough = sum_up(drives, ROUGH)
     print_drives(drives)
-    print_sums(everything, "All obstacles: means of those that all controllers passed")
-    print_sums(rough, "Rocks and relief: means of those that all controllers passed")
+    print_sums(everything, "All obstacles that all controllers passed: sums and means")
+    print_sums(rough, "Rocks and relief that all controllers passed: sums and means")
     rows = [asdict(o) | {"controller": name} | asdict(row) for (o, name), row in drives.items()]
     write_rows({"drives": rows, "all": everything, "rough": rough}, out / "traction.json")
     draw_sums(everything, out / "traction.png")

@@ -6,7 +6,6 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.hostile_files import make_oddities
 from rover_physics.errors import RoverError, RoverFileError
 from rover_physics.files.user_file import read_regular_file, write_file
 from rover_physics.rover.rover_file import load_rover
@@ -15,6 +14,7 @@ from rover_physics.terrain.soil_file import load_soils
 from rover_planner.command.prediction_files import read_poses, read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.studies.study_file import load_study
+from support.hostile_files import make_oddities
 
 KINDS = {
     "pipe": "a named pipe",
