@@ -146,7 +146,8 @@ def test_a_best_effort_map_is_heard_where_the_parameter_says_so(start_server, cl
     wait_until(heard, "the map")
 
 
-def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(server, client, ros):
+def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, client):
+    server = start_server(planner="fan")
     heard: list[DiagnosticArray] = []
     client.create_subscription(DiagnosticArray, "diagnostics", heard.append, 10)
 

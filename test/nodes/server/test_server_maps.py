@@ -52,7 +52,7 @@ def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
 ):
     file = tmp_path / "prior.npz"
     save_terrain(file, PRIOR)
-    server = start_server(terrain_file=str(file))
+    server = start_server(terrain_file=str(file), planner="fan")
     before = server.service.known_map.fingerprint
     merge, began, go_on = MapKeeper.take, threading.Event(), threading.Event()
 
