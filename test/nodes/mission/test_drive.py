@@ -13,7 +13,7 @@ from support.rough_grounds import plane
 
 LSR1 = load_rover("lsr1")
 MAP = plane(0.0, 0.0, half=4.0)
-STEP = 0.04
+STEP = 0.1
 SETTINGS = DriveSettings(within=0.1, patience=0.3)
 
 
