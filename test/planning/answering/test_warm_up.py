@@ -22,7 +22,7 @@ def compiled():
     return {f"{one.__module__}.{one.__name__}": len(one.signatures) for one in kernels}
 
 def service(**parameters):
-    values = TraverseServerParameters(waypoint_spacing=0.05, candidate_count=3, **parameters)
+    values = TraverseServerParameters(waypoint_spacing=0.1, candidate_count=2, **parameters)
     return TraverseService(load_service_settings(values))
 
 for group in GROUPS:
