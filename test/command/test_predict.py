@@ -8,7 +8,6 @@ import pytest
 from rover_physics.files.config_files import find_config
 from rover_physics.names import WHEELS
 from rover_physics.terrain.grid import load_terrain, save_terrain
-from rover_physics.traversability import judge_poses
 from rover_planner.cli import main
 from rover_planner.command import predict as predict_command
 from support.command_line import (
@@ -276,7 +275,6 @@ def test_many_single_poses_are_predicted_part_by_part_as_a_few_are(files, monkey
     with np.load(files / "out.npz") as out:
         whole = {name: out[name] for name in out.files}
     monkeypatch.setattr(predict_command, "MAX_IN_MEMORY", 10)
-    monkeypatch.setattr(judge_poses, "PART", 7)
     assert main(words) == 0
     with np.load(files / "out.npz") as out:
         assert set(out.files) == whole.keys()
