@@ -48,8 +48,6 @@ print({name: count for name, count in after.items() if count > before.get(name, 
 
 
 def test_no_question_compiles_a_kernel():
-    warmed = subprocess.run([sys.executable, "-m", "rover_planner", "warm-up"], check=False)
-    assert warmed.returncode == 0
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "{}"
