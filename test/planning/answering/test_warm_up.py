@@ -35,9 +35,13 @@ edge = make_terrain(lambda x, y: waves(x, y) - np.where(x > 0.5, 0.06, 0.0))
 grounds = [make_terrain(waves), make_terrain(wall_at(0.5)), edge]
 grounds += [replace(one, elevation_std=np.full_like(one.elevation, 0.005)) for one in grounds]
 fan = {"planner": "fan"}  # one search is enough
-for parameters in ({}, fan | {"policy": "optimal"}, fan | {"soil": "mars_simulant"}):
+for parameters, asked in (
+    ({}, grounds),
+    (fan | {"policy": "optimal"}, grounds),
+    (fan | {"soil": "mars_simulant"}, grounds[::3]),  # sinkage takes long
+):
     answering = service(**parameters)
-    for ground in grounds:
+    for ground in asked:
         answering.take_terrain(ground)
         answering.answer(start, goal, 0.3).complete()
         answering.take_path(np.array([start, goal]))
