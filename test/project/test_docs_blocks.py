@@ -45,7 +45,7 @@ SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
 LONGEST = 300.0
 """Longest time for a block [s]."""
 
-LONG_PAGES = ("docs/command_line.md",)
+LONG_PAGES = ("docs/command_line.md", "docs/integration/maps.md", "docs/simulator.md")
 """Pages whose blocks take a minute or more."""
 
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
