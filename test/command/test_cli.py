@@ -49,33 +49,6 @@ def params_of(name, *words):
 @pytest.mark.parametrize(
     ("words", "name", "value"),
     [
-        (["--start", "-3", "-0.5", "-1e-1"], "start", (-3.0, -0.5, -0.1)),
-        (["--start=-3", "0", "-1"], "start", (-3.0, 0.0, -1.0)),
-        (["lsr1", "spirit", "--goal", "-3", "0", "-.5", "--port", "0"], "goal", (-3.0, 0.0, -0.5)),
-    ],
-)
-def test_view_takes_negative_numbers(words, name, value):
-    assert params_of("view", *words)[name] == value
-
-
-@pytest.mark.parametrize(
-    ("words", "name", "value"),
-    [
-        (["--payload", "-1"], "payload", -1.0),
-        (["--payload=-1"], "payload", -1.0),
-        (["--tool-force", "-1", "0", "-2.5"], "tool_force", (-1.0, 0.0, -2.5)),
-        (["--tool-moment=-1", "-.5", "0"], "tool_moment", (-1.0, -0.5, 0.0)),
-        (["--arm", "arm_yaw=-0.5"], "arm", ["arm_yaw=-0.5"]),
-    ],
-)
-def test_predict_takes_negative_numbers(words, name, value):
-    found = params_of("predict", "lsr1", "a.npz", "b.npz", "c.npz", *words)[name]
-    assert (list(found) if isinstance(value, list) else found) == value
-
-
-@pytest.mark.parametrize(
-    ("words", "name", "value"),
-    [
         (["plan", "lsr1", "a", "b", "--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
          "start", (-3.0, 0.0, 0.0)),
         (["plan", "lsr1", "a", "b", "--start", "0,0,0", "--goal", "-.5,-1e-1,0"],

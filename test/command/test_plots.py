@@ -67,21 +67,6 @@ def draw(tmp_path, rover, holed, monkeypatch):
     return draw_one
 
 
-def test_a_start_off_the_map_is_drawn_without_any_settled_pose(draw, rover, holed):
-    answer = answer_path_query(rover, holed, (50, 50, 0), (52, 50, 0), COARSE)
-    on_map, _ = draw(LabelledAnswer("A", "off", answer))
-    low, high = on_map.get_xlim()
-    assert low < 50.0 and high > 52.0
-    assert "A" in {text.get_text() for text in on_map.texts}
-
-
-def test_a_single_pose_is_drawn(draw, rover, holed):
-    answer = answer_path_query(rover, holed, (0, 0, 0), (0, 0, 0), COARSE)
-    on_map, _ = draw(LabelledAnswer("A", "here", answer))
-    starts = [line for line in on_map.get_lines() if line.get_markersize() == 17]
-    assert {tuple(line.get_xydata()[0]) for line in starts} == {(0.0, 0.0)}
-
-
 def test_forces_that_no_verdict_asks_for_are_shaded(draw, rover):
     """A wheel that rolls off an edge may use more friction than the verdict tells."""
     x = 0.05 * np.arange(121) - 4.5
@@ -109,12 +94,6 @@ def test_slopes_towards_the_sun_are_brighter():
     # the sun is in the north-west: a slope that rises to the east faces it
     assert (rising_east > level).all()
     assert (hill_shade(0.05 * x.T, 0.1) < level).all()
-
-
-def test_unknown_ground_has_no_shade(holed):
-    shade = hill_shade(holed.elevation, holed.resolution)
-    assert np.isnan(shade[70, 100])
-    assert np.isfinite(shade[:50]).all()
 
 
 def test_nothing_to_draw_and_nowhere_to_write_are_refused(tmp_path, rover, holed):

@@ -7,8 +7,7 @@ import pytest
 
 from rover_physics.files.config_files import find_config
 from rover_physics.names import WHEELS
-from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
-from rover_physics.traversability import judge_poses
+from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.command import predict as predict_command
 from support.command_line import (
@@ -19,54 +18,35 @@ from support.command_line import (
     write_ground_and_path,
 )
 
-SHAPES = {
-    "settled": (N,),
-    "position": (N, 3),
-    "roll": (N,),
-    "pitch": (N,),
-    "rocker_angle": (N, 2),
-    "bogie_angle": (N, 2),
-    "wheel_centres": (N, 6, 3),
-    "wheel_loads": (N, 6),
-    "tangential": (N, 6),
-    "lateral": (N, 6),
-    "friction_utilisation": (N, 6),
-    "slip_ratio": (N, 6),
-    "torque_saturation": (N, 6),
-    "tip_over_ratio": (N,),
-    "tip_over_force_angle": (N,),
-    "belly_clearance": (N,),
-    "steering_angle": (N, 6),
-    "wheel_speed": (N, 6),
-    "energy": (N,),
-    "time": (N,),
-    "reason": (N,),
-    "traversable": (),
-    "first_failure": (),
-}
-REPLAY_SHAPES = {
-    "poses": (N, 3),
-    "status": (N,),
-    "contact_points": (N, 6, 3),
-    "contact_angle": (N, 6),
-    "torque": (N, 6),
-    "friction": (N, 6),
-    "sinkage": (N, 6),
-    "motion_resistance": (N, 6),
-    "power": (N,),
-    "motion": (N, 3),
-    "distance": (N,),
-    "wheel_drop": (N, 6),
-    "falling": (N, 6),
-    "speed_share": (N,),
-    "stalls": (N,),
-    "slip_speed": (N, 6),
-    "lift_rate": (N, 6),
-    "lift_height": (N, 6),
-    "deviation": (N, 3),
-    "drift": (N, 2),
-    "assumptions": (),
-}
+
+def by_name(table):
+    """Return the shapes of arrays by their names; the table has names by shape."""
+    return {name: shape for shape, names in table.items() for name in names.split()}
+
+
+SHAPES = by_name(
+    {
+        (): "traversable first_failure",
+        (N,): "settled roll pitch tip_over_ratio tip_over_force_angle belly_clearance energy time "
+        "reason",
+        (N, 2): "rocker_angle bogie_angle",
+        (N, 3): "position",
+        (N, 6): "wheel_loads tangential lateral friction_utilisation slip_ratio torque_saturation "
+        "steering_angle wheel_speed",
+        (N, 6, 3): "wheel_centres",
+    }
+)
+REPLAY_SHAPES = by_name(
+    {
+        (): "assumptions",
+        (N,): "status power distance speed_share stalls",
+        (N, 2): "drift",
+        (N, 3): "poses motion deviation",
+        (N, 6): "contact_angle torque friction sinkage motion_resistance wheel_drop falling "
+        "slip_speed lift_rate lift_height",
+        (N, 6, 3): "contact_points",
+    }
+)
 """What the file holds beside the contract's arrays, for a replay."""
 
 
@@ -142,21 +122,12 @@ def test_options_change_the_prediction(files):
         assert out["friction_utilisation"] == pytest.approx(little / 2)
 
 
-def test_a_preset_terrain_is_found_by_its_name(files, capfd):
-    poses = np.array([[-44.684, -19.499, 3.41], [-44.78, -19.53, 3.41]])
-    np.savez(files / "poses.npz", poses=poses)
-    words = ["predict", "lsr1", "spirit", str(files / "poses.npz"), str(files / "out.npz")]
-    assert main(words) == 0
-    assert capfd.readouterr().out.endswith("2 waypoints, traversable\n")
-
-
-CLASS_SHAPES = {
-    "traversability_class": (N,),
-    "class_constraint": (N,),
-    "class_wheel": (N,),
-    "class_margin": (N,),
-    "torque_range": (N, 6, 2),
-}
+CLASS_SHAPES = by_name(
+    {
+        (N,): "traversability_class class_constraint class_wheel class_margin",
+        (N, 6, 2): "torque_range",
+    }
+)
 
 
 def test_classes_and_torque_ranges_are_added_on_demand(files):
@@ -171,17 +142,6 @@ def test_classes_and_torque_ranges_are_added_on_demand(files):
         assert (out["class_margin"] > 0.5).all()
         low, high = out["torque_range"][..., 0], out["torque_range"][..., 1]
         assert (low < 0.0).all() and (high > 0.0).all()
-
-
-def test_what_speed_servos_pass_is_classified_so_under_any_policy(files):
-    rise = np.tile(0.45 * 0.05 * np.arange(120), (80, 1))
-    save_terrain(files / "terrain.npz", Terrain(rise, 0.05, (0.0, 0.0)))
-    for policy, traversable in (("equal", False), ("servo", True), ("optimal", True)):
-        assert main([*predict_words(files), "--classes", "--policy", policy]) == 0
-        with np.load(files / "out.npz") as out:
-            assert bool(out["traversable"]) == traversable
-            assert set(out["traversability_class"]) == {"passable with speed servos"}
-            assert (out["class_margin"] > 0.0).all()
 
 
 def test_on_soil_the_file_has_sinkage_and_resistance_too(files):
@@ -315,7 +275,6 @@ def test_many_single_poses_are_predicted_part_by_part_as_a_few_are(files, monkey
     with np.load(files / "out.npz") as out:
         whole = {name: out[name] for name in out.files}
     monkeypatch.setattr(predict_command, "MAX_IN_MEMORY", 10)
-    monkeypatch.setattr(judge_poses, "PART", 7)
     assert main(words) == 0
     with np.load(files / "out.npz") as out:
         assert set(out.files) == whole.keys()

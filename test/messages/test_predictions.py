@@ -61,12 +61,6 @@ def test_an_array_has_labelled_dimensions_and_its_values():
     np.testing.assert_array_equal(array_values(message), values)
 
 
-def test_an_array_keeps_its_values_whatever_their_layout():
-    values = np.asfortranarray(np.arange(12).reshape(2, 6))
-    np.testing.assert_array_equal(array_values(waypoint_array(values)), values)
-    assert array_values(waypoint_array(np.empty((0, 6)))).shape == (0, 6)
-
-
 def test_an_array_whose_length_disagrees_is_refused():
     message = waypoint_array(np.zeros((2, 6)))
     message.data = message.data[:-1]
@@ -146,14 +140,6 @@ def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other
     assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()
 
 
-def test_wheels_roll_forwards_by_the_way_they_go(prediction, rover):
-    message = joint_trajectory(prediction, rover, "map", STAMP)
-    rolled = np.array([point.positions[4:10] for point in message.points])
-    assert (np.diff(rolled, axis=0) > 0.0).all()
-    flat = 0.05 * 49 / rover.wheel.radius
-    assert np.all((rolled[-1] > 0.97 * flat) & (rolled[-1] < 1.05 * flat))
-
-
 def test_a_path_of_poses_filled_anew_is_the_same_as_one_of_new_poses(prediction):
     stock = PoseStock()
     for rows in ([0, 10, 49], [5], range(50), [49, 48]):
@@ -192,8 +178,3 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
         [[p.x, p.y, p.z] for p in contacts[:6]], prediction.contact_points[0]
     )
     assert all(marker.header.stamp == STAMP for marker in markers)
-
-
-def test_markers_of_a_passable_path_show_no_failure(prediction):
-    markers = path_markers(prediction, [""] * 60, np.arange(50), "map", STAMP).markers
-    assert [marker.ns for marker in markers[1:]] == ["path", "contact_points"]

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from rover_physics.numerics.interruption import interruptible
-from rover_physics.prediction.sweep import sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES, classify_judged
-from rover_physics.traversability.judge_poses import judge_poses
+from rover_physics.traversability.judge import judge_poses
+from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_planner.planning.navigation.hazard_map import HazardMap
-from rover_planner.planning.navigation.pose_classes import RoverOnMap, classify_poses
 
 LSR1 = load_rover("lsr1")
 OPTIONS = SweepOptions(control_margin=0.3)
@@ -104,7 +103,7 @@ def test_threads_change_no_class_and_questions_can_go_first_every_256_poses():
 def test_at_a_limit_a_pose_has_the_class_of_the_full_judgement(excess):
     ramp = Terrain(0.3 * 0.05 * np.indices((60, 60))[1].astype(float), 0.05, (0.0, 0.0))
     pose = np.array([[1.5, 1.5, 0.0]])
-    tilt = sweep_poses(LSR1, ramp, pose, np.zeros(1)).pitch[0]
+    tilt = judge_poses(LSR1, ramp, pose, np.zeros(1))[0].pitch[0]
     limits = replace(LSR1.limits, tilt=abs(float(tilt)) + np.radians(excess))
     on_map = RoverOnMap(replace(LSR1, limits=limits), ramp, OPTIONS)
     found = classify_poses(on_map, pose)

@@ -14,7 +14,6 @@ from rover_planner.planning.path_query import (
     answer_path_query,
     check_path,
     choose,
-    path_risk,
 )
 
 COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
@@ -113,11 +112,11 @@ def test_the_safer_path_wins_and_energy_decides_between_equals(rover):
 def test_risk_is_one_at_a_limit(rover):
     verdict = check_path(rover, flat(), np.array([[0.0, 0.0, 0.0]]), COARSE).verdict
     limits = rover.limits
-    assert 0 < path_risk(rover, verdict) < 1
+    assert 0 < verdict.risk < 1
     at_limit = dataclasses.replace(verdict, max_tilt=limits.tilt)
-    assert path_risk(rover, at_limit) == pytest.approx(1.0)
+    assert at_limit.risk == pytest.approx(1.0)
     at_limit = dataclasses.replace(verdict, min_tip_over_ratio=limits.tip_over_ratio)
-    assert path_risk(rover, at_limit) == pytest.approx(1.0)
+    assert at_limit.risk == pytest.approx(1.0)
 
 
 def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):

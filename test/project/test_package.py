@@ -66,12 +66,6 @@ def test_the_latest_release_in_the_changelog_is_this_version():
     assert released[0] == rover_physics.__version__
 
 
-def test_manifest_and_setup_agree_on_name_and_licence(setup_arguments):
-    assert package_xml().findtext("name") == setup_arguments["name"] == "rover_planner"
-    assert package_xml().findtext("license") == setup_arguments["license"] == "Apache-2.0"
-    assert package_xml().findtext("export/build_type") == "ament_python"
-
-
 def test_the_manifest_depends_on_every_ros_package_that_is_imported():
     declared = {element.text for element in package_xml().iter("exec_depend")}
     used = {

@@ -12,8 +12,8 @@ from rover_physics.traversability.classification import classify_judged
 from rover_physics.traversability.judge import judge_poses
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
-    LIMIT_NUMBERS,
     NO_LIMIT,
+    number_limits,
     pack_bits,
     types_of_layers,
     unpack_bits,
@@ -71,7 +71,7 @@ def test_limits_and_classes_are_those_of_predict(ground, policy, std):
         TOP_HEAVY, ground, prediction, verdict, request.options, curvature=np.zeros(len(poses))
     )
     clear = is_clear(ground, places)
-    limits = np.array([LIMIT_NUMBERS[code] for code in verdict.codes])
+    limits = np.array([number_limits()[code] for code in verdict.codes])
     np.testing.assert_array_equal(layers["first_limit"][clear], limits[clear])
     classes = np.array([CLASS_NUMBERS[one.traversability_class] for one in told])
     np.testing.assert_array_equal(layers["best_class"][clear], classes[clear])
@@ -140,7 +140,7 @@ def test_no_cell_passes_whose_outline_touches_unknown_ground():
 def test_ground_that_is_all_unknown_is_impassable():
     layers = survey_tile(make_request(turns=True), None, np.zeros((5, 2)))
     assert (layers["best_class"] == CLASS_NUMBERS["impassable"]).all()
-    assert (layers["first_limit"] == LIMIT_NUMBERS["unknown_ground"]).all()
+    assert (layers["first_limit"] == number_limits()["unknown_ground"]).all()
     assert not layers["passable_headings"].any() and np.isnan(layers["worst_tilt"]).all()
     assert {name: layer.dtype for name, layer in layers.items()} == types_of_layers(4, True)
 

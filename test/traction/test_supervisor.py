@@ -189,14 +189,3 @@ def test_a_rover_that_does_not_turn_is_stalled_one_that_turns_is_not(wanted):
         assert found[-1] == stalled
     assert watch.update(turns, turns, 0.02, 2.0)
     assert not watch.update(turns, -turns, 0.02, 2.0)
-
-
-def test_new_settings_change_the_policy_at_rest():
-    rig = Rig(enabled=False)
-    rig.pitch = -0.3
-    assert rig.run(0.1).torques.any()
-    settings = load_traction_settings(
-        TractionControllerParameters(rest_policy="coast"), rig.supervisor.service.settings
-    )
-    rig.supervisor.configure(settings)
-    assert not rig.run(PERIOD).torques.any()

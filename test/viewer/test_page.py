@@ -162,9 +162,7 @@ def test_the_hint_for_first_visitors_can_be_closed_for_ever(visitor):
     visitor.tab.locator("#hint").wait_for(state="hidden")
 
 
-def test_a_failing_page_shows_a_red_banner_over_the_scene_and_goes_on(
-    onlooker, page, monkeypatch
-):
+def test_a_failing_page_shows_a_red_banner_over_the_scene_and_goes_on(onlooker, page, monkeypatch):
     def fail(*_arguments) -> None:
         raise ValueError("no picture today")
 

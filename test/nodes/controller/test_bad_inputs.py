@@ -11,7 +11,6 @@ from sensor_msgs.msg import JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics.errors import ModelError
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.driven_rover import JOINTS
 from support.ros_fixtures import run_in_executor
@@ -19,15 +18,10 @@ from support.rough_grounds import plane
 from support.waiting import wait_until
 
 CYCLES_IN_A_TENTH = 5
-FIRST_WHEEL = len(SUSPENSION_JOINTS)
 
 
 def nan_rate(rover):
-    rover.joints.velocity[FIRST_WHEEL + 2] = math.nan
-
-
-def fast_wheel(rover):
-    rover.joints.velocity[FIRST_WHEEL] = 1000.0
+    rover.joints.velocity[JOINTS.index("front_right_wheel")] = math.nan
 
 
 def large_attitude(rover):
@@ -45,7 +39,6 @@ def nan_speed(rover):
 GOOD = "all inputs are right"
 SPOILS = [
     (nan_rate, "velocity nan of front_right_wheel"),
-    (fast_wheel, "velocity 1000 of rear_right_wheel; it must be within 20 rad/s"),
     (large_attitude, "imu has orientation [0.0, 0.0, 0.0, 1e+155]"),
     (other_frame, "imu is in frame 'imu_link'; it must be in 'base_link', or the parameters"),
     (nan_speed, "cmd_vel has linear.x nan"),
@@ -103,21 +96,6 @@ def test_steering_is_read_with_the_sign_of_the_rover(rover, start_controller, si
 def test_joints_that_do_not_reach_the_steering_limit_end_the_start(start_controller):
     with pytest.raises(ModelError, match=r"reach 0\.5 rad.*must be at most 0\.5"):
         start_controller(steering_limit=0.5)
-
-
-def test_messages_of_an_arm_between_those_of_the_wheels_change_nothing(rover, controller):
-    arm = JointState(name=["arm_yaw"], position=[0.1], velocity=[0.0])
-    bad = JointState(name=["arm_yaw"], position=[math.nan, 0.0])
-    sender = rover.create_publisher(JointState, "joint_states", sensor_qos())
-    heard = len(rover.commands)
-
-    def send():
-        sender.publish(arm)
-        sender.publish(bad)
-        return rover.pushes_on(heard, 25)
-
-    wait_until(send, "half a second of commands that push")
-    assert rover.faults == []
 
 
 def spoilt_odometry(field):

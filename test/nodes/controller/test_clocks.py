@@ -108,22 +108,6 @@ def test_frozen_delayed_and_future_stamps_are_faults_in_time(rover, drive, shift
     wait_until(lambda: rover.state == "driving", "driving again")
 
 
-def test_a_slow_update_is_no_step_of_the_clock(rover, controller, monkeypatch):
-    take, slow = controller._maps.take, []
-
-    def take_slowly():
-        if not slow:
-            time.sleep(0.3)
-        slow.append(True)
-        return take()
-
-    monkeypatch.setattr(controller._maps, "take", take_slowly)
-    wait_until(lambda: len(slow) > 10, "updates")
-    heard = len(rover.commands)
-    wait_until(lambda: len(rover.commands) > heard + 10, "commands")
-    assert not any("was stepped" in status.message for _, status in rover.diagnostics)
-
-
 @pytest.mark.timed
 def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, drive):
     controller = drive()

@@ -4,7 +4,6 @@ The mock hardware takes commands as forward_command_controllers of the shipped c
 and sends joint states as their broadcaster does.
 """
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -190,27 +189,6 @@ def test_efforts_drive_the_robot_straight_ahead(ros, start, tmp_path):
     wait_until(lambda: controller.state == "driving", "driving")
     angles = controller.service._suspension_angles
     assert np.abs(angles).max() < 0.01  # the offset of the rocker's encoder is taken off
-
-
-def test_the_signs_matter(ros, start, tmp_path):
-    plant = start_plant(ros, tmp_path)
-    robot = ros.spin(SimulatedRobot(ros))
-    entries = read_config("joints.yaml", "/**")["joint_map"]
-    wrong = [entry.replace(":-1", "") if "_wheel" in entry else entry for entry in entries]
-    start(joint_map=wrong)
-    place = plant.simulation.plant.pose()
-    wait_until(lambda: any(robot.commands.get("wheel_efforts", {}).values()), "efforts")
-    time.sleep(2.5)  # with the right signs it drives 0.1 m
-    assert np.hypot(*(plant.simulation.plant.pose() - place)[:2]) < 0.05
-
-
-def test_without_names_the_joints_are_missed(ros, start):
-    ros.spin(KinematicRobot(ros, 0.03, 0.0))
-    names = ["rocker_right:rocker_right"]
-    controller = start(joint_map=names, joints=list(WHEEL_JOINTS))
-    alone = "waiting for joint_states"  # imu and cmd_vel are heard
-    wait_until(lambda: controller._command and controller._command.update.fault == alone, alone)
-    assert controller.state == "fault"
 
 
 @pytest.mark.parametrize(("speed", "yaw_rate"), [(0.03, 0.03), (0.0, 0.05)])

@@ -71,21 +71,6 @@ def test_a_best_effort_map_is_named_and_the_parameter_mends_it(rover, start_cont
     assert node.get_parameter("input_reliability").value == "reliable"
 
 
-def test_a_best_effort_map_is_heard_with_the_parameter(rover, start_controller):
-    qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-    sender = rover.create_publisher(PointCloud2, "elevation_cloud", qos)
-    start_controller(input_reliability="best_effort")
-    cloud = PointCloud2()
-    cloud.header.frame_id = "elsewhere"
-
-    def is_refused():
-        sender.publish(cloud)
-        return rover.count_lines("elevation_cloud refused")
-
-    wait_until(is_refused, "the cloud")
-    assert not rover.count_lines("not heard")
-
-
 def test_two_rovers_in_two_namespaces_do_not_meet(ros):
     rovers = {}
     for name in ("one", "two"):

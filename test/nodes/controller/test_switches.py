@@ -1,6 +1,5 @@
 """Enabling, emergency stop, rest and the end of the node over DDS."""
 
-import itertools
 import os
 import signal
 import subprocess
@@ -8,7 +7,6 @@ import sys
 import time
 
 import pytest
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -102,45 +100,6 @@ def test_a_stall_ends_the_push_and_is_reported(rover, start_controller):
     wait_until(lambda: rover.status.message.startswith("stalled: no progress"), "the report")
     rover.speed = 0.0
     wait_until(lambda: rover.state == "standstill", "the way out")
-
-
-def set_parameter(controller, name, value):
-    changes = [Parameter(name, value=value)]
-    [result] = run_in_executor(controller, lambda: controller.set_parameters(changes))
-    assert result.successful
-
-
-def pushes_while_parameters_change(rover, controller):
-    """Return the pushes that are commanded while parameters change."""
-    heard = len(rover.commands)
-    for name, value in (("friction", 0.3), ("policy", "equal"), ("slip_gain", 5.0)):
-        set_parameter(controller, name, value)
-        before = len(rover.commands)
-        wait_until(lambda before=before: len(rover.commands) > before + 10, "commands")
-    for name, value in (("friction", 0.8), ("policy", "optimal"), ("slip_gain", 2.0)):
-        set_parameter(controller, name, value)
-    return [push for *_, push in rover.commands[heard:]]
-
-
-def test_a_parameter_change_moves_no_torque_by_a_step(rover, controller):
-    set_parameter(controller, "torque_rate", 2.0)
-    for _ in range(3):  # a machine that stalls lets the watchdog send zeros, which is right
-        pushes = pushes_while_parameters_change(rover, controller)
-        if all(push > 0.0 for push in pushes):
-            break
-        wait_until(lambda: rover.commands[-1][-1] > 0.0, "the push")
-    assert all(push > 0.0 for push in pushes)
-    # Six torques of 2 N m/s each, over at most 0.1 s between two updates.
-    steps = itertools.pairwise(pushes)
-    assert max(abs(new - old) for old, new in steps) < 6 * 2.0 * 0.1
-
-
-def test_a_node_that_is_stopped_sends_zeros_and_no_more(rover, controller):
-    run_in_executor(controller, controller.stop)
-    wait_until(lambda: rover.torque == 0.0 and rover.brakes[-1], "zeros and the brake")
-    updates, heard = controller.statistics.updates, len(rover.commands)
-    time.sleep(0.1)
-    assert controller.statistics.updates == updates and len(rover.commands) == heard
 
 
 @pytest.mark.slow

@@ -98,8 +98,9 @@ def run_planner(monkeypatch, capfd):
 
 
 @pytest.fixture
-def walled(server):
+def walled(start_server):
     """A server whose map has a wall at x = 0.5 m."""
+    server = start_server(planner="fan")
     server.service.take_terrain(make_terrain(wall_at(0.5)))
     return server
 

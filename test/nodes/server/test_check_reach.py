@@ -132,15 +132,3 @@ def test_a_bad_message_is_not_answered_for_by_the_one_before(level, client, tool
     tool.push((0.0, 0.0, 0.0))
     assert tool.ask()[0]
     assert ros.is_alive(level)
-
-
-def test_an_arm_of_which_only_some_joints_are_known_is_refused(level, client, tool):
-    tool.aim(TARGET)
-    client.send_joints(["arm_yaw", "arm_elbow"], [0.1, 0.2])
-    wait_until(lambda: "arm_elbow" in level.service.joints, "the joints")
-    success, answer = tool.ask()
-    assert not success and answer["code"] == "missing_joints"
-    assert "arm_shoulder" in answer["reason"]
-    client.send_joints(["arm_shoulder"], [0.3])
-    wait_until(lambda: "arm_shoulder" in level.service.joints, "the joint")
-    assert tool.ask()[0]

@@ -116,17 +116,13 @@ def test_a_map_published_before_the_server_came_is_heard(client, start_server):
     wait_until(lambda: server.service.terrain is not None, "the map")
 
 
-def test_a_map_from_a_volatile_publisher_is_heard_once(server, client):
+def test_a_map_from_a_volatile_publisher_is_heard(server, client):
     publisher = client.create_publisher(
         PointCloud2, "elevation_cloud", map_qos(DurabilityPolicy.VOLATILE)
     )
     wait_until(lambda: publisher.get_subscription_count() > 0, "the subscription")
     publisher.publish(terrain_to_point_cloud(make_terrain(waves), "map"))
-    client.wait_for_log("map from elevation_cloud")
-    client.send_cloud(terrain_to_point_cloud(make_terrain(wall_at(0.5)), "map"))
-    told = lambda: sum("map from elevation_cloud" in line for line in client.logs)  # noqa: E731
-    wait_until(lambda: told() == 2, "the second map")
-    assert told() == 2
+    wait_until(lambda: server.service.terrain is not None, "the map")
 
 
 def check(client, server, poses=AHEAD) -> dict:

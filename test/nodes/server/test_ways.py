@@ -48,7 +48,7 @@ def test_where_all_candidates_are_refused_a_path_around_is_the_plan_which_passes
 
 
 def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_server, client):
-    start_server(**LONG)
+    start_server(lattice_cell=0.4, **LONG)
     client.send_terrain(make_terrain(pen))
     assert client.set_parameter("search_budget", 0.05) == (True, "")
     _, verdict, _ = ask(client, start=INSIDE, goal=BEYOND)

@@ -46,7 +46,7 @@ def test_edges_that_the_model_refuses_are_the_more_difficult_ones(seed):
     ground = make_mars_terrain(seed, rock_cover=0.15, crater_density=0.0, size=6.0)
     estimate, edges = difficulties(ground)
     chosen = np.random.default_rng(seed).choice(len(edges), 500, replace=False)
-    judge = Judge(LSR1, ground, PathQueryOptions(control_margin=0.0, waypoint_spacing=0.04))
+    judge = Judge(LSR1, ground, PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0))
     asked = edges[chosen]
     verdicts = judge.judge(
         [EDGES.poses(edge) for edge in asked], [EDGES.primitive(edge).gear for edge in asked]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter
+from rover_physics.traversability.judge import judge_path
 from rover_planner.errors import PlanningError
 from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_plant import MujocoPlant
@@ -40,7 +40,7 @@ def test_the_rover_is_where_the_model_settles_it():
     plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
     state = drive(plant, 5.0)
     assert plant.pose() == pytest.approx([-1.0 + 5.0 * 0.06, 0.0, 0.0])
-    settled = sweep_path(LSR1, ground, plant.pose()[None])
+    settled = judge_path(LSR1, ground, plant.pose()[None])[0]
     assert state.position == pytest.approx(settled.position[0])
     angles = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
     assert angles == pytest.approx([*settled.rocker_angle[0], *settled.bogie_angle[0]])
@@ -217,16 +217,16 @@ def test_torques_shared_well_carry_the_rover_where_equal_ones_would_slip():
     way = np.linspace(-0.6, 0.2, 81)
     poses = np.column_stack([way, np.zeros_like(way), np.zeros_like(way)])
     needed = {
-        policy: sweep_path(LSR1, ground, poses, SweepOptions(friction=0.4, policy=policy))
+        policy: judge_path(LSR1, ground, poses, SweepOptions(friction=0.4, policy=policy))[0]
         for policy in ("equal", "optimal")
     }
     assert np.nanmax(needed["equal"].friction_utilisation) > 1.05
     assert np.nanmax(needed["optimal"].friction_utilisation) < 1.0
     plant = QuasiStaticPlant(LSR1, ground, (-0.5, 0.0, 0.0), friction=0.4)
     for _ in range(round(12.0 / STEP)):
-        here = sweep_path(
+        here = judge_path(
             LSR1, ground, plant.pose()[None], SweepOptions(friction=0.4, policy="optimal")
-        )
+        )[0]
         push = 6.0 * (0.08 - plant.state().velocity[0]) * LSR1.total_mass
         plant.pull(here.torque[0] + push * LSR1.wheel.radius / 6.0, AHEAD, STEP)
     assert plant.pose()[0] > 0.1
@@ -244,11 +244,11 @@ def test_a_rover_whose_wheels_spin_says_so():
 
 def test_driving_forces_are_those_of_the_model_and_more_torque_pushes_by_as_much():
     ground, optimal = wavy(), SweepOptions(policy="optimal")
-    here = sweep_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), optimal)
+    here = judge_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), optimal)[0]
     forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, here.torque[0], 0.0)
     assert forces.push == pytest.approx(0.0, abs=0.01) and not forces.sliding.any()
     assert forces.loads == pytest.approx(here.wheel_loads[0], abs=0.05)
-    here = sweep_path(LSR1, plane(0.0, 0.0, half=2.0), np.zeros((1, 3)))
+    here = judge_path(LSR1, plane(0.0, 0.0, half=2.0), np.zeros((1, 3)))[0]
     forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, np.full(6, 0.3), 0.0)
     assert forces.push == pytest.approx(18.0, rel=1e-6)
     assert forces.loads.sum() == pytest.approx(LSR1.weight)

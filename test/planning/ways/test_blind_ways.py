@@ -25,7 +25,7 @@ from rover_planner.worlds.maps.blind_ground import (
 )
 
 LSR1 = load_rover("lsr1")
-OPTIONS = PathQueryOptions(control_margin=0.0, waypoint_spacing=0.04)
+OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
 

@@ -30,7 +30,7 @@ from support.grounds import make_terrain, waves
 from support.rough_grounds import rocky
 
 LSR1 = load_rover("lsr1")
-OPTIONS = PathQueryOptions(control_margin=0.0, waypoint_spacing=0.04)
+OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
 
@@ -71,7 +71,7 @@ def test_the_way_passes_as_any_path_does_and_ends_where_it_was_asked_to(around):
     poses = answer.path.poses
     np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-12)
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= OPTIONS.waypoint_spacing + 1e-9
-    _, verdict = judge_path(LSR1, question.terrain, poses, OPTIONS.sweep_options())
+    _, verdict = judge_path(LSR1, question.terrain, poses, OPTIONS.model)
     assert verdict.traversable, verdict.reason
 
 
@@ -170,7 +170,7 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
     assert warm.outcome == cold.outcome == FOUND
     assert warm.cost == pytest.approx(cold.cost, rel=0.03)
     assert 0 < warm.edges_judged < cold.edges_judged
-    _, verdict = judge_path(LSR1, after, warm.path.poses, OPTIONS.sweep_options())
+    _, verdict = judge_path(LSR1, after, warm.path.poses, OPTIONS.model)
     assert verdict.traversable
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from rover_physics.names import OPTIMAL, SERVO, WHEELS
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge_path import judge_path
-from rover_physics.traversability.verdict import judge
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.viewer.state.reasons.before_after import (
     ChangeHistory,
@@ -183,7 +183,7 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
     [candidate] = session.candidates
     assert candidate.verdict.code == "unknown_ground"
     before = prediction.cut(verdict.first_failure + 1)
-    assert candidate.verdict.max_tilt == judge(LSR1, before).max_tilt < 0.2
+    assert candidate.verdict.max_tilt == hold_against_limits(LSR1, before).max_tilt < 0.2
 
 
 def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():

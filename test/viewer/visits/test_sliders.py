@@ -115,7 +115,7 @@ def check_page(page: Page, visitor: Visitor) -> None:
         return now if is_seen and session.finished is now else None
 
     now = wait_until(find_shown, "the verdict in header and tab")
-    options = now.scenario.options.sweep_options(now.scenario.arm_angles)
+    options = now.scenario.asked_options.model
     poses = now.shown.candidate.poses
     _, verdict = judge_path(now.scenario.rover, now.scenario.terrain, poses, options)
     assert now.shown.verdict.traversable == verdict.traversable
