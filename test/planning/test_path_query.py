@@ -110,27 +110,25 @@ def test_the_safer_path_wins_and_energy_decides_between_equals(rover):
 
 
 def test_risk_is_one_at_a_limit(rover):
-    verdict = check_path(rover, flat(), np.array([[0.0, 0.0, 0.0]]), COARSE).verdict
-    limits = rover.limits
-    assert 0 < verdict.risk < 1
-    at_limit = dataclasses.replace(verdict, max_tilt=limits.tilt)
-    assert at_limit.risk == pytest.approx(1.0)
-    at_limit = dataclasses.replace(verdict, min_tip_over_ratio=limits.tip_over_ratio)
-    assert at_limit.risk == pytest.approx(1.0)
+    pose = np.array([[0.0, 0.0, 0.0]])
+    assert 0 < check_path(rover, flat(), pose, COARSE).verdict.risk < 1
+    clearance = check_path(rover, flat(), pose, COARSE).verdict.min_belly_clearance
+    for limit in ({"tip_over_ratio": 1.0 - 1e-9}, {"belly_clearance": clearance - 1e-9}):
+        limits = dataclasses.replace(rover.limits, **limit)
+        at_limit = dataclasses.replace(rover, limits=limits)
+        verdict = check_path(at_limit, flat(), pose, COARSE).verdict
+        assert verdict.traversable and verdict.risk == pytest.approx(1.0)
 
 
 def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):
     ground = flat(4.0)
     uncertain = dataclasses.replace(ground, elevation_std=np.full(ground.elevation.shape, 0.003))
     pose = np.array([[0.0, 0.0, 0.0]])
-    sure = path_risk(rover, check_path(rover, ground, pose, COARSE).verdict)
+    sure = check_path(rover, ground, pose, COARSE).verdict.risk
     risks = [
-        path_risk(
-            rover,
-            check_path(
-                rover, uncertain, pose, dataclasses.replace(COARSE, map_sigmas=sigmas)
-            ).verdict,
-        )
+        check_path(
+            rover, uncertain, pose, dataclasses.replace(COARSE, map_sigmas=sigmas)
+        ).verdict.risk
         for sigmas in (0.0, 1.0, 3.0)
     ]
     assert risks[0] == sure
