@@ -12,6 +12,7 @@ READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.bench_ready
 PACKAGES := rover_physics msg_adapters rover_planner
 MAP ?=
+TESTS ?= test
 # One more than there are cores: many tests wait for a rover that drives.
 WORKERS ?= $(shell echo $$(( $$(nproc) + 1 )))
 # A test that hangs fails, as does a stage that does not end: each says where.
@@ -60,6 +61,11 @@ test-long: $(READY) kernels ## the tests that take a minute or more each: lowest
 quick: $(READY) ## the tests that are not slow: under a minute once the kernels are compiled
 	@$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow and not timed and not long" test
 
+.PHONY: coverage
+coverage: $(READY) kernels ## share of the lines that tests run, compiled kernels left out; TESTS=test/messages for a part
+	@$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile -m "not timed and not long" \
+	  --cov --cov-report term:skip-covered $(TESTS)
+
 .PHONY: lint
 lint: $(READY) ## ruff and mypy
 	@echo "== ruff"
@@ -77,7 +83,7 @@ bench: $(BENCH_READY) kernels ## measure times and memory, as a table and bench_
 	@$(BIN)/python -m benchmarks.run
 
 .PHONY: fuzz
-fuzz: $(READY) kernels ## throw 12,000 malformed and hostile inputs at services and running nodes
+fuzz: $(READY) kernels ## throw 6,000 malformed and hostile inputs at running nodes
 	@$(BIN)/python -m benchmarks.fuzz
 
 .PHONY: clean

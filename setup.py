@@ -49,10 +49,11 @@ EXTRAS = {
         "playwright>=1.48,<2",
         "mujoco>=3.2,<5",
     ],
-    "bench": ["mujoco>=3.2,<5", "ompl>=2.0,<3"],
+    "bench": ["mujoco>=3.2,<5"],
     "dev": [
         "ruff>=0.9,<1",
         "mypy>=1.14,<3",
+        "pytest-cov>=6.0,<8",
     ],
 }
 EXTRAS["all"] = [

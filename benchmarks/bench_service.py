@@ -3,23 +3,24 @@
 Three answers are timed in turns: the server's, that of a node that returns the same plan without
 computing it, and the same query in this process without ROS. Everything is measured twice: with a
 pause before each query (processors sleep and caches are cold), and without a pause, as by a
-planner that sends the next query as soon as it has an answer.
+planner that sends the next query as soon as it has an answer. A map message is timed, too.
 """
 
+import array
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from benchmarks.measure import Figure, quantile
-from benchmarks.planner_process import SERVER, Planner, planner_and_processes
-from rover_physics.terrain.grid import Terrain
-from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import load_service_settings
-from rover_planner.planning.answering.traverse_service import TraverseService
+import numpy as np
+from sensor_msgs.msg import PointCloud2
+
+from benchmarks.measure import Figure, median_times, quantile
+from benchmarks.processes import ECHO, SERVER, Client, open_nodes
+from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
+from rover_physics import Terrain, load_rover
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-ECHO = "/echo/can_traverse"
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
 """Poses x, y [m], yaw [rad]. The path crosses some rocks, so that contact points jump."""
 QUESTIONS = 200
@@ -28,45 +29,44 @@ WARM_UP = 20
 """Queries before these that are not timed."""
 NINES = 50
 """Questions with nine candidates."""
+CELLS, RESOLUTION = 1_000, 0.05
+"""Cells along each side of the map that is sent, and their size [m]."""
+ASKERS = (("after a pause", 0.03, 1), ("at once", 0.0, 20))
+"""Name, pause before a query [s], and queries to one responder before the next has its turn."""
 
 
-@dataclass(frozen=True)
-class Asker:
-    """The timing of a planner's queries."""
-
-    name: str
-    """Name in the table."""
-    pause: float
-    """Time between an answer and the next query [s]."""
-    in_a_row: int
-    """Queries to one responder before the next one takes its turn."""
-
-
-ASKERS = (Asker("after a pause", 0.03, 1), Asker("at once", 0.0, 20))
-
-
-def make_service(ground: Terrain, parameters: TraverseServerParameters) -> TraverseService:
-    """Return the service that a server uses, without ROS."""
-    service = TraverseService(load_service_settings(parameters))
-    service.take_terrain(ground)
-    return service
+def measure() -> list[Figure]:
+    """Measure one path with and without a pause, a fan of nine, and a map message."""
+    rover, ground = load_rover("lsr1"), make_mars_terrain(1, 24.0, 0.05)
+    options, figures = PathQueryOptions(count=1), []
+    with open_nodes() as nodes:
+        nodes.start(SERVER, terrain_file=ground, candidate_count=1)
+        client = nodes.client()
+        plan = client.first_plan(START, GOAL)
+        assert plan.poses, "the path is to be passable"
+        nodes.start_echo(plan)
+        client.first_plan(START, GOAL, ECHO)
+        responders: dict[str, Callable[[], object]] = {
+            "server": lambda: client.plan(START, GOAL),
+            "echo": lambda: client.plan(START, GOAL, node=ECHO),
+            "computation": lambda: answer_path_query(rover, ground, START, GOAL, options),
+        }
+        for name, pause, in_a_row in ASKERS:
+            times = ask_in_turns(responders, pause, in_a_row)
+            figures += make_figures(name, times, len(plan.poses))
+    return [*figures, measure_nine(ground), *measure_map_message()]
 
 
 def ask_in_turns(
-    planner: Planner, service: TraverseService, asker: Asker
+    responders: dict[str, Callable[[], object]], pause: float, in_a_row: int
 ) -> dict[str, list[float]]:
-    """Return the times [s] of "server", "echo" and "computation"."""
-    ways: dict[str, Callable[[], object]] = {
-        "server": lambda: planner.ask(SERVER, START, GOAL),
-        "echo": lambda: planner.ask(ECHO, START, GOAL),
-        "computation": lambda: service.answer(START, GOAL),
-    }
-    times: dict[str, list[float]] = {name: [] for name in ways}
-    for _ in range((WARM_UP + QUESTIONS) // asker.in_a_row):
-        for name, ask in ways.items():
-            if not asker.pause:
+    """Return the times [s] of each responder."""
+    times: dict[str, list[float]] = {name: [] for name in responders}
+    for _ in range((WARM_UP + QUESTIONS) // in_a_row):
+        for name, ask in responders.items():
+            if not pause:
                 ask()  # not counted: the caches hold another responder's data
-            times[name] += [_time(ask, asker.pause) for _ in range(asker.in_a_row)]
+            times[name] += [_time(ask, pause) for _ in range(in_a_row)]
     return {name: taken[WARM_UP:] for name, taken in times.items()}
 
 
@@ -77,24 +77,8 @@ def _time(ask: Callable[[], object], pause: float) -> float:
     return time.perf_counter() - began
 
 
-def measure() -> list[Figure]:
-    """Measure one path with and without a pause, and a fan of nine."""
-    ground = make_mars_terrain(1, 24.0, 0.05)
-    service = make_service(ground, TraverseServerParameters(candidate_count=1))
-    figures = []
-    with planner_and_processes() as (planner, processes):
-        processes.start_server(ground, candidate_count=1)
-        plan, _ = planner.ask(SERVER, START, GOAL)
-        assert plan.poses, "the path is to be passable: " + service.answer(START, GOAL).reason
-        processes.start_echo(plan)
-        planner.ask(ECHO, START, GOAL)
-        for asker in ASKERS:
-            times = ask_in_turns(planner, service, asker)
-            figures += _tell(asker.name, times, len(plan.poses))
-    return [*figures, *_measure_nine(ground)]
-
-
-def _tell(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]:
+def make_figures(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]:
+    """Return the figures of the times [s] of all responders."""
     middle = {name: 1e3 * statistics.median(values) for name, values in times.items()}
     late = {name: 1e3 * quantile(values, 0.99) for name, values in times.items()}
     spread = {name: late[name] / middle[name] for name in times}
@@ -115,13 +99,35 @@ def _tell(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]
     ]
 
 
-def _measure_nine(ground: Terrain) -> list[Figure]:
+def measure_nine(ground: Terrain) -> Figure:
     """Measure the query with the default of nine candidates."""
-    with planner_and_processes() as (planner, processes):
-        processes.start_server(ground)
-        times = []
-        for _ in range(NINES + 10):
-            time.sleep(ASKERS[0].pause)
-            times.append(planner.ask(SERVER, START, GOAL)[1])
+    with open_nodes() as nodes:
+        nodes.start(SERVER, terrain_file=ground)
+        client: Client = nodes.client()
+        client.first_plan(START, GOAL)
+        pause = ASKERS[0][1]
+        times = [_time(lambda: client.plan(START, GOAL), pause) for _ in range(NINES + 10)]
     middle = 1e3 * statistics.median(times[10:])
-    return [Figure("service", "p50, nine candidates", middle, "ms", repeats=NINES)]
+    return Figure("service", "p50, nine candidates", middle, "ms", repeats=NINES)
+
+
+def measure_map_message() -> list[Figure]:
+    """Measure a cloud of a million points, by rows and in random order, until it is a terrain."""
+    ground, rng = make_mars_terrain(2, CELLS * RESOLUTION, RESOLUTION), np.random.default_rng(0)
+    elevation = ground.elevation[:CELLS, :CELLS].copy()
+    elevation[rng.random(elevation.shape) < 0.02] = np.nan
+    cloud = terrain_to_point_cloud(Terrain(elevation, RESOLUTION, ground.origin), "map")
+    points = rng.permutation(np.frombuffer(cloud.data, "<f4").reshape(-1, 3))
+    points[:, :2] += rng.uniform(-0.5 * RESOLUTION, 0.5 * RESOLUTION, (len(points), 2))
+    mixed = PointCloud2(height=1, width=len(points), point_step=12, row_step=12 * len(points))
+    mixed.header, mixed.fields = cloud.header, cloud.fields
+    mixed.data = array.array("B", points.astype("<f4").tobytes())
+    calls = [
+        lambda: terrain_from_point_cloud(cloud),
+        lambda: terrain_from_point_cloud(mixed, RESOLUTION),
+    ]
+    rows, scattered = (1e3 * taken for taken in median_times(calls, clock=time.perf_counter))
+    return [
+        Figure("map message", "1,000 x 1,000 points row by row", rows, "ms", 30.0),
+        Figure("map message", "a million scattered points", scattered, "ms"),
+    ]

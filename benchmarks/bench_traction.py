@@ -18,9 +18,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from benchmarks.measure import Figure
-from benchmarks.planner_process import DOMAIN, SERVER, Planner, planner_and_processes
+from benchmarks.processes import CONTROLLER, DOMAIN, SERVER, Client, open_nodes
+from rover_physics import load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.contact_ekf import Motion
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import topic_qos
@@ -38,6 +38,8 @@ ALONE_TIME = 20.0
 """Time for which updates are measured alone [s]."""
 PRIORITY = 50
 """Real-time priority (SCHED_FIFO) of the controller, as in ros2_control, if it is granted."""
+NUMBERS = ("updates", "missed_cycles", "fallbacks", "update_time_median_ms", "update_time_p99_ms")
+"""Values of the diagnostics that are read."""
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
 """Poses of the query that keeps the server busy: x, y [m], yaw [rad]."""
 
@@ -51,7 +53,7 @@ class DiagnosticsReader:
 
     def _take(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name.startswith("traction_controller"):
+            if status.name.startswith(CONTROLLER):
                 self.values = {item.key: item.value for item in status.values}
 
     def wait_for_updates(self, count: int, timeout: float = 120.0) -> dict[str, float]:
@@ -61,13 +63,7 @@ class DiagnosticsReader:
             if time.monotonic() > end:
                 raise TimeoutError(f"the controller made {self.values.get('updates', 0)} updates")
             time.sleep(0.1)
-        numbers = {}
-        for key, value in self.values.items():
-            try:
-                numbers[key] = float(value)
-            except ValueError:
-                continue
-        return numbers
+        return {key: float(self.values[key]) for key in NUMBERS}
 
 
 def measure() -> list[Figure]:
@@ -123,34 +119,35 @@ def _take(node: TractionController, motion: Motion) -> None:
 def measure_together() -> list[Figure]:
     """Measure the node while a simulator and a busy server run beside it."""
     ground = make_mars_terrain(1, 24.0, 0.05)
-    with planner_and_processes() as (planner, processes):
-        reader = DiagnosticsReader(planner.node)
-        processes.start_server(ground, candidate_count=1)
-        planner.ask(SERVER, START, GOAL)
-        processes.start_rover(ground, RATE, START, PRIORITY)
+    with open_nodes() as nodes:
+        client = nodes.client()
+        reader = DiagnosticsReader(client.node)
+        nodes.start(SERVER, terrain_file=ground, candidate_count=1)
+        client.first_plan(START, GOAL)
+        nodes.start(CONTROLLER, rate=RATE, realtime_priority=PRIORITY, enabled_at_start=True)
+        start = {"start_x": START[0], "start_y": START[1], "follow_commands": True}
+        nodes.start("rover_simulator", rate=RATE, terrain_file=ground, **start)
         before, stolen = reader.wait_for_updates(int(RATE)), stolen_time()
         stop = threading.Event()
-        asked = threading.Thread(target=_ask_on, args=(planner, stop))
+        asked = threading.Thread(target=_ask_on, args=(client, stop))
         asked.start()
         time.sleep(TOGETHER_TIME)
         stolen = stolen_time() - stolen
         stop.set()
         asked.join()
         after = reader.wait_for_updates(int(before["updates"] + 0.9 * RATE * TOGETHER_TIME))
-    missed = after["missed_cycles"] - before["missed_cycles"]
     updates = int(after["updates"] - before["updates"])
-    return [
-        Figure("traction", "the same beside simulator and busy server, by the clock: median",
-               after["update_time_median_ms"], "ms", 0.5, repeats=updates),
-        Figure("traction", "the same: 99 of 100 within", after["update_time_p99_ms"], "ms", 2.0,
-               repeats=updates),
-        Figure("traction", "cycles missed at 100 Hz in a minute, a server busy beside it", missed,
-               "", 0.0, repeats=updates),
-        Figure("traction", "time that the host of a virtual machine took from it meanwhile",
-               1e3 * stolen, "ms"),
-        Figure("traction", "updates that fell back to equal torques", after["fallbacks"], "",
-               repeats=updates),
-    ]  # fmt: skip
+    together = "the same beside simulator and busy server, by the clock"
+    rows = (
+        (f"{together}: median", after["update_time_median_ms"], "ms", 0.5),
+        ("the same: 99 of 100 within", after["update_time_p99_ms"], "ms", 2.0),
+        ("cycles missed at 100 Hz in a minute, a server busy beside it",
+         after["missed_cycles"] - before["missed_cycles"], "", 0.0),
+        ("time that the host of a virtual machine took from it meanwhile",
+         1e3 * stolen, "ms", None),
+        ("updates that fell back to equal torques", after["fallbacks"], "", None),
+    )  # fmt: skip
+    return [Figure("traction", *row, repeats=updates) for row in rows]
 
 
 def stolen_time() -> float:
@@ -159,7 +156,7 @@ def stolen_time() -> float:
         return int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")
 
 
-def _ask_on(planner: Planner, stop: threading.Event) -> None:
+def _ask_on(client: Client, stop: threading.Event) -> None:
     """Send one query after another until `stop` is set."""
     while not stop.is_set():
-        planner.ask(SERVER, START, GOAL)
+        client.plan(START, GOAL)

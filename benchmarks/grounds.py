@@ -1,30 +1,23 @@
 """Grounds and poses that benchmarks run on."""
 
-import json
 import os
 from pathlib import Path
 
 import numpy as np
 
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics import Terrain, load_terrain
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.reference_cases import reference_ground
 
 ROOT = Path(__file__).resolve().parents[1]
-REFERENCE = ROOT / "test" / "data" / "settled_a.npz"
 MARGIN = 0.8
 """Distance of the poses from the map's edge [m]: the rover stays on the map."""
 
 
-def reference_ground(name: str) -> Terrain:
-    """Return a ground of the reference cases, 6 x 6 m at 2 cm."""
-    with np.load(REFERENCE) as entries:
-        meta = json.loads(str(entries["meta"]))
-        return Terrain(entries[f"terrain_{name}"], meta["res"], tuple(meta["origin"]))
-
-
 def all_grounds() -> dict[str, Terrain]:
     """Return grounds by name: flat, rocks, fractal, a generated Mars terrain, and a real map."""
-    grounds = {name: reference_ground(name) for name in ("flat", "rocks", "fractal")}
+    names = ("flat", "rocks", "fractal")
+    grounds = {name: reference_ground(f"settled_a/{name}").terrain for name in names}
     grounds["Mars-like"] = make_mars_terrain(1)
     for name, terrain in list(real_maps().items())[:1]:
         grounds[f"real map {name}"] = terrain
@@ -64,10 +57,7 @@ def random_poses(ground: Terrain, count: int) -> np.ndarray:
     return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
 
 
-def straight_paths(ground: Terrain, count: int) -> np.ndarray:
-    """Return about `count` poses (n, 3) along straight paths, 2 cm apart."""
-    xmin, xmax, ymin, ymax = ground.bounds
-    along = np.arange(xmin + MARGIN, min(xmax - MARGIN, xmin + MARGIN + 10.0), 0.02)
-    across = np.linspace(ymin + MARGIN, ymax - MARGIN, max(2, count // len(along)))
-    y, x = np.meshgrid(across, along, indexing="ij")
-    return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+def straight(length: float, x: float = 0.0, y: float = 0.0) -> np.ndarray:
+    """Return poses (n, 3) every 2 cm along x, of a length and with their middle at x, y [m]."""
+    along = x + np.arange(-0.5 * length, 0.5 * length, 0.02)
+    return np.column_stack([along, np.full_like(along, y), np.zeros_like(along)])

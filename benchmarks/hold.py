@@ -7,15 +7,16 @@ input is lost or the command becomes zero, and the steering stays as it is. Torq
 wheels two periods (40 ms) after the measurement.
 """
 
-import argparse
 from collections import deque
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
+import typer
 
-from rover_physics.rover.rover_file import load_rover
+from benchmarks.drives import LOOK_AHEAD, PERIOD
+from benchmarks.measure import print_table
+from rover_physics import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.parameters.traction_controller import (
     BRAKE,
@@ -28,13 +29,9 @@ from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.supervisor import TractionSupervisor
 from support.rough_grounds import plane
 
-PERIOD = 0.02
-"""Period of the controller [s]."""
 DELAY = 2
 """Periods from a measurement to its torques at the wheels."""
 FRICTION = 0.8
-LOOK_AHEAD = 0.5
-"""Look-ahead distance of the path follower [m]."""
 SETTLING_TIME = 1.0
 """Time at rest before the rover is enabled [s]."""
 EVENT_TIME = SETTLING_TIME + 3.0
@@ -119,34 +116,24 @@ def _measure(
         supervisor.permission.take_emergency_stop(True)
 
 
-def main() -> None:
+def main(
+    slope: Annotated[float, typer.Option(help="Slope in degrees.")] = 20.0,
+    seconds: Annotated[float, typer.Option(help="Time of rest in s.")] = 5.0,
+) -> None:
     """Run all cases and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--slope", type=float, default=20.0, help="slope [deg]")
-    parser.add_argument("--seconds", type=float, default=5.0, help="time of rest [s]")
-    arguments = parser.parse_args()
-    table = Table(
-        title=f"Slope of {arguments.slope:g} deg, friction {FRICTION:g}, {arguments.seconds:g} s "
-        "after the event"
-    )
-    headings = ("rover", "drives", "policy", "event", "state", "~/brake", "farthest [m]",
-                "end, uphill [m]", "speed [m/s]")  # fmt: skip
-    for heading in headings:
-        table.add_column(heading)
+    rows = []
     for rover in ROVERS:
         for policy in REST_POLICIES:
             for event in EVENTS:
                 for direction, sign in (("up", 1.0), ("down", -1.0)):
-                    slope = sign * np.radians(arguments.slope)
-                    rest = rest_on_slope(rover, policy, event, slope, arguments.seconds)
-                    table.add_row(
-                        rover, direction, policy, event, rest.state, str(rest.brake).lower(),
-                        f"{rest.peak:.3f}", f"{rest.end:+.3f}", f"{rest.speed:+.3f}",
-                    )  # fmt: skip
-    console = Console()
-    console.width = max(console.width, 130)
-    console.print(table)
+                    rest = rest_on_slope(rover, policy, event, sign * np.radians(slope), seconds)
+                    told = f"{rest.peak:.3f}", f"{rest.end:+.3f}", f"{rest.speed:+.3f}"
+                    rows.append((rover, direction, policy, event, rest.state, rest.brake, *told))
+    headings = ("rover", "drives", "policy", "event", "state", "~/brake", "farthest [m]",
+                "end, uphill [m]", "speed [m/s]")  # fmt: skip
+    title = f"Slope of {slope:g} deg, friction {FRICTION:g}, {seconds:g} s after the event"
+    print_table(title, headings, rows)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

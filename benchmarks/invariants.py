@@ -7,13 +7,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from rover_physics import Rover, SweepOptions, Terrain, Verdict, judge_path, load_rover
 from rover_physics.names import EQUAL
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.verdict import Verdict
 from support.rough_grounds import bouldered, fractal, rocky
 
 GROUNDS = (bouldered, rocky, fractal)
@@ -45,23 +40,6 @@ def ask(rover: Rover, terrain: Terrain, path: np.ndarray, options: SweepOptions)
     return judge_path(rover, terrain, path, options)[1]
 
 
-def find_passing(
-    rover: Rover, terrain: Terrain, path: np.ndarray, options: SweepOptions
-) -> np.ndarray:
-    """Return (n,) True for waypoints without a reason at which no wheel is falling."""
-    prediction, verdict = judge_path(rover, terrain, path, options)
-    return np.array([not reason for reason in verdict.reasons]) & ~prediction.falling.any(axis=1)
-
-
-def find_changes(rover: Rover, count: int, first_seed: int, policy: str) -> dict[str, list[int]]:
-    """Return the seeds of the courses that did not stand each change, and of those that pass."""
-    found: dict[str, list[int]] = {}
-    for seed in range(first_seed, first_seed + count):
-        for change in changes_of(rover, seed, policy):
-            found.setdefault(change, []).append(seed)
-    return found
-
-
 def changes_of(rover: Rover, seed: int, policy: str = EQUAL) -> Iterator[str]:
     """Yield the names of the changes that a course did not stand, and "passes" if it passes."""
     terrain, path = random_course(rover, seed)
@@ -70,19 +48,15 @@ def changes_of(rover: Rover, seed: int, policy: str = EQUAL) -> Iterator[str]:
     verdict = ask(rover, terrain, path, options)
     if verdict.traversable:
         yield "passes"
-    by_friction = [
-        ask(rover, terrain, path, replace(options, friction=mu)).traversable for mu in FRICTIONS
-    ]
-    if by_friction != sorted(by_friction):
-        yield "more friction makes it worse"
-    by_torque = [
-        ask(
-            rover, terrain, path, replace(options, max_torque=share * rover.wheel.max_torque)
-        ).traversable
-        for share in TORQUES
-    ]
-    if by_torque != sorted(by_torque):
-        yield "more torque makes it worse"
+    torques = [share * rover.wheel.max_torque for share in TORQUES]
+    for name, option, values in (
+        ("friction", "friction", FRICTIONS),
+        ("torque", "max_torque", torques),
+    ):
+        asked = [replace(options, **{option: value}) for value in values]
+        passes = [ask(rover, terrain, path, one).traversable for one in asked]
+        if passes != sorted(passes):
+            yield f"more {name} makes it worse"
     if not all(_agrees_in_halves(rover, terrain, path, options, verdict)):
         yield "splitting changes it"
     place = (terrain.origin[0] + SHIFT[0], terrain.origin[1] + SHIFT[1])
@@ -103,7 +77,9 @@ def _agrees_in_halves(
     "trapped" is not compared: it says that there is no way on from the end of a path, and the end
     of a half is another place, from which the other half may be the way on.
     """
-    passing = find_passing(rover, terrain, path, options)
+    prediction, judged = judge_path(rover, terrain, path, options)
+    passing = np.array([not reason for reason in judged.reasons])
+    passing &= ~prediction.falling.any(axis=1)
     for row in (len(path) // 3, len(path) // 2, 2 * len(path) // 3):
         if not passing[row]:
             continue
@@ -120,8 +96,11 @@ def main(
 ) -> None:
     """Print how many courses did not stand each change, and which."""
     for name in ("lsr1", "m2020"):
-        found = find_changes(load_rover(name), count, seed, policy)
-        print(f"{name}, {policy}: {count} courses, {len(found.pop('passes', []))} pass")
+        found: dict[str, list[int]] = {"passes": []}
+        for course in range(seed, seed + count):
+            for change in changes_of(load_rover(name), course, policy):
+                found.setdefault(change, []).append(course)
+        print(f"{name}, {policy}: {count} courses, {len(found.pop('passes'))} pass")
         for change, seeds in found.items():
             print(f"  {change}: {len(seeds)}, seeds {', '.join(map(str, seeds))}")
 

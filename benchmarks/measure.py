@@ -1,4 +1,4 @@
-"""Measurement and reports of benchmarks: medians of repeats, one table, one JSON file.
+"""Measurement and reports of benchmarks: medians of repeats, tables, JSON files.
 
 Functions that are compared run in turns, so that other load on the machine affects all of them.
 """
@@ -7,17 +7,21 @@ import json
 import math
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 REPEATS = 5
 """Default number of repeats of a measurement."""
 WIDTH = 140
-"""Width of the table in characters when the output is not a terminal."""
+"""Width of a table in characters when the output is not a terminal."""
+OUTPUT = Path("bench_output")
+"""Folder of the files with results."""
 
 
 @dataclass(frozen=True)
@@ -85,29 +89,47 @@ def quantile(values: Sequence[float], share: float) -> float:
     return ordered[max(0, math.ceil(share * len(ordered)) - 1)]
 
 
-def show(figures: list[Figure]) -> None:
-    """Print the figures as a table."""
-    table = Table(title="Medians; targets with a tick are met")
-    for heading in ("topic", "measured", "against"):
-        table.add_column(heading)
-    for heading in ("repeats", "value", "target", ""):
-        table.add_column(heading, justify="right")
-    for figure in figures:
-        target, mark = "", ""
-        if figure.target is not None:
-            target = f"{'>=' if figure.at_least else '<='} {figure.target:,g}"
-            mark = "✓" if figure.met else "✗"
-        large = abs(figure.value) >= 1000.0
-        value = f"{figure.value:,.0f}" if large else f"{figure.value:.3g}"
-        told = str(figure.repeats), f"{value} {figure.unit}", target, mark
-        table.add_row(figure.topic, figure.name, figure.against, *told)
-    console = Console()
-    console.width = console.width if console.is_terminal else WIDTH
-    console.print(table)
+def console(stderr: bool = False) -> Console:
+    """Return a console whose tables are not cut off where the output is a file."""
+    made = Console(stderr=stderr)
+    made.width = made.width if made.is_terminal else WIDTH
+    return made
 
 
-def write(figures: list[Figure], path: Path) -> None:
-    """Write the figures as JSON."""
+def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Print rows of texts and numbers as a table; columns of numbers are aligned to the right."""
+    table, cells = Table(title=escape(title)), [list(row) for row in rows]
+    for column, heading in enumerate(headings):
+        numeric = bool(cells) and all(str(row[column])[:1] in "-+0123456789" for row in cells)
+        table.add_column(escape(heading), justify="right" if numeric else "left")
+    for row in cells:
+        table.add_row(*(escape(str(cell)) for cell in row))
+    console().print(table)
+
+
+def print_figures(figures: Sequence[Figure]) -> None:
+    """Print figures as a table."""
+    headings = ("topic", "measured", "against", "repeats", "value", "target", "")
+    print_table("Medians; targets with a tick are met", headings, map(_row, figures))
+
+
+def _row(figure: Figure) -> list[Any]:
+    large = abs(figure.value) >= 1000.0
+    value = f"{figure.value:,.0f}" if large else f"{figure.value:.3g}"
+    target = mark = ""
+    if figure.target is not None:
+        target = f"{'>=' if figure.at_least else '<='} {figure.target:,g}"
+        mark = "✓" if figure.met else "✗"
+    value = f"{value} {figure.unit}".strip()
+    return [figure.topic, figure.name, figure.against, figure.repeats, value, target, mark]
+
+
+def write_figures(figures: Sequence[Figure], path: Path) -> None:
+    """Write figures as JSON."""
+    write_rows([{**asdict(figure), "met": figure.met} for figure in figures], path)
+
+
+def write_rows(rows: Any, path: Path) -> None:
+    """Write what was measured as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    rows = [{**asdict(figure), "met": figure.met} for figure in figures]
     path.write_text(json.dumps(rows, indent=1) + "\n")

@@ -1,19 +1,20 @@
 """Compares the model with MuJoCo in tables: settled cases, drives, curves (docs/validation.md).
 
-Run from the repository: python -m benchmarks.validate
+Run from the repository: python -m benchmarks.validate [--energy]
+
+With --energy, which needs the extra `bench`, drives are made anew and their energy is compared.
 """
 
-import numpy as np
-from rich.console import Console
-from rich.table import Table
+from typing import Annotated
 
-from rover_physics.prediction.sweep import sweep_path
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.verdict import hold_against_limits
+import numpy as np
+import typer
+
+from benchmarks.measure import console, print_table
+from rover_physics import SweepOptions, judge_path, load_rover
 from support.reference_cases import reference_predictions, steered_predictions
 from support.reference_drives import (
     PASSED,
-    Drive,
     curve_ground,
     curve_options,
     curve_path,
@@ -21,6 +22,7 @@ from support.reference_drives import (
     judge_drives,
     predict_trace,
     read_curves,
+    unlimited,
 )
 
 
@@ -45,69 +47,60 @@ def settled_errors(cases) -> dict[str, np.ndarray]:
     return {name: np.concatenate(parts) for name, parts in errors.items()}
 
 
-def settled_table(name: str, cases) -> Table:
-    """Return the errors of settled cases as a table."""
+def print_settled(name: str, cases) -> None:
+    """Print the errors of settled cases."""
     count = sum(len(case.poses) for case, _ in cases)
     settled = sum(int(prediction.settled.sum()) for _, prediction in cases)
-    table = Table(title=f"{name}: {settled} of {count} settle")
-    table.add_column("absolute error of")
-    for heading in ("median", "95 %", "worst"):
-        table.add_column(heading, justify="right")
-    for name, values in settled_errors(cases).items():
-        found = np.median(values), np.percentile(values, 95), values.max()
-        table.add_row(name, *(f"{value:.3f}" for value in found))
-    return table
+    rows = [
+        (what, *(f"{v:.3f}" for v in (np.median(e), np.percentile(e, 95), e.max())))
+        for what, e in settled_errors(cases).items()
+    ]
+    headings = ("absolute error of", "median", "95 %", "worst")
+    print_table(f"{name}: {settled} of {count} settle", headings, rows)
 
 
-def drives_table(policy: str) -> Table:
-    """Return a table of the drives whose outcome differs from the verdict under `policy`."""
+def print_drives(policy: str) -> None:
+    """Print the drives whose outcome differs from the verdict under `policy`."""
     rows, agree, wrongly_passed = [], 0, 0
     for drive, _, verdict in judge_drives(policy):
         if verdict.traversable == (drive.outcome == PASSED):
             agree += 1
-        else:
-            wrongly_passed += verdict.traversable
-            rows.append((*_describe(drive), verdict.reason or "passable"))
-    table = Table(
-        title=f"Drives under {policy} torques: {agree} of {agree + len(rows)} agree, "
-        f"{wrongly_passed} passable that got stuck or tipped"
+            continue
+        wrongly_passed += verdict.traversable
+        numbers = f"{drive.friction}", f"{drive.max_torque:.2f}"
+        told = drive.outcome, f"{drive.end:.2f}", verdict.reason or "passable"
+        rows.append((drive.label, *numbers, *told))
+    print_table(
+        f"Drives under {policy} torques: {agree} of {agree + len(rows)} agree, "
+        f"{wrongly_passed} passable that got stuck or tipped",
+        ("drive", "mu", "limit [N m]", "in MuJoCo", "ended at x [m]", "verdict"),
+        sorted(rows),
     )
-    for heading in ("drive", "mu", "limit [N m]", "in MuJoCo", "ended at x [m]", "verdict"):
-        table.add_column(heading)
-    for row in sorted(rows):
-        table.add_row(*row)
-    return table
 
 
-def curves_table() -> Table:
-    """Return a table of the curves whose outcome differs from the verdict under "servo"."""
+def print_curves() -> None:
+    """Print the curves whose outcome differs from the verdict under "servo"."""
     rows, agree, wrongly_passed = [], 0, 0
     for curve in read_curves():
-        rover, ground = curve_rover(curve), curve_ground(curve.kind, curve.size)
-        verdict = judge(rover, sweep_path(rover, ground, curve_path(curve), curve_options(curve)))
+        ground, path = curve_ground(curve.kind, curve.size), curve_path(curve)
+        verdict = judge_path(curve_rover(curve), ground, path, curve_options(curve))[1]
         if verdict.traversable == curve.kept:
             agree += 1
-        else:
-            wrongly_passed += verdict.traversable
-            kept = "kept" if curve.kept else "left"
-            rows.append((curve.label, f"{curve.friction}", kept, verdict.reason or "passable"))
-    table = Table(
-        title=f"Curves under servo torques: {agree} of {agree + len(rows)} agree, "
-        f"{wrongly_passed} passable that left their path"
+            continue
+        wrongly_passed += verdict.traversable
+        kept = "kept" if curve.kept else "left"
+        rows.append((curve.label, f"{curve.friction}", kept, verdict.reason or "passable"))
+    print_table(
+        f"Curves under servo torques: {agree} of {agree + len(rows)} agree, "
+        f"{wrongly_passed} passable that left their path",
+        ("curve", "mu", "path in MuJoCo", "verdict"),
+        rows,
     )
-    for heading in ("curve", "mu", "path in MuJoCo", "verdict"):
-        table.add_column(heading)
-    for row in rows:
-        table.add_row(*row)
-    return table
 
 
-def traces_table() -> Table:
-    """Return the median errors of wheel forces and mean torques along the traces of curves."""
-    table = Table(title="Along the traces of curves, under servo torques")
-    for heading in ("mode", "curves", "wheel force [% of the weight]", "mean torque [%]"):
-        table.add_column(heading)
-    weight = load_rover("lsr1").weight
+def print_traces() -> None:
+    """Print the median errors of wheel forces and mean torques along the traces of curves."""
+    weight, rows = load_rover("lsr1").weight, []
     for mode in ("steered", "spot", "skid", "skid_spot"):
         forces, torques = [], []
         for curve in read_curves():
@@ -120,27 +113,48 @@ def traces_table() -> Table:
                 ours, theirs = np.abs([found.torque[drives], curve.torques[drives]]).mean((1, 2))
                 torques.append(100.0 * (ours / theirs - 1.0))
         values = np.median(np.concatenate(forces)), np.median(torques)
-        table.add_row(mode, f"{len(forces)}", *(f"{value:.1f}" for value in values))
-    return table
+        rows.append((mode, len(forces), *(f"{value:.1f}" for value in values)))
+    headings = ("mode", "curves", "wheel force [% of the weight]", "mean torque [%]")
+    print_table("Along the traces of curves, under servo torques", headings, rows)
 
 
-def _describe(drive: Drive) -> tuple[str, ...]:
-    numbers = f"{drive.friction}", f"{drive.max_torque:.2f}"
-    return drive.label, *numbers, drive.outcome, f"{drive.end:.2f}"
+def print_energy(step: int = 1) -> None:
+    """Drive over every `step`-th obstacle with speed servos, and print the energy with ours.
+
+    MuJoCo's time step is 2 ms: with the usual 4 ms its wheels chatter on their contacts.
+    """
+    from benchmarks.drives import DROOP, END, OBSTACLES, START, drive, run_in_processes
+
+    x = np.linspace(START, END, round((END - START) / 0.01) + 1)
+    path, rows, errors = np.column_stack([x, 0.0 * x, 0.0 * x]), [], []
+    obstacles = OBSTACLES[::step]
+    jobs = [(obstacle, DROOP, 1, 2.0, 0.002) for obstacle in obstacles]
+    for obstacle, row in zip(obstacles, run_in_processes(drive, jobs, None), strict=True):
+        if row.passed:
+            options = SweepOptions(policy="servo", friction=obstacle.friction)
+            rover, ground = unlimited(obstacle.rover), obstacle.ground
+            ours = float(judge_path(rover, ground, path, options)[0].energy[-1])
+            errors.append(abs(ours / row.energy - 1.0))
+            rows.append((obstacle.label, f"{row.energy:.1f}", f"{ours:.1f}"))
+    rows.append(("median error", "", f"{np.median(errors):.0%}"))
+    title = "Speed servos over 2.4 m at 6 cm/s"
+    print_table(title, ("obstacle", "energy in MuJoCo [J]", "of the model [J]"), rows)
 
 
-def main() -> None:
+def main(
+    energy: Annotated[bool, typer.Option("--energy", help="Compare energy, too.")] = False,
+) -> None:
     """Print all tables."""
-    console = Console()
-    console.print(settled_table("Settled cases", reference_predictions()))
-    console.print(settled_table("Settled with turned wheels", steered_predictions()))
+    print_settled("Settled cases", reference_predictions())
+    print_settled("Settled with turned wheels", steered_predictions())
     for policy in ("optimal", "servo", "equal"):
-        with console.status(f"drives, {policy}"):
-            table = drives_table(policy)
-        console.print(table)
-    console.print(curves_table())
-    console.print(traces_table())
+        with console(stderr=True).status(f"drives, {policy}"):
+            print_drives(policy)
+    print_curves()
+    print_traces()
+    if energy:
+        print_energy()
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

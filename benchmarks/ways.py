@@ -3,69 +3,177 @@
 Run from the repository, on one core: taskset -c 0 python -m benchmarks.ways --count 100
 """
 
-import json
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
+from unittest import mock
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
+from numpy.typing import NDArray
 
-from benchmarks.measure import WIDTH, quantile
-from benchmarks.way_trials.estimate import check_estimate, rank_difficulty
-from benchmarks.way_trials.grounds import Case, Pair, grounds
-from benchmarks.way_trials.trial import Trial, same_on_threads, search, try_pair, try_warm
-from benchmarks.way_trials.truth import NoTruthError, Truth
+from benchmarks.grounds import real_maps
+from benchmarks.measure import console, print_table, quantile, write_rows
+from rover_physics import Rover, Terrain, judge_path, load_rover
 from rover_physics.names import EQUAL
-from rover_physics.rover.rover_file import load_rover
-from rover_planner.planning.ways.way_search import FOUND
+from rover_planner.planning.lattice.judge import Judge
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.planning.ways.question import WayQuestion
+from rover_planner.planning.ways.way_search import FOUND, LatticeSettings, WayAnswer, find_way
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 
+Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Start and goal, (3,) each."""
 Rows = list[dict[str, Any]]
 """One record for each pair."""
+NEAREST, FURTHEST = 4.0, 20.0
+"""Distances of start and goal [m]."""
+MADE = {
+    "rocks": {"seed": 17, "rock_cover": 0.2, "crater_density": 0.0},
+    "craters": {"seed": 18, "rock_cover": 0.01, "crater_density": 0.1},
+}
+"""Arguments of the made Mars terrains, 24 x 24 m at 5 cm."""
+DRAWN = 2000
+"""Number of poses drawn at a time."""
+SIDE, CHANGE = 1.0, 0.02
+"""Side of the square of the map that changes, and largest change of the heights in it [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A rover on a ground."""
+
+    name: str
+    """Name of the ground."""
+    rover: Rover
+    """The rover."""
+    terrain: Terrain
+    """The ground."""
+    policy: str = EQUAL
+    """Torque policy."""
+
+    @cached_property
+    def options(self) -> PathQueryOptions:
+        """The options of `rover_planner plan`."""
+        return PathQueryOptions().change(policy=self.policy, control_margin=0.0)
+
+    @property
+    def judge(self) -> Judge:
+        """A new judge."""
+        return Judge(self.rover, self.terrain, self.options)
+
+    def question(self, pair: Pair, terrain: Terrain | None = None) -> WayQuestion:
+        """Return the question for a way between two poses."""
+        return WayQuestion(self.rover, terrain or self.terrain, *pair, self.options)
+
+    def search(
+        self,
+        pair: Pair,
+        budget: float,
+        memory: EdgeMemory | None = None,
+        terrain: Terrain | None = None,
+    ) -> WayAnswer:
+        """Search a way; CPU time is its clock, so that other programs do not cut its budget."""
+        with mock.patch("time.perf_counter", time.process_time):
+            question, settings = self.question(pair, terrain), LatticeSettings(budget=budget)
+            return find_way(question, settings, memory)
+
+    def pairs(self, count: int, seed: int) -> list[Pair]:
+        """Return random pairs of poses on which the rover can stand, NEAREST to FURTHEST apart."""
+        rng, found = np.random.default_rng(seed), []
+        standing = self._standing(rng)
+        start, misses = next(standing), 0
+        while len(found) < count:
+            goal = next(standing)
+            if NEAREST <= np.hypot(*(goal - start)[:2]) <= FURTHEST:
+                found.append((start, goal))
+                start, misses = next(standing), 0
+            elif (misses := misses + 1) > 100:
+                start, misses = next(standing), 0
+        return found
+
+    def _standing(self, rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
+        """Yield random poses (3,) on which the rover can stand, without end."""
+        xmin, xmax, ymin, ymax = self.terrain.bounds
+        while True:
+            poses = rng.uniform((xmin, ymin, -np.pi), (xmax, ymax, np.pi), (DRAWN, 3))
+            stands = np.array([code == "" for code in self.judge.stand(poses)])
+            if not stands.any():
+                raise ValueError(f"the rover stands at none of {DRAWN} poses on {self.name}")
+            yield from poses[stands]
 
 
 def run_case(case: Case, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield what is found of each pair of a ground, and last of the ground as a whole."""
+    """Yield what is found of each pair of a ground.
+
+    `asked` has the options of `main`: count, seed, budget, truth, truth_seconds and warm.
+    """
+    from benchmarks.best_of_lattice import NoTruthError, Truth
+
     pairs = case.pairs(asked["count"], asked["seed"])
-    search(case, pairs[0], asked["budget"])  # compiles, and reads the code from the disk
+    case.search(pairs[0], asked["budget"])  # compiles, and reads the code from the disk
     truth = Truth(case) if asked["truth"] else None
     for index, pair in enumerate(pairs):
-        trial = try_pair(case, pair, index, asked["budget"])
-        yield {**asdict(trial), **compare(case, pair, trial, truth, asked)}
-    if asked["nodes"]:
-        yield {"ground": case.name, **check_estimate(case, asked["nodes"])}
-    if asked["edges"]:
-        yield {"ground": case.name, **rank_difficulty(case, asked["edges"])}
+        row = try_pair(case, pair, asked["budget"])
+        if truth is not None and index < asked["truth"]:
+            try:
+                row["best"] = truth.find(pair, asked["truth_seconds"])
+            except NoTruthError:
+                row["best"] = np.nan
+        if index < asked["warm"]:
+            answer = try_warm(case, pair, asked["budget"], index)
+            row |= {"warm_outcome": answer.outcome, "warm_first": answer.seconds_first}
+        yield row
 
 
-def compare(
-    case: Case, pair: Pair, trial: Trial, truth: Truth | None, asked: dict[str, Any]
-) -> dict[str, Any]:
-    """Return what else is asked for of a pair: the best cost, the warm case, OMPL, threads."""
-    found: dict[str, Any] = {}
-    if truth is not None and trial.pair < asked["truth"]:
-        try:
-            found["best"] = truth.find(pair, asked["truth_seconds"])
-        except NoTruthError:
-            found["best"] = np.nan
-        found["truth_judged"], found["truth_edges"] = truth.judged, truth.count
-    if trial.pair < asked["warm"]:
-        answer = try_warm(case, pair, asked["budget"], trial.pair)
-        found["warm_outcome"], found["warm_first"] = answer.outcome, answer.seconds_first
-    if trial.pair < asked["ompl"]:
-        from benchmarks.way_trials.sampling import sample_way
+def try_pair(case: Case, pair: Pair, budget: float) -> dict[str, Any]:
+    """Search a way, judge it once more as `predict` does, and return what was found."""
+    answer = case.search(pair, budget)
+    passes = None
+    if answer.path is not None:
+        options = case.options.model
+        passes = judge_path(case.rover, case.terrain, answer.path.poses, options)[1].traversable
+    return {
+        "ground": case.name,
+        "distance": float(np.hypot(*(pair[1] - pair[0])[:2])),
+        "outcome": answer.outcome,
+        "seconds_first": answer.seconds_first,
+        "seconds": answer.seconds,
+        "length": np.nan if answer.path is None else answer.path.length,
+        "cost": answer.cost,
+        "bound": answer.bound,
+        "judged_share": answer.edges_judged / max(1, answer.edges),
+        "repeatable": answer.repeatable,
+        "passes": passes,
+    }
 
-        seconds = asked["ompl_seconds"]
-        sampled = sample_way(case, pair, asked["ompl_planner"], seconds, 1 + trial.pair)
-        found |= {f"ompl_{name}": value for name, value in asdict(sampled).items()}
-    if trial.pair < asked["threads"]:
-        found["same_on_threads"] = same_on_threads(case, pair, asked["budget"])
-    return found
+
+def try_warm(case: Case, pair: Pair, budget: float, seed: int) -> WayAnswer:
+    """Return the answer after a change of the map near a way.
+
+    The way is searched first, then heights in a square on it change, and it is searched again with
+    what is known. Without a first way, the square lies midway between start and goal.
+    """
+    memory = EdgeMemory()
+    before = case.search(pair, budget, memory)
+    middle = 0.5 * (pair[0] + pair[1])
+    if before.path is not None:
+        middle = before.path.poses[len(before.path.poses) // 2]
+    return case.search(pair, budget, memory, change_heights(case.terrain, middle, seed))
+
+
+def change_heights(terrain: Terrain, middle: np.ndarray, seed: int) -> Terrain:
+    """Return the ground with other heights in a square of SIDE around a place: a smooth bump."""
+    x = terrain.origin[0] + terrain.resolution * np.arange(terrain.elevation.shape[1])
+    y = terrain.origin[1] + terrain.resolution * np.arange(terrain.elevation.shape[0])
+    along, across = (np.abs(v - m) / (0.5 * SIDE) for v, m in zip((x, y), middle, strict=False))
+    shape = np.clip(1.0 - across**2, 0.0, None)[:, None] * np.clip(1.0 - along**2, 0.0, None)
+    height = np.random.default_rng(seed).uniform(-CHANGE, CHANGE)
+    return replace(terrain, elevation=terrain.elevation + height * shape)
 
 
 def tell(values: Sequence[float], digits: int = 2) -> str:
@@ -76,81 +184,46 @@ def tell(values: Sequence[float], digits: int = 2) -> str:
     return f"{quantile(known, 0.5):.{digits}f}; {quantile(known, 0.95):.{digits}f}"
 
 
-def column(rows: Rows, name: str) -> list[Any]:
-    """Return the values of a name in the rows that have it."""
-    return [row[name] for row in rows if name in row]
-
-
 def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
     """Yield the lines of the table for one ground, each a name and a value."""
-    trials = [row for row in rows if "outcome" in row]
-    outcomes = column(trials, "outcome")
-    ways = [row for row in trials if row["outcome"] == FOUND]
-    yield "pairs", str(len(trials))
-    yield "outcomes", ", ".join(f"{name} {outcomes.count(name)}" for name in sorted({*outcomes}))
-    yield "ways that judge_path passes", f"{sum(column(ways, 'passes'))} of {len(ways)}"
-    yield "first way [s]: median; 95 %", tell(column(ways, "seconds_first"))
+
+    def column(name: str, rows: Rows = rows) -> list[Any]:
+        return [row[name] for row in rows]
+
+    outcomes, ways = column("outcome"), [row for row in rows if row["outcome"] == FOUND]
     far = [row for row in ways if row["distance"] > 12.0]
-    yield "first way beyond 12 m [s]", f"{tell(column(far, 'seconds_first'))} ({len(far)})"
-    yield "whole search [s]", tell(column(trials, "seconds"))
-    yield "judged edges [%]: median; 95 %", tell([100 * v for v in column(trials, "judged_share")])
-    yield "judged edges [%]: mean", f"{100 * np.mean(column(trials, 'judged_share')):.3f}"
-    yield "bound: median; 95 %", tell(column(ways, "bound"))
-    yield "not ended by the clock", f"{sum(column(trials, 'repeatable'))} of {len(trials)}"
-    yield from summarise_comparisons(trials)
-    for row in rows:
-        if "checked" in row:
-            yield "nodes refused by the cheap test", f"{100 * row['share']:.1f} %"
-            yield "of these the model passes", f"{row['wrong']} of {row['checked']:,}"
-        if "rank" in row:
-            yield "random edges refused", f"{row['refused']} of {row['ranked']:,}"
-            yield "of more difficulty than those that pass", f"{100 * row['rank']:.0f} %"
-
-
-def summarise_comparisons(trials: Rows) -> Iterator[tuple[str, str]]:
-    """Yield the lines about the best of the lattice, the warm case, OMPL and threads."""
-    known = [row for row in trials if not np.isnan(row.get("best", np.nan))]
+    yield "pairs", str(len(rows))
+    yield "outcomes", ", ".join(f"{name} {outcomes.count(name)}" for name in sorted({*outcomes}))
+    yield "ways that judge_path passes", f"{sum(column('passes', ways))} of {len(ways)}"
+    yield "first way [s]: median; 95 %", tell(column("seconds_first", ways))
+    yield "first way beyond 12 m [s]", f"{tell(column('seconds_first', far))} ({len(far)})"
+    yield "whole search [s]", tell(column("seconds"))
+    yield "judged edges [%]: median; 95 %", tell([100 * v for v in column("judged_share")])
+    yield "judged edges [%]: mean", f"{100 * np.mean(column('judged_share')):.3f}"
+    yield "bound: median; 95 %", tell(column("bound", ways))
+    yield "not ended by the clock", f"{sum(column('repeatable'))} of {len(rows)}"
+    known = [row for row in rows if not np.isnan(row.get("best", np.nan))]
     if known:
         connected = [row for row in known if np.isfinite(row["best"])]
         found = [row for row in connected if row["outcome"] == FOUND]
+        beyond = sum(row["outcome"] == FOUND for row in known) - len(found)
         yield "pairs with known truth", str(len(known))
         yield "found of connected", f"{len(found)} of {len(connected)}"
-        beyond = sum(row["outcome"] == FOUND for row in known) - len(found)
         yield "found though not connected", str(beyond)
         over = [100.0 * (row["cost"] / row["best"] - 1.0) for row in found]
         yield "cost over the best [%]", tell(over, 1)
-    warm = [row for row in trials if row.get("warm_outcome") == FOUND]
+    warm = [row for row in rows if row.get("warm_outcome") == FOUND]
     if warm:
-        yield "warm: first way [s]", f"{tell(column(warm, 'warm_first'))} ({len(warm)})"
-    sampled = [row for row in trials if "ompl_cpu" in row]
-    if sampled:
-        both = [row for row in sampled if row["ompl_length"] > 0 and row["outcome"] == FOUND]
-        yield "OMPL: found", f"{sum(row['ompl_length'] > 0 for row in sampled)} of {len(sampled)}"
-        yield "ours: found of the same", str(sum(row["outcome"] == FOUND for row in sampled))
-        yield "OMPL: first way [s]", tell(column(both, "ompl_cpu"))
-        ratios = [row["ompl_cpu"] / row["seconds_first"] for row in both]
-        yield "OMPL over ours, first way", tell(ratios, 1)
-        yield "OMPL slower", f"{sum(ratio > 1.0 for ratio in ratios)} of {len(both)}"
-    threads = [same for same in column(trials, "same_on_threads") if same is not None]
-    if threads:
-        yield "same way on two threads", f"{sum(threads)} of {len(threads)}"
+        yield "warm: first way [s]", f"{tell(column('warm_first', warm))} ({len(warm)})"
 
 
 def show(rows: Rows) -> None:
     """Print the table."""
     names = list(dict.fromkeys(row["ground"] for row in rows))
-    columns = {
-        name: dict(summarise([row for row in rows if row["ground"] == name])) for name in names
-    }
-    table = Table(title="Median; 95th percentile. Times are CPU time")
-    table.add_column("")
-    for name in names:
-        table.add_column(name, justify="right")
-    for line in dict.fromkeys(line for values in columns.values() for line in values):
-        table.add_row(escape(line), *(values.get(line, "") for values in columns.values()))
-    console = Console()
-    console.width = console.width if console.is_terminal else WIDTH
-    console.print(table)
+    columns = [dict(summarise([row for row in rows if row["ground"] == name])) for name in names]
+    lines = dict.fromkeys(line for values in columns for line in values)
+    cells = [(line, *(values.get(line, "") for values in columns)) for line in lines]
+    print_table("Median; 95th percentile. Times are CPU time", ("", *names), cells)
 
 
 def main(
@@ -167,28 +240,22 @@ def main(
         float, typer.Option(help="Longest time for one of these in s.")
     ] = 300,
     warm: Annotated[int, typer.Option(help="Pairs asked again after a change of the map.")] = 0,
-    ompl: Annotated[int, typer.Option(help="Pairs that OMPL is asked about, too.")] = 0,
-    ompl_seconds: Annotated[float, typer.Option(help="Time after which OMPL gives up, s.")] = 20,
-    ompl_planner: Annotated[str, typer.Option(help="BITstar, RRTConnect, RRTstar.")] = "BITstar",
-    threads: Annotated[int, typer.Option(help="Pairs searched on one and on two threads.")] = 0,
-    nodes: Annotated[int, typer.Option(help="Nodes with which the cheap test is checked.")] = 0,
-    edges: Annotated[int, typer.Option(help="Edges that rank the difficulty.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Write all rows as JSON lines.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write all rows as JSON.")] = None,
 ) -> None:
     """Search ways between random poses and print what was found, in what time."""
-    asked = dict(locals())
-    console, rows = Console(stderr=True), []
-    for name, terrain in grounds().items():
+    asked, rows = dict(locals()), []
+    made = {name: make_mars_terrain(**arguments) for name, arguments in MADE.items()}
+    for name, terrain in {**real_maps(), **made}.items():
         if ground and not any(name.startswith(beginning) for beginning in ground):
             continue
         began = time.perf_counter()
         for row in run_case(Case(name, load_rover(rover), terrain, policy), asked):
             rows.append(row)
-            if out is not None:
-                with out.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row) + "\n")
-            console.print(f"{name} {len(rows)}, {time.perf_counter() - began:.0f} s", row)
+            taken = time.perf_counter() - began
+            console(stderr=True).print(f"{name} {len(rows)}, {taken:.0f} s", row)
     show(rows)
+    if out is not None:
+        write_rows(rows, out)
 
 
 if __name__ == "__main__":

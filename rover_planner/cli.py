@@ -1,9 +1,11 @@
 """The command `rover_planner`: its subcommands and its exit code."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 
+from rover_physics import __version__
 from rover_planner.command.demo import demo
 from rover_planner.command.figure4 import figure4
 from rover_planner.command.plan import plan, replay_plan
@@ -30,6 +32,27 @@ app = typer.Typer(
 )
 NEGATIVE_ARGUMENTS = {"ignore_unknown_options": True}
 """Makes typer accept negative numbers as arguments; options accept them anyway."""
+
+
+
+def _print_version(asked: bool) -> None:
+    """Print the version and end, if it was asked for."""
+    if asked:
+        typer.echo(f"{NAME} {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _take_options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version.", callback=_print_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    pass
+
 
 app.command()(predict)
 app.command(cls=PoseCommand)(plan)

@@ -1,4 +1,4 @@
-"""The smallest friction utilisation of any torques, by independent linear programs."""
+"""Whether any torques do with a friction utilisation, by independent linear programs."""
 
 import numpy as np
 from scipy.optimize import linprog
@@ -17,34 +17,18 @@ def can_stand(rover, prediction, i, utilisation, max_torque) -> bool:
     """
     A, b, along = balance_matrix(rover, prediction, i)
     turns = 2.0 * np.pi * np.arange(SIDES_OF_THE_CONE) / SIDES_OF_THE_CONE
-    rows = []
+    rows = np.zeros((6, SIDES_OF_THE_CONE, 14))
     for wheel in range(6):
-        mu = prediction.friction[i, wheel]
-        for c, s in zip(np.cos(turns), np.sin(turns), strict=True):
-            row = np.zeros(14)
-            row[wheel], row[6 + wheel] = -utilisation * mu, c
-            row[12], row[13] = s, s * along[wheel]
-            rows.append(row)
+        rows[wheel, :, wheel] = -utilisation * prediction.friction[i, wheel]
+        rows[wheel, :, 6 + wheel] = np.cos(turns)
+        rows[wheel, :, 12:] = np.sin(turns)[:, None] * [1.0, along[wheel]]
+    rows = rows.reshape(-1, 14)
     pull = max_torque / (rover.wheel.radius * rover.weight)
     bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + [(None, None)] * 2
-    program = np.zeros(14), np.array(rows), np.zeros(len(rows)), A, b, bounds
+    program = np.zeros(14), rows, np.zeros(len(rows)), A, b, bounds
     for method in ("highs", "highs-ipm", "highs-ds"):  # the others where one does not decide
         answer = linprog(*program, method=method)
         if answer.status in (0, 2):
             break
     assert answer.status in (0, 2), answer.message
     return answer.status == 0
-
-
-def least_utilisation(rover, prediction, i, max_torque, most=20.0) -> float:
-    """Return a lower bound, within 0.3 %, of the friction utilisation that waypoint i needs."""
-    low, high = 0.0, most
-    if not can_stand(rover, prediction, i, most, max_torque):
-        return np.inf
-    while high - low > 1e-3 * high + 1e-5:
-        middle = 0.5 * (low + high)
-        if can_stand(rover, prediction, i, middle, max_torque):
-            high = middle
-        else:
-            low = middle
-    return low

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_path, judge_poses
 
 DATA = Path(__file__).resolve().parents[1] / "test" / "data"
 FILES = ("settled_a.npz", "settled_b.npz")
@@ -93,7 +93,7 @@ def reference_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...
     """Return the model's predictions for all reference cases under equal torques."""
     rover = load_rover("lsr1")
     grounds = reference_grounds()
-    return tuple((case, sweep_path(rover, case.terrain, case.poses)) for case in grounds)
+    return tuple((case, judge_path(rover, case.terrain, case.poses)[0]) for case in grounds)
 
 
 @lru_cache(maxsize=1)
@@ -101,7 +101,7 @@ def steered_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
     """Return the model's predictions for the cases with turned wheels under equal torques."""
     rover = load_rover("lsr1")
     return tuple(
-        (case, sweep_poses(rover, case.terrain, case.poses, case.curvature))
+        (case, judge_poses(rover, case.terrain, case.poses, case.curvature)[0])
         for case in steered_grounds()
     )
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_physics.traversability.verdict import Verdict, hold_against_limits
 
 DRIVES = Path(__file__).resolve().parents[1] / "test" / "data" / "drives.json"
 RESOLUTION = 0.02
@@ -100,13 +100,13 @@ def unlimited(rover: Rover) -> Rover:
 def judge_drive(drive: Drive, policy: str) -> tuple[PathPrediction, Verdict]:
     """Return prediction and verdict of a drive."""
     rover = unlimited(load_rover("lsr1"))
-    prediction = sweep_path(
+    prediction = judge_path(
         rover,
         drive_ground(drive.kind, drive.size),
         drive_path(),
         SweepOptions(friction=drive.friction, max_torque=drive.max_torque, policy=policy),
-    )
-    return prediction, judge(rover, prediction)
+    )[0]
+    return prediction, hold_against_limits(rover, prediction)
 
 
 def judge_drives(policy: str) -> Iterator[tuple[Drive, PathPrediction, Verdict]]:
@@ -228,10 +228,10 @@ def curve_options(curve: Curve) -> SweepOptions:
 
 def predict_trace(curve: Curve) -> PathPrediction:
     """Return the prediction at the poses of the trace."""
-    return sweep_poses(
+    return judge_poses(
         curve_rover(curve),
         curve_ground(curve.kind, curve.size),
         curve.poses,
         np.full(len(curve.poses), curve.curvature),
         curve_options(curve),
-    )
+    )[0]

@@ -42,9 +42,10 @@ def domain_id() -> int:
 class RosRun:
     """A context with nodes; each node has its own executor and thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, domain: int | None = None) -> None:
+        """Begin on a domain, by default that of this test process."""
         self.context = Context()
-        rclpy.init(context=self.context, domain_id=domain_id())
+        rclpy.init(context=self.context, domain_id=domain_id() if domain is None else domain)
         self._ending = threading.Event()
         self._spinning: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 
 RESOLUTION = 0.04
@@ -96,6 +97,16 @@ def mirrored(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
         friction=friction,
     )
     return flipped, poses * [1.0, -1.0, -1.0]
+
+
+def scaled_for(
+    rover: Rover, ground: Terrain, poses: np.ndarray, radius: float = 0.1
+) -> tuple[Terrain, np.ndarray]:
+    """Return ground and poses as large for a rover as they are for one with wheels of `radius`."""
+    size = rover.wheel.radius / radius
+    x, y = ground.origin
+    scaled = Terrain(ground.elevation * size, ground.resolution * size, (x * size, y * size))
+    return scaled, poses * [size, size, 1.0]
 
 
 def _grid(half: float) -> tuple[np.ndarray, np.ndarray]:

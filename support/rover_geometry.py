@@ -196,9 +196,9 @@ def free_balance_matrix(
     return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
 
 
-COARSE_ANGLES, COARSE_ACROSS = 241, 33
+COARSE_ANGLES, COARSE_ACROSS = 121, 17
 """Points along and across a wheel in the first look of `wheel_gaps`."""
-STARTS, REFINEMENTS = 8, 7
+STARTS, REFINEMENTS = 6, 7
 """Nearest points that are refined, and how often the spacing is divided by three."""
 
 

@@ -42,16 +42,27 @@ def make_request(**changes) -> SurveyRequest:
     return SurveyRequest(load_rover("lsr1"), options, **({"headings": 4} | changes))
 
 
+def prepare_here(
+    folder: Path, terrain: Terrain, request: SurveyRequest, **changes
+) -> PreparedSurvey:
+    """Save a terrain and make the store of its survey beside it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_terrain(folder / "map.npz", terrain)
+    return prepare_survey(request, str(folder / "map.npz"), folder / "out", **changes)
+
+
+def compute_here(prepared: PreparedSurvey) -> PreparedSurvey:
+    """Survey the chunks that are left in this process, without a cluster."""
+    for chunk in prepared.chunks:
+        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+    return prepared
+
+
 def survey_here(
     folder: Path, terrain: Terrain, request: SurveyRequest, **changes
 ) -> PreparedSurvey:
     """Survey a terrain in this process, without a cluster; return it with its store."""
-    folder.mkdir(parents=True, exist_ok=True)
-    save_terrain(folder / "map.npz", terrain)
-    prepared = prepare_survey(request, str(folder / "map.npz"), folder / "out", **changes)
-    for chunk in prepared.chunks:
-        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
-    return prepared
+    return compute_here(prepare_here(folder, terrain, request, **changes))
 
 
 def layers_of(prepared: PreparedSurvey) -> dict[str, np.ndarray]:

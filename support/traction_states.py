@@ -3,11 +3,11 @@
 import numpy as np
 
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
+from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import fractal, random_poses, rocky
 from support.rover_geometry import wheel_axes
 
@@ -31,7 +31,7 @@ def rough_states(rover: Rover, count: int):
     left = count
     for seed in range(100):
         ground = (rocky if seed % 2 else fractal)(seed)
-        prediction = sweep_path(rover, ground, random_poses(seed, 260, 1.8))
+        prediction = judge_path(rover, ground, random_poses(seed, 260, 1.8))[0]
         for i in np.flatnonzero(prediction.settled):
             if not left:
                 return
@@ -42,7 +42,7 @@ def rough_states(rover: Rover, count: int):
 def drive_states(rover: Rover, ground: Terrain, speed: float = 0.03, start: float = -1.2):
     """Return prediction, motions and time step [s] of a slow drive along +x."""
     x = np.linspace(start, -start, 1201)
-    prediction = sweep_path(rover, ground, np.column_stack([x, 0.0 * x, 0.0 * x]))
+    prediction = judge_path(rover, ground, np.column_stack([x, 0.0 * x, 0.0 * x]))[0]
     duration = (x[1] - x[0]) / speed
 
     def rate(values):

@@ -7,10 +7,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
 
 ROUNDING = 1e-6
@@ -109,14 +109,14 @@ def draw_path(
     sigmas: float = 3.0,
 ) -> Outcome:
     """Predict a path on random maps and compare the values with their bounds."""
-    prediction = sweep_path(rover, terrain, poses, SweepOptions(policy=policy))
+    prediction = judge_path(rover, terrain, poses, SweepOptions(policy=policy))[0]
     bounds = bound_path(rover, terrain, prediction, SweepOptions(policy=policy), sigmas=sigmas)
     rows = bounds.bounded
     limits = {name: getattr(bounds, name)[rows] for name in BOUNDED_VALUES}
     drawn: dict[str, list[np.ndarray]] = {name: [] for name in BOUNDED_VALUES}
     outside = dict.fromkeys((*BOUNDED_VALUES, "no pose", "any"), 0)
     for sample in draw_maps(terrain, length, count, seed):
-        swept = sweep_path(rover, sample, poses, SweepOptions(policy=policy))
+        swept = judge_path(rover, sample, poses, SweepOptions(policy=policy))[0]
         beyond = ~swept.settled[rows]
         outside["no pose"] += int(beyond.sum())
         for name, limit in limits.items():

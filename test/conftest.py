@@ -15,17 +15,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell's background job ignores it, and so would every child that a test interrupts.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-LONGEST = (
-    "test_docs_blocks",
-    "test_drive_around",
-    "test_warm_up",
-    "test_lowest_versions",
-    "test_survey_command",
-    "test_benchmarks",
-    "test_workspace",
-    "test_reliability",
-)
-"""Files that take minutes. They begin first, so that none is left alone on one core at the end."""
+LONGEST = ("test_docs_blocks", "test_survey_command", "test_demo", "test_processes")
+"""Files that take longest. They begin first, so that none is left alone on one core at the end."""
 
 
 def pytest_runtest_logreport(report):

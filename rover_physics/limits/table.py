@@ -29,6 +29,8 @@ TRAPPED = "trapped"
 """Code of a path that leads to where the rover gets neither on nor back."""
 NOT_COMPUTABLE = "not_computable"
 """Code of a value that is not a number; it counts as a broken limit."""
+WHEEL_CONSTRAINTS = ("wheel_lift", "friction", "torque")
+"""Codes of the paper's three constraints."""
 
 Bound = float | tuple[float, float] | None
 

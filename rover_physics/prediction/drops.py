@@ -84,7 +84,10 @@ def _find_falls(wheels, poses, results, between):
         last = here
     for k in range(n + m):
         i = order[k]
-        if angle[k].min() < -MIN_ANGLE:
+        lowest = 0.0
+        for wheel in range(6):
+            lowest = min(lowest, angle[k, wheel])
+        if lowest < -MIN_ANGLE:
             result = results[i] if i < n else between.results[i - n]
             _find_falling(angle[k], result, wheels, falling[k])
     first_open = _find_first_open(falling)
@@ -98,7 +101,10 @@ def _find_falls(wheels, poses, results, between):
         i = order[k]
         if i < n and k < first_open:
             decided += 1
-            if not np.any(falling[k]) and not np.any(fallen[k] > 0.0):
+            some = False
+            for wheel in range(6):
+                some = some or falling[k, wheel] or fallen[k, wheel] > 0.0
+            if not some:
                 restart = i
         owner = i if i < n else between.waypoint[i - n]
         for wheel in range(6):

@@ -89,7 +89,7 @@ def score_poses(
     """
     given = np.asarray(poses)
     flat = check_poses(given.reshape(-1, 3) if given.shape[-1:] == (3,) else given)
-    return _score(pack_model(rover, terrain, options), flat, given.shape[:-1])
+    return score(pack_model(rover, terrain, options), flat, given.shape[:-1])
 
 
 def sweep_map(
@@ -119,10 +119,10 @@ def sweep_map(
         y = terrain.origin[1] + terrain.resolution * np.arange(first, min(first + rows, ny))
         grid = np.stack(np.broadcast_arrays(x[:, None], y[:, None, None], yaw), axis=-1)
         poses = np.ascontiguousarray(grid.reshape(-1, 3))
-        yield first, _score(model, poses, grid.shape[:-1])
+        yield first, score(model, poses, grid.shape[:-1])
 
 
-def _score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
+def score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
     """Score poses (n, 3) and return scores of `shape`, which has n elements."""
     n, limits = len(poses), model.limits
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)

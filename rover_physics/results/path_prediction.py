@@ -129,12 +129,14 @@ class PathPrediction:
 
 
 def write_values(results: Any, values: dict[str, Any]) -> None:
-    """Write values (n, ...) of quantities or views into RESULTs (n,)."""
+    """Write values (n, ...) of quantities or views into RESULTs (n,), and the tilt they give."""
     numbers = numbers_of(results)
     for name, value in values.items():
         first, count = find_column(name)
         rows = np.asarray(value, float).reshape(len(results), count)
         numbers[:, first : first + count] = rows
+    if "roll" in values or "pitch" in values:
+        results["tilt"] = tilt_of(results["q"][:, 1], results["q"][:, 2])
 
 
 def prediction_of(
@@ -156,7 +158,6 @@ def prediction_of(
     write_values(results, known)
     results["status"] = status
     results["q"][:, 0], results["q"][:, 3] = height, results["rocker_angle"][:, 0]
-    results["tilt"] = tilt_of(results["q"][:, 1], results["q"][:, 2])
     return PathPrediction(poses, results, np.arange(len(poses)), policy)
 
 

@@ -156,9 +156,7 @@ QUANTITIES = (
 )  # fmt: skip
 """All quantities of a pose besides its status; NaN where the rover does not settle."""
 
-RESULT = record_type(
-    ("status", np.int8), *((one.name, float, one.shape) for one in QUANTITIES)
-)
+RESULT = record_type(("status", np.int8), *((one.name, float, one.shape) for one in QUANTITIES))
 """Results at one pose: its PoseStatus and the QUANTITIES."""
 NUMBERS = RESULT.itemsize // 8
 """Columns of RESULTs as numbers; the first holds the status."""

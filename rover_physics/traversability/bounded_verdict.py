@@ -8,7 +8,7 @@ from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.limits.table import NOT_COMPUTABLE
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_bounds import PathBounds
-from rover_physics.results.path_prediction import PathPrediction, tilt_of
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus
@@ -89,12 +89,9 @@ def _find_worst(
         values = getattr(bounds, name)[..., end]
         return np.where(np.isnan(values), getattr(prediction, name), values)
 
-    roll = _largest(prediction.roll, bounds.roll)
-    pitch = _largest(prediction.pitch, bounds.pitch)
     worst = prediction.change(
-        roll=roll,
-        pitch=pitch,
-        tilt=tilt_of(roll, pitch),
+        roll=_largest(prediction.roll, bounds.roll),
+        pitch=_largest(prediction.pitch, bounds.pitch),
         rocker_angle=at("rocker_angle", 0),
         bogie_angle=at("bogie_angle", 0),
         belly_clearance=at("belly_clearance", 0),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
+from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.names import (
     CONTROL_POLICIES,
     EQUAL,
@@ -32,8 +33,6 @@ WITH_TRACTION_CONTROL = "passable with traction control"
 IMPASSABLE = "impassable"
 TRAVERSABILITY_CLASSES = (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IMPASSABLE)
 """The classes, from best to worst."""
-WHEEL_CONSTRAINTS = ("wheel_lift", "friction", "torque")
-"""The paper's three constraints, named by their codes in a verdict."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
+from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.prediction.evaluation import evaluate_pose, new_work, set_pose
@@ -23,6 +24,7 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.record import new_results
+from rover_physics.results.uses import find_uses
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
@@ -92,13 +94,14 @@ def find_torque_ranges(
     poses = check_poses(poses)
     model = pack_model(rover, terrain, replace(options, policy="optimal", control_margin=0.0))
     n, motions = len(poses), motions_of(model, poses, curvature)
-    result, work = new_results(1)[0], new_work()
+    results, work = new_results(1), new_work()
+    result = results[0]
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     for i in range(n):
         set_pose(model.record, poses, motions, i, work)
         evaluate_pose(model.record, work, result)
-        if result.status != PoseStatus.SETTLED or not _is_within(rover, model, result):
+        if result.status != PoseStatus.SETTLED or not _is_within(model, results):
             continue
         feasible[i] = True
         lowest[i], highest[i] = _find_extremes(_describe_set(rover, model, work.balance, result))
@@ -108,10 +111,11 @@ def find_torque_ranges(
     return TorqueRanges(feasible, lowest, highest)
 
 
-def _is_within(rover: Rover, model: PackedModel, result: Any) -> bool:
-    friction = result.friction_utilisation.max() < rover.limits.friction_utilisation
-    torque = np.abs(result.torque).max() < model.settings.allowed_torque
-    return bool(friction and torque and result.wheel_loads.min() > 0.0)
+def _is_within(model: PackedModel, results: Any) -> bool:
+    """Return whether a RESULT (1,) is within its limits of load, friction and torque."""
+    uses = find_uses(model.limits, results)
+    decisive = [row.code in WHEEL_CONSTRAINTS for row in uses.limits.rows]
+    return bool((uses.use[0, decisive] < 1.0).all())
 
 
 def _describe_set(rover: Rover, model: PackedModel, balance: Any, result: Any) -> _FeasibleSet:

@@ -16,9 +16,9 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_path
 from rover_planner.cli import main
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
@@ -56,7 +56,7 @@ def drive(length: float, off: float = 0.0) -> list[tuple[str, object]]:
     """
     x = np.arange(0.5, 0.5 + length, 0.02)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
-    prediction = sweep_path(LSR1, waves(), poses)
+    prediction = judge_path(LSR1, waves(), poses)[0]
     messages: list[tuple[str, object]] = []
     for k, place in enumerate(x.tolist()):
         right, left = prediction.bogie_angle[k].tolist()

@@ -103,9 +103,10 @@ def _check_python(words: tuple[str, ...]) -> None:
     if module in ROBOT_TOOLS:
         return
     assert importlib.util.find_spec(module) is not None, f"no module {module}"
-    if module == "benchmarks.run":
-        for topic in arguments:
-            assert (TOP / "benchmarks" / f"bench_{topic}.py").is_file(), f"no topic {topic}"
+    if module.startswith("benchmarks."):
+        benchmark = typer.Typer()
+        benchmark.command()(importlib.import_module(module).main)
+        typer.main.get_command(benchmark).make_context(module, list(arguments))
     if module == "rover_planner":
         _check_subcommand(arguments)
 

@@ -54,10 +54,15 @@ RECORD_NOTE = """() => {
 }"""
 """Keeps what the note at a box says, and how far it is below the box [px]."""
 
-SMALL_SCENE = (
-    'div[style*="touch-action: none"] > div {width: 16px !important; height: 16px !important}'
-)
-"""Style of a scene of 16 x 16 pixels."""
+SHRINK = """() => {
+    if (document.getElementById('small-scene')) return;
+    const style = document.createElement('style');
+    style.id = 'small-scene';
+    style.textContent = 'div[style*="touch-action: none"] > div '
+        + '{width: 16px !important; height: 16px !important}';
+    document.head.append(style);
+}"""
+"""Lets the browser draw a scene of 16 x 16 pixels."""
 
 OVERLAPS = """() => {
     const boxes = [...document.querySelectorAll('.label-box')].filter(e => e.offsetParent).map(
@@ -97,12 +102,14 @@ def wait_until(condition: Callable[[], Any], what: str) -> Any:
 class Visitor:
     """A simulated user of the page: reads texts and pixels, presses, drags and clicks."""
 
-    def __init__(self, browser: Any, url: str, scale: float = 0.4):
+    def __init__(self, browser: Any, url: str, scale: float = 0.4, sees_scene: bool = True):
         # Few pixels by default, because rendering without a graphics card is slow.
         self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=scale)
         self.page_errors: list[str] = []
         self.tab.on("pageerror", lambda error: self.page_errors.append(str(error)))
         self.tab.set_default_timeout(1000.0 * WAIT)
+        if not sees_scene:
+            self.tab.add_init_script(f"document.addEventListener('DOMContentLoaded', {SHRINK})")
         self.tab.goto(url)
         self.tab.wait_for_selector("#dashboard")
 
@@ -111,7 +118,15 @@ class Visitor:
 
         Without a graphics card it then draws 60 times as many pictures.
         """
-        self.tab.add_style_tag(content=SMALL_SCENE)
+        self.tab.evaluate(SHRINK)
+
+    def show_scene(self) -> None:
+        """Let the browser draw the whole scene again."""
+        self.tab.evaluate("() => document.getElementById('small-scene')?.remove()")
+
+    def hide_notices(self) -> None:
+        """Hide the notices of viser, which may cover what is clicked or seen."""
+        self.tab.add_style_tag(content=".mantine-Notifications-root { display: none; }")
 
     def open_tab(self, name: str) -> None:
         """Open a tab of the panel."""
@@ -123,13 +138,14 @@ class Visitor:
             self.tab.get_by_text(name, exact=True)
         ).first.click()
 
-    def _buttons(self, label: str) -> Callable[[], list[str]]:
+    def buttons(self, label: str) -> Callable[[], list[str]]:
         """Return what lists the names of the buttons in a row."""
         named = self.tab.get_by_text(label, exact=True)
         row = named.locator("xpath=ancestor::*[.//button][1]")
         return lambda: row.get_by_role("button").all_inner_texts()
 
-    def _row(self, label: str) -> Any:
+    def row(self, label: str) -> Any:
+        """Return the row of the panel with a label."""
         named = self.tab.get_by_text(label, exact=True).or_(
             self.tab.get_by_text(f"{CHANGED}{label}", exact=True)
         )
@@ -140,7 +156,7 @@ class Visitor:
 
         Playwright's `fill` sets the text without key events. The box may then discard the text.
         """
-        box = self._row(label).locator("input").last
+        box = self.row(label).locator("input").last
         box.click()
         box.press("Control+a")
         box.press_sequentially(value)
@@ -148,7 +164,7 @@ class Visitor:
 
     def type_keys(self, label: str, text: str, end: str = "") -> None:
         """Type into the box beside a slider, slowly and key by key, and press a last key."""
-        box = self._row(label).locator("input").last
+        box = self.row(label).locator("input").last
         box.click()
         box.press("Control+a")
         box.press_sequentially(text, delay=30)
@@ -157,15 +173,15 @@ class Visitor:
 
     def place_of(self, label: str) -> float:
         """Return the height of a slider below the upper edge of the window [px]."""
-        return float(self._row(label).bounding_box()["y"])
+        return float(self.row(label).bounding_box()["y"])
 
     def slider_value(self, label: str) -> float:
         """Return the value in the box beside a slider."""
-        return float(self._row(label).locator("input").last.input_value())
+        return float(self.row(label).locator("input").last.input_value())
 
     def drag_slider(self, label: str, share: float, moves: int = 25) -> None:
         """Drag the thumb of a slider to a share of its range, in a number of moves."""
-        thumb = self._row(label).get_by_role("slider")
+        thumb = self.row(label).get_by_role("slider")
         x, y, left, width = thumb.evaluate(FIND_THUMB)
         self.tab.mouse.move(x, y)
         self.tab.mouse.down()
@@ -174,7 +190,7 @@ class Visitor:
 
     def choose(self, label: str, option: str) -> None:
         """Choose an option of a drop-down."""
-        self._row(label).locator("input:visible").first.click()
+        self.row(label).locator("input:visible").first.click()
         self.tab.get_by_role("option", name=option, exact=True).click()
 
     def text(self, selector: str) -> str:

@@ -1,7 +1,7 @@
 """Paths, grounds, sessions and slow scenarios for tests of the viewer."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -16,11 +16,16 @@ from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
+from support.waiting import wait_until
 
 LSR1 = load_rover("lsr1")
 SHARE = 0.2
 """Heights over those of the made reef, on which every path ends after a few centimetres."""
 START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
+FAR = (500_000.0, 4_000_000.0)
+"""Place of a map in a UTM zone: easting and northing [m]."""
+PATIENCE = 120.0
+"""Longest wait for a page [s]; drawing and judging take seconds on a busy machine."""
 
 
 def straight(length: float = 2.0, spacing: float = 0.02) -> np.ndarray:
@@ -37,6 +42,54 @@ def ramp(x, y):
 def session_on(height, start=(-2.0, 0.0, 0.0), goal=(1.0, 0.0, 0.0)) -> ViewSession:
     """Return a session of the LSR-1 on a ground with heights height(x, y) [m]."""
     return ViewSession(LSR1, make_terrain(height), start, goal)
+
+
+def blocked(x, y):
+    """Return waves with a block on the straight path and, from x = 2.6 m on, a wall along y."""
+    block, wall = (abs(x - 0.5) < 0.2) & (abs(y) < 0.15), (x > 2.6) & (x < 2.8)
+    return waves(x, y) + 0.25 * block + 0.5 * wall
+
+
+def blocked_session() -> ViewSession:
+    """Return a session of which some paths are refused and some pass; it searches briefly."""
+    search = LatticeSettings(budget=0.5)
+    session = ViewSession(
+        LSR1, make_terrain(blocked), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), search=search
+    )
+    session.ground_name = "blocked.npz"
+    return session
+
+
+def shift(terrain: Terrain, by: tuple[float, float]) -> Terrain:
+    """Return a ground at another place [m]."""
+    x, y = terrain.origin
+    return Terrain(terrain.elevation, terrain.resolution, (x + by[0], y + by[1]))
+
+
+def ask(page: Any, action: Callable[[], Any]) -> None:
+    """Let the page's own thread act, and wait until it has; what fails shows on the page."""
+    done = threading.Event()
+
+    def act() -> None:
+        try:
+            action()
+        finally:
+            done.set()
+
+    page.requests.add(act)
+    assert done.wait(PATIENCE), "the page's thread does nothing"
+    wait_until(lambda: not page._fulfils, "what the action makes the page say", PATIENCE)
+
+
+def wait_for_rest(page: Any) -> None:
+    """Wait until everything that is wanted is judged and shown."""
+    session = page.session
+
+    def at_rest() -> bool:
+        done = session.finished.answered is session.finished.scenario is session.wanted
+        return done and not page.is_busy and page._changed_at is None
+
+    wait_until(lambda: at_rest() or session.refusal, "all judgements", PATIENCE)
 
 
 def lowered_reef() -> Terrain:

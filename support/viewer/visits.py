@@ -1,4 +1,4 @@
-"""A page with a browser for the tests of a module, and grounds far from the origin."""
+"""A browser for the tests of a module, what it has heard of a page, and its camera."""
 
 import itertools
 from collections.abc import Iterator
@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.browser.channel import run_script
-from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.pages.page_base import PageBase
 from support.viewer.browser import (
     ARGUMENTS,
@@ -21,8 +19,6 @@ from support.viewer.browser import (
 )
 
 NUMBERS = itertools.count(1)
-FAR = (500_000.0, 4_000_000.0)
-"""Place of a map in a UTM zone: easting and northing [m]."""
 
 SEEN_FROM_CAMERA = """places => {
     const viser = window.__viserMutable, root = viser && viser.nodeRefFromName[''];
@@ -34,15 +30,6 @@ SEEN_FROM_CAMERA = """places => {
         view.reduce((at, matrix) => times(matrix, at), [...place, 1]).slice(0, 3));
 }"""
 """Returns places of the scene in the frame of the browser's camera, which looks along -z."""
-
-
-def shift(terrain: Terrain, by: tuple[float, float]) -> Terrain:
-    """Return a ground at another place [m]."""
-    return Terrain(
-        terrain.elevation,
-        terrain.resolution,
-        (terrain.origin[0] + by[0], terrain.origin[1] + by[1]),
-    )
 
 
 @contextmanager
@@ -57,25 +44,14 @@ def open_browser() -> Iterator[object]:
 
 
 @contextmanager
-def visit(page: Page, browser: object, query: str = "") -> Iterator[Visitor]:
+def visit(page: PageBase, browser: object, *, sees_scene: bool = True) -> Iterator[Visitor]:
     """Serve a page to a visitor, and close both."""
     try:
-        visitor = Visitor(browser, page.url + query)
+        visitor = Visitor(browser, page.url, sees_scene=sees_scene)
         yield visitor
         visitor.tab.close()
     finally:
         page.close()
-
-
-def wait_for_rest(page: Page) -> None:
-    """Wait until everything that is wanted is judged and shown."""
-    session = page.session
-
-    def at_rest() -> bool:
-        done = session.finished.answered is session.finished.scenario is session.wanted
-        return done and not page.is_busy and page._changed_at is None
-
-    wait_until(lambda: at_rest() or session.refusal, "all judgements")
 
 
 def wait_for_browser(page: PageBase, visitor: Visitor) -> None:
@@ -93,17 +69,17 @@ def wait_for_browser(page: PageBase, visitor: Visitor) -> None:
 
 
 def find_camera(page: PageBase) -> Any:
-    """Return the camera of the page's only visitor, once nothing else moves it.
+    """Return the camera of the page's newest visitor, once nothing else moves it.
 
     The page aims it when the visitor comes, which is later than the visitor sees the board.
     """
 
     def welcomed() -> list[Any]:
         clients = page.server.get_clients()
-        return [clients[key] for key in clients if key in page._visitors.greeted]
+        newest = max(clients, default=None)
+        return [clients[newest]] if newest in page._visitors.greeted else []
 
-    wait_until(lambda: len(welcomed()) == 1, "the visitor to be welcomed")
-    return welcomed()[0].camera
+    return wait_until(welcomed, "the visitor to be welcomed")[0].camera
 
 
 def look_from(page: PageBase, visitor: Visitor, position: Any, look_at: Any) -> None:

@@ -87,7 +87,6 @@ def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environmen
     [
         (signal.SIGINT, -signal.SIGINT),
         (signal.SIGTERM, 128 + signal.SIGTERM),
-        (signal.SIGHUP, 128 + signal.SIGHUP),
         (signal.SIGKILL, -signal.SIGKILL),
     ],
 )

@@ -67,40 +67,6 @@ def draw(tmp_path, rover, holed, monkeypatch):
     return draw_one
 
 
-def paths_of(axes, answer):
-    """Return which candidates of an answer are drawn as lines on a map."""
-    lines = [np.column_stack(line.get_data()) for line in axes.get_lines()]
-    return [
-        any(one.poses.shape[0] == len(line) and np.allclose(line, one.poses[:, :2])
-            for line in lines)
-        for one in answer.candidates
-    ]  # fmt: skip
-
-
-def test_refused_answers_alone_are_drawn_too(draw, rover, holed):
-    labelled = ask(rover, holed, "A", (9, 0, 0))
-    assert not labelled.answer.traversable
-    on_map, others = draw(labelled)
-    assert all(paths_of(on_map, labelled.answer))
-    assert "A" in {text.get_text() for text in on_map.texts}
-    assert any(axes.get_ylabel() == "wheel load [N]" for axes in others)
-
-
-def test_a_start_off_the_map_is_drawn_without_any_settled_pose(draw, rover, holed):
-    answer = answer_path_query(rover, holed, (50, 50, 0), (52, 50, 0), COARSE)
-    on_map, _ = draw(LabelledAnswer("A", "off", answer))
-    low, high = on_map.get_xlim()
-    assert low < 50.0 and high > 52.0
-    assert "A" in {text.get_text() for text in on_map.texts}
-
-
-def test_a_single_pose_is_drawn(draw, rover, holed):
-    answer = answer_path_query(rover, holed, (0, 0, 0), (0, 0, 0), COARSE)
-    on_map, _ = draw(LabelledAnswer("A", "here", answer))
-    starts = [line for line in on_map.get_lines() if line.get_markersize() == 17]
-    assert {tuple(line.get_xydata()[0]) for line in starts} == {(0.0, 0.0)}
-
-
 def test_forces_that_no_verdict_asks_for_are_shaded(draw, rover):
     """A wheel that rolls off an edge may use more friction than the verdict tells."""
     x = 0.05 * np.arange(121) - 4.5
@@ -130,12 +96,6 @@ def test_slopes_towards_the_sun_are_brighter():
     assert (hill_shade(0.05 * x.T, 0.1) < level).all()
 
 
-def test_unknown_ground_has_no_shade(holed):
-    shade = hill_shade(holed.elevation, holed.resolution)
-    assert np.isnan(shade[70, 100])
-    assert np.isfinite(shade[:50]).all()
-
-
 def test_nothing_to_draw_and_nowhere_to_write_are_refused(tmp_path, rover, holed):
     with pytest.raises(PlanningError, match="no answers"):
         draw_answers(tmp_path / "picture.png", rover, holed, [])
@@ -144,9 +104,3 @@ def test_nothing_to_draw_and_nowhere_to_write_are_refused(tmp_path, rover, holed
         draw_answers(tmp_path / "no" / "picture.png", rover, holed, answers)
     with pytest.raises(PlanningError, match="must be a .png, .svg, .pdf file"):
         draw_answers(tmp_path / "picture.tiger", rover, holed, answers)
-
-
-def test_labelled_answers_are_frozen(rover, holed):
-    labelled = ask(rover, holed, "A", (0, 0, 0))
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        labelled.name = "B"

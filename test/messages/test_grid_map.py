@@ -35,12 +35,6 @@ def test_heights_ascend_along_x_and_y_from_the_cell_of_smallest_x_and_y():
     assert terrain.friction is None and terrain.elevation_std is None
 
 
-def test_the_first_stored_value_is_the_cell_of_largest_x_and_y_and_the_next_runs_along_minus_x():
-    message = grid_map_of({"elevation": HEIGHTS}, 0.5)
-    data = message.data[0].data
-    assert data[0] == HEIGHTS[-1, -1] and data[1] == HEIGHTS[-1, -2]
-
-
 @given(row=st.integers(0, 4), column=st.integers(0, 6), by_rows=st.booleans())
 def test_a_moved_buffer_start_gives_the_same_terrain_to_the_bit(row, column, by_rows):
     layers = {"elevation": HEIGHTS, "variance": HEIGHTS**2, "friction": 0.5 + 0.0 * HEIGHTS}

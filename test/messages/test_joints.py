@@ -1,20 +1,30 @@
-"""Joint states are read by name, and angles without meaning are refused."""
+"""Joints are read by name, with names, signs and offsets of the robot; odd ones are refused."""
 
 import math
 
+import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from sensor_msgs.msg import JointState
 
+from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
+from msg_adapters.joint_map import OWN_NAMES, read_joint_map
 from msg_adapters.joints import convert_steering, joint_positions
-from rover_physics.names import STEERING_JOINTS
+from msg_adapters.results.predictions import JOINTS, joint_trajectory
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import LEFT, RIGHT
+from rover_physics.traversability.judge import judge_path
+from support.grounds import make_terrain, waves
 
+KNOWN = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 WANTED = ("rocker_left", "bogie_left")
 
 
-def test_positions_are_found_by_name_in_any_order():
-    state = JointState(name=["bogie_left", "camera", "rocker_left"], position=[0.2, 9.0, 0.1])
+def test_positions_are_found_by_name_in_any_order_and_others_are_not_looked_at():
+    state = JointState(name=["bogie_left", "camera", "camera", "rocker_left"])
+    state.position = [0.2, math.nan, 9.0, 0.1]
     assert joint_positions(state, WANTED) == {"rocker_left": 0.1, "bogie_left": 0.2}
 
 
@@ -31,27 +41,17 @@ def test_a_message_without_wanted_positions_says_nothing(state):
     assert joint_positions(state, WANTED) == {}
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_an_angle_that_is_not_finite_is_refused(value):
-    state = JointState(name=["camera", "rocker_left"], position=[0.0, value])
-    with pytest.raises(MessageError, match=r"position (nan|inf) of rocker_left"):
-        joint_positions(state, WANTED)
-
-
-def test_other_joints_are_not_looked_at():
-    state = JointState(name=["camera", "camera", "rocker_left"], position=[math.nan, 0.0, 0.1])
-    assert joint_positions(state, WANTED) == {"rocker_left": 0.1}
-
-
 @pytest.mark.parametrize(
     ("names", "positions", "text"),
     [
         (["rocker_left", "bogie_left"], [0.1], "1 positions for 2 names"),
         ([], [0.1], "1 positions for 0 names"),
         (["rocker_left", "rocker_left"], [0.1, 0.2], "names rocker_left twice"),
+        (["camera", "rocker_left"], [0.0, math.nan], "position nan of rocker_left"),
+        (["rocker_left"], [math.inf], "position inf of rocker_left"),
     ],
 )
-def test_lengths_and_names_that_disagree_are_refused(names, positions, text):
+def test_joint_states_that_disagree_or_are_not_finite_are_refused(names, positions, text):
     with pytest.raises(MessageError, match=text):
         joint_positions(JointState(name=names, position=positions), WANTED)
 
@@ -63,3 +63,65 @@ def test_steering_is_converted_to_positive_left_and_back_and_nothing_else_is():
     turned = convert_steering(read, RIGHT)
     assert turned == {"front_left_steering": -0.3, "rocker_left": 0.1}
     assert convert_steering(turned, RIGHT) == read
+
+
+def test_angles_and_rates_are_those_of_the_model():
+    names = read_joint_map(["rocker_left:rl:-1:0.1", "bogie_left: bl "], KNOWN)
+    state = JointState(name=["rl", "bl", "rocker_right"])
+    state.position, state.velocity = [0.3, 0.2, 0.5], [1.0, 2.0, 3.0]
+    assert names.positions(state, SUSPENSION_JOINTS) == pytest.approx(
+        {"rocker_left": -0.2, "bogie_left": 0.2, "rocker_right": 0.5}
+    )
+    assert names.velocities(state, SUSPENSION_JOINTS) == pytest.approx(
+        {"rocker_left": -1.0, "bogie_left": 2.0, "rocker_right": 3.0}
+    )
+    assert OWN_NAMES.positions(state, SUSPENSION_JOINTS) == {"rocker_right": 0.5}
+    swapped = ["rocker_left:rocker_right", "rocker_right:rocker_left"]
+    assert read_joint_map(swapped, SUSPENSION_JOINTS).link("rocker_left").robot == "rocker_right"
+
+
+def test_a_predicted_trajectory_is_read_back_as_the_model_has_it():
+    entries = [f"{name}:{name}_j:-1:0.3" for name in SUSPENSION_JOINTS]
+    entries += [f"{name}:{name}_j:-1" for name in WHEEL_JOINTS]
+    names, rover = read_joint_map(entries, KNOWN), load_rover("lsr1")
+    poses = [(0.1 * k, 0.0, 0.0) for k in range(5)]
+    prediction = judge_path(rover, make_terrain(waves), poses)[0]
+    ours = joint_trajectory(prediction, rover, "map", Time())
+    theirs = joint_trajectory(prediction, rover, "map", Time(), names=names)
+    state, own = JointState(name=theirs.joint_names), ours.points[3]
+    state.position, state.velocity = theirs.points[3].positions, theirs.points[3].velocities
+    for back, right in (
+        (names.positions(state, JOINTS), own.positions),
+        (names.velocities(state, JOINTS), own.velocities),
+    ):
+        assert [back[name] for name in JOINTS] == pytest.approx(list(right[:10]))
+    efforts = theirs.points[3].effort[4:10], own.effort[4:10]
+    np.testing.assert_array_equal(np.array(efforts[0]), -np.array(efforts[1]))
+
+
+def test_the_order_of_commands_is_given_in_names_of_the_robot_or_the_model():
+    names = read_joint_map([f"{name}:j{k}" for k, name in enumerate(WHEEL_JOINTS)], KNOWN)
+    assert joint_order(["j5", "j4", "j3", "j2", "j1", "j0"], names).tolist() == [5, 4, 3, 2, 1, 0]
+    assert joint_order(WHEEL_JOINTS, names).tolist() == list(range(6))
+    with pytest.raises(MessageError, match="j0, j1"):
+        joint_order(["j5"], names)
+
+
+@pytest.mark.parametrize(
+    ("entries", "text"),
+    [
+        (["rocker_left"], "must be model_joint:robot_joint"),
+        (["rocker_left:a:-1:0:0"], "must be model_joint"),
+        (["rocker_left:"], "must be model_joint"),
+        (["rockr:a"], "the model does not have"),
+        (["rocker_left:a:2"], "must be 1 or -1"),
+        (["rocker_left:a:x"], "no number"),
+        (["rocker_left:a:1:nan"], "within 2 pi"),
+        (["rocker_left:a", "rocker_left:b"], "rocker_left twice"),
+        (["rocker_left:a", "rocker_right:a"], "a twice"),
+        (["rocker_left:rocker_right"], "that of another"),
+    ],
+)
+def test_a_wrong_entry_of_the_map_is_refused_with_the_reason(entries, text):
+    with pytest.raises(MessageError, match=text):
+        read_joint_map(entries, KNOWN)

@@ -1,4 +1,4 @@
-"""Attitude, odometry and commands: frames are looked at, impossible values are refused."""
+"""Attitude, odometry, commands, tool targets and wrenches: impossible ones are refused."""
 
 import math
 
@@ -12,7 +12,12 @@ from msg_adapters.commands import twist_to_speeds
 from msg_adapters.errors import MessageError
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.odometry import odometry_to_pose
-from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
+from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
+from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_planner.planning.navigation.transforms import Rigid
+from support.messages.tool_messages import make_target, make_wrench
+
+NAN, INF = math.nan, math.inf
 
 
 def imu(xyzw=(0.0, 0.0, 0.0, 1.0), rates=(0.0, 0.0, 0.0), frame=""):
@@ -24,81 +29,34 @@ def imu(xyzw=(0.0, 0.0, 0.0, 1.0), rates=(0.0, 0.0, 0.0), frame=""):
     return message
 
 
-def odometry(child="base_link", **position):
+def odometry(child="base_link", variance=0.0, turn=0.0, **position):
     message = Odometry(child_frame_id=child)
     message.header.frame_id = "map"
     for name, value in position.items():
         setattr(message.pose.pose.position, name, value)
+    message.pose.pose.orientation.x = turn
+    message.pose.covariance[7] = variance
     return message
 
 
 @pytest.mark.parametrize("mounting", [(0.3, -0.2, 2.0), (math.pi, 0.0, 0.5), (0.0, 1.2, -1.0)])
 def test_a_mounted_imu_gives_the_attitude_and_the_rates_of_the_body(mounting):
-    body = matrix_from_xyzw(xyzw_from_rpy(0.1, -0.25, 1.5))
-    imu_in_body = matrix_from_xyzw(xyzw_from_rpy(*mounting))
-    measured = xyzw_from_matrix(body @ imu_in_body)
+    body, mount = (Rigid.from_rpy(0.0, 0.0, 0.0, *rpy) for rpy in ((0.1, -0.25, 1.5), mounting))
     rates = np.array([0.2, -0.1, 0.4])
-    attitude = imu_to_attitude(
-        imu(measured, imu_in_body.T @ rates, "imu_link"), ImuMounting("imu_link", mounting)
-    )
+    measured = imu(body.then(mount).rotation.as_quat(), mount.rotation.inv().apply(rates), "mast")
+    attitude = imu_to_attitude(measured, ImuMounting("mast", mounting))
     assert (attitude.roll, attitude.pitch) == pytest.approx((0.1, -0.25))
     assert attitude.rates == pytest.approx(rates)
 
 
-def xyzw_from_matrix(R):
-    """Return the quaternion of a rotation matrix, by its eigenvector of eigenvalue 1."""
-    K = np.array(
-        [
-            [R[0, 0] - R[1, 1] - R[2, 2], 0, 0, 0],
-            [R[1, 0] + R[0, 1], R[1, 1] - R[0, 0] - R[2, 2], 0, 0],
-            [R[2, 0] + R[0, 2], R[2, 1] + R[1, 2], R[2, 2] - R[0, 0] - R[1, 1], 0],
-            [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], np.trace(R)],
-        ]
-    )
-    values, vectors = np.linalg.eigh(K / 3.0)
-    return vectors[:, np.argmax(values)]
-
-
 @pytest.mark.parametrize("frame", ["", "base_link"])
 def test_an_imu_of_the_body_and_one_without_a_frame_are_taken(frame):
-    given = imu(xyzw_from_rpy(0.1, 0.2, 0.0), frame=frame)
-    assert imu_to_attitude(given, ImuMounting("base_link")).roll == pytest.approx(0.1)
+    measured = imu(xyzw_from_rpy(0.1, 0.2, 0.0), frame=frame)
+    assert imu_to_attitude(measured, ImuMounting("base_link")).roll == pytest.approx(0.1)
 
 
-def test_an_imu_in_another_frame_is_refused_with_the_parameters_that_mend_it():
-    with pytest.raises(MessageError, match=r"in frame 'mast'.*imu_frame and imu_mounting"):
-        imu_to_attitude(imu(frame="mast"), ImuMounting("base_link"))
-
-
-@pytest.mark.parametrize("size", [1e155, 1e200, math.inf, math.nan])
-def test_huge_orientations_are_refused(size):
-    with pytest.raises(MessageError, match="imu has orientation"):
-        imu_to_attitude(imu((size, 0.0, 0.0, 0.0)))
-    message = odometry()
-    message.pose.pose.orientation.x = size
-    with pytest.raises(MessageError, match="odometry has orientation"):
-        odometry_to_pose(message, "map")
-
-
-@pytest.mark.parametrize("value", [1e200, -1e9, math.nan, math.inf])
-def test_impossible_positions_are_refused(value):
-    with pytest.raises(MessageError, match="coordinates must be within 1e"):
-        odometry_to_pose(odometry(y=value), "map")
-
-
-@pytest.mark.parametrize("index", [0, 7])
-@pytest.mark.parametrize("value", [1e200, math.nan])
-def test_impossible_variances_are_refused(index, value):
-    message = odometry()
-    message.pose.covariance[index] = value
-    with pytest.raises(MessageError, match="variances within"):
-        odometry_to_pose(message, "map")
-
-
-def test_odometry_of_another_body_is_refused():
+def test_odometry_without_the_name_of_its_body_is_taken():
     assert odometry_to_pose(odometry(""), "map", "base_link")[1] == 0.0
-    with pytest.raises(MessageError, match="odometry is of frame 'mast'; it must be of 'base_li"):
-        odometry_to_pose(odometry("mast"), "map", "base_link")
 
 
 @pytest.mark.parametrize("kind", [Twist, TwistStamped])
@@ -107,3 +65,50 @@ def test_both_kinds_of_twists_are_read(kind):
     speeds = message.twist if kind is TwistStamped else message
     speeds.linear.x, speeds.angular.z = 0.1, -0.2
     assert twist_to_speeds(message) == (0.1, -0.2)
+
+
+def test_a_target_is_its_place_and_a_wrench_is_force_and_moment():
+    np.testing.assert_array_equal(target_to_point(make_target(), "map"), [1.0, 2.0, 0.3])
+    force, moment = wrench_to_force_and_moment(make_wrench(), "map")
+    assert (force.tolist(), moment.tolist()) == ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
+
+
+def read_imu(message):
+    return imu_to_attitude(message, ImuMounting("base_link"))
+
+
+def read_odometry(message):
+    return odometry_to_pose(message, "map", "base_link")
+
+
+def read_target(message):
+    return target_to_point(message, "map")
+
+
+def read_wrench(message):
+    return wrench_to_force_and_moment(message, "map")
+
+
+MAST = "in frame 'mast'.*imu_frame and imu_mounting"
+
+
+@pytest.mark.parametrize(
+    ("read", "message", "text"),
+    [
+        (read_imu, imu(frame="mast"), MAST),
+        *[(read_imu, imu((x, 0.0, 0.0, 0.0)), "imu has orientation") for x in (1e155, INF, NAN)],
+        *[(read_odometry, odometry(turn=x), "has orientation") for x in (1e155, 1.7e308, NAN)],
+        *[(read_odometry, odometry(y=y), "must be within 1e") for y in (1e200, -1e9, NAN, INF)],
+        *[(read_odometry, odometry(variance=v), "variances within") for v in (1e200, NAN)],
+        (read_odometry, odometry("mast"), "is of frame 'mast'; it must be of 'base_li"),
+        (read_target, make_target(frame="odom"), "tool target is in frame 'odom'"),
+        (read_target, make_target(frame=""), "without a frame_id"),
+        *[(read_target, make_target(z=z), r"target is .* within 1e\+09") for z in (1e10, NAN)],
+        (read_wrench, make_wrench(frame="base_link"), "tool wrench is in frame 'base_link'"),
+        (read_wrench, make_wrench(force=(0.0, INF, 0.0)), r"wrench force is .* within 1e\+09"),
+        (read_wrench, make_wrench(moment=(0.0, -1e300, 0.0)), r"torque is .* within 1e\+09"),
+    ],
+)
+def test_what_is_impossible_is_refused_by_name(read, message, text):
+    with pytest.raises(MessageError, match=text):
+        read(message)

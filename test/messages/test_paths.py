@@ -1,14 +1,22 @@
-"""Poses keep place and heading through messages, and poses without meaning are refused."""
+"""Poses keep place and heading through messages; those without meaning are refused by name."""
 
+import hashlib
 import math
+import struct
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, Quaternion
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from nav_msgs.msg import Path
 
-from msg_adapters.errors import MessageError
+from msg_adapters.errors import MAX_TEXT, MessageError
+from msg_adapters.frames import check_frame
+from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import (
+    MAX_POSES,
     decimate,
     path_to_poses,
     poses_path,
@@ -16,17 +24,16 @@ from msg_adapters.paths import (
     stamped_pose_to_array,
     yaw_from_quaternion,
 )
-from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_physics.numerics.quaternions import length_of, xyzw_from_rpy
+
+HUGE = (1.1e9, 1e155, 1.7e308, math.inf, math.nan)
 
 
-@pytest.mark.parametrize("yaw", [-3.0, -math.pi / 2, 0.0, 0.3, 2.5])
+@pytest.mark.parametrize("yaw", [-3.0, -math.pi / 2, 0.0, 2.5])
 def test_place_and_heading_survive_a_message(yaw):
-    pose = stamped_pose((1.5, -2.5, yaw), "map")
-    np.testing.assert_allclose(stamped_pose_to_array(pose, "map"), [1.5, -2.5, yaw], atol=1e-15)
-
-
-def test_a_path_survives_a_message():
-    poses = np.array([[0.0, 0.0, 0.1], [1.0, 0.1, 0.2], [2.0, 0.3, -3.1]])
+    poses = np.array([[1.5, -2.5, yaw], [1.0, 0.1, 0.2]])
+    alone = stamped_pose_to_array(stamped_pose(poses[0], "map"), "map")
+    np.testing.assert_allclose(alone, poses[0], atol=1e-15)
     np.testing.assert_allclose(path_to_poses(poses_path(poses, "map"), "map"), poses, atol=1e-15)
 
 
@@ -34,6 +41,7 @@ def test_the_heading_of_a_tilted_body_is_its_yaw():
     for roll, pitch, yaw in np.random.default_rng(2).uniform(-1.2, 1.2, (20, 3)):
         x, y, z, w = xyzw_from_rpy(roll, pitch, yaw).tolist()
         assert yaw_from_quaternion(Quaternion(x=x, y=y, z=z, w=w)) == pytest.approx(yaw)
+    assert yaw_from_quaternion(Quaternion(z=0.707, w=0.707)) == pytest.approx(math.pi / 2)
 
 
 @pytest.mark.parametrize(
@@ -41,10 +49,11 @@ def test_the_heading_of_a_tilted_body_is_its_yaw():
     [
         ((0.0, 0.0, 0.0, 0.0), "has length 0; it must be a quaternion of length 1"),
         ((0.0, 0.0, 1.0, 1.0), "has length 1.41"),
-        ((0.0, 0.0, 0.0, 0.9), "has length 0.9"),
         ((0.0, math.nan, 0.0, 1.0), "is not finite"),
         ((0.0, 0.0, math.inf, 1.0), "is not finite"),
         ((0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5)), "it has no heading"),
+        ((1e155, 0.0, 0.0, 0.0), r"has length 1e\+155; it must be"),
+        ((0.0, 0.0, 0.0, 1.7e308), r"has length 1.7e\+308; it must be"),
     ],
 )
 def test_a_bad_quaternion_is_refused(quaternion, text):
@@ -53,16 +62,20 @@ def test_a_bad_quaternion_is_refused(quaternion, text):
         yaw_from_quaternion(Quaternion(x=x, y=y, z=z, w=w), "goal orientation")
 
 
-def test_a_quaternion_rounded_to_three_digits_is_accepted():
-    assert yaw_from_quaternion(Quaternion(z=0.707, w=0.707)) == pytest.approx(math.pi / 2)
+def test_the_length_of_a_quaternion_never_overflows():
+    assert length_of((3e200, 0.0, 4e200, 0.0)) == pytest.approx(5e200)
+    assert length_of((1.7e308, 1.7e308, 0.0, 0.0)) == math.inf
+    assert length_of((3e-200, 0.0, 4e-200, 0.0)) == pytest.approx(5e-200)
+    assert math.isnan(length_of((math.nan, 0.0, 0.0, 1.0)))
 
 
-@pytest.mark.parametrize(("x", "y"), [(math.nan, 0.0), (0.0, math.inf)])
-def test_a_position_that_is_not_finite_is_refused(x, y):
-    pose = stamped_pose((0.0, 0.0, 0.0), "map")
-    pose.pose.position.x, pose.pose.position.y = x, y
-    with pytest.raises(MessageError, match=r"goal has position x .* both must be finite"):
-        stamped_pose_to_array(pose, "map", "goal")
+@pytest.mark.parametrize("huge", HUGE)
+def test_a_position_beyond_any_map_is_refused(huge):
+    for x, y in ((huge, 0.0), (0.0, -huge)):
+        pose = stamped_pose((0.0, 0.0, 0.0), "map")
+        pose.pose.position.x, pose.pose.position.y = x, y
+        with pytest.raises(MessageError, match=r"goal has position x .* finite, in .* 1e\+09"):
+            stamped_pose_to_array(pose, "map", "goal")
 
 
 @pytest.mark.parametrize(
@@ -70,26 +83,53 @@ def test_a_position_that_is_not_finite_is_refused(x, y):
     [
         ("odom", "goal is in frame 'odom'; it must be in 'map'"),
         ("", "goal is without a frame_id; it must be in 'map'"),
+        ("f" * 1_000_000, "goal is in frame 'fff"),
     ],
 )
-def test_another_frame_is_refused(frame, text):
+def test_another_frame_is_refused_in_a_short_text(frame, text):
+    with pytest.raises(MessageError, match=text) as raised:
+        check_frame(frame, "map", "goal")
+    assert len(str(raised.value)) <= MAX_TEXT
+
+
+def spoilt(change):
+    path = poses_path(np.zeros((4, 3)), "map")
+    change(path.poses[2])
+    return path
+
+
+def nan_position(pose):
+    pose.pose.position.x = math.nan
+
+
+def other_frame(pose):
+    pose.header.frame_id = "base_link"
+
+
+def no_orientation(pose):
+    pose.pose.orientation.w = 0.0
+
+
+def long_path():
+    path = poses_path(np.zeros((1, 3)), "map")
+    path.poses = path.poses * (MAX_POSES + 1)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: poses_path([], "map"), "path has no poses"),
+        (lambda: poses_path([[0.0, 0.0, 0.0]], "odom"), "path is in frame 'odom'"),
+        (lambda: spoilt(other_frame), "path pose 2 is in frame 'base_link'"),
+        (lambda: spoilt(no_orientation), r"path pose 2 orientation .* has length 0"),
+        (lambda: spoilt(nan_position), r"path pose 2 has position x .* within 1e\+09"),
+        (long_path, r"path has 100001 poses; it may have 100000: leave"),
+    ],
+)
+def test_a_path_is_refused_by_its_bad_part(make, text):
     with pytest.raises(MessageError, match=text):
-        stamped_pose_to_array(stamped_pose((0.0, 0.0, 0.0), frame), "map", "goal")
-
-
-def test_a_path_is_refused_by_its_bad_part():
-    with pytest.raises(MessageError, match="path has no poses"):
-        path_to_poses(poses_path([], "map"), "map")
-    with pytest.raises(MessageError, match="path is in frame 'odom'"):
-        path_to_poses(poses_path([[0.0, 0.0, 0.0]], "odom"), "map")
-    path = poses_path(np.zeros((4, 3)), "map")
-    path.poses[2].header.frame_id = "base_link"
-    with pytest.raises(MessageError, match="path pose 2 is in frame 'base_link'"):
-        path_to_poses(path, "map")
-    path = poses_path(np.zeros((4, 3)), "map")
-    path.poses[3].pose.orientation.w = 0.0
-    with pytest.raises(MessageError, match=r"path pose 3 orientation .* has length 0"):
-        path_to_poses(path, "map")
+        path_to_poses(make(), "map")
 
 
 def test_poses_of_a_path_may_leave_their_frame_empty():
@@ -98,20 +138,59 @@ def test_poses_of_a_path_may_leave_their_frame_empty():
     np.testing.assert_array_equal(path_to_poses(path, "map"), np.zeros((1, 3)))
 
 
-def test_decimation_keeps_the_ends_and_the_spacing():
+@settings(max_examples=200)
+@given(numbers=st.lists(st.floats(), min_size=7, max_size=7))
+def test_every_pose_is_read_or_refused(numbers):
+    path = poses_path(np.zeros((2, 3)), "map")
+    place, turn = path.poses[1].pose.position, path.poses[1].pose.orientation
+    place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w = numbers
+    try:
+        assert np.isfinite(path_to_poses(path, "map")).all()
+    except MessageError as error:
+        assert len(str(error)) <= MAX_TEXT
+
+
+def test_decimation_keeps_the_ends_the_spacing_and_what_it_is_told_to():
     poses = np.column_stack([np.linspace(0.0, 3.0, 151), np.zeros(151)])
     rows = decimate(poses, 0.1)
     assert rows[0] == 0 and rows[-1] == 150
     np.testing.assert_allclose(np.diff(poses[rows, 0]), 0.1, atol=1e-12)
-    np.testing.assert_array_equal(decimate(poses, 0.0), np.arange(151))
+    for spacing in (0.0, 1e-9, 5e-324):
+        np.testing.assert_array_equal(decimate(poses, spacing), np.arange(151))
     np.testing.assert_array_equal(decimate(poses, 100.0), [0, 150])
     np.testing.assert_array_equal(decimate(poses[:1], 0.1), [0])
+    np.testing.assert_array_equal(decimate(poses, 1.0, [7, 8, 7]), [0, 7, 8, 50, 100, 150])
+    np.testing.assert_array_equal(decimate(np.zeros((5, 3)), 0.1), [0, 4])  # stands still
 
 
-def test_decimation_keeps_what_it_is_told_to():
-    poses = np.column_stack([np.linspace(0.0, 1.0, 51), np.zeros(51)])
-    np.testing.assert_array_equal(decimate(poses, 0.5, [7, 25, 8]), [0, 7, 8, 25, 50])
+POSES = [(0.0, 0.0, 0.0), (1.0, 0.5, 0.3)]
 
 
-def test_decimation_copes_with_standing_still():
-    np.testing.assert_array_equal(decimate(np.zeros((5, 3)), 0.1), [0, 4])
+def seven(pose):
+    p, q = pose.position, pose.orientation
+    return struct.pack("<7d", p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+
+
+def test_the_hash_is_the_documented_one():
+    path = poses_path(POSES, "map")
+    data = b"map\0" + b"".join(seven(stamped.pose) for stamped in path.poses)
+    assert path_hash(path) == hashlib.sha256(data).hexdigest()[:16]
+    start, goal = (stamped_pose(pose, "map") for pose in POSES)
+    on_wire = struct.unpack("<f", struct.pack("<f", 0.1))[0]
+    data = b"map\0map\0" + seven(start.pose) + seven(goal.pose) + struct.pack("<d", on_wire)
+    for tolerance in (0.1, on_wire):
+        found = plan_request_hash(start, goal, tolerance)
+        assert found == hashlib.sha256(data).hexdigest()[:16]
+
+
+def test_stamps_do_not_count_and_poses_order_and_frame_do():
+    path = poses_path(POSES, "map")
+    assert path_hash(poses_path(POSES, "map", Time(sec=5))) == path_hash(path)
+    others = [
+        poses_path(POSES[::-1], "map"),
+        poses_path(POSES[:1], "map"),
+        poses_path([POSES[0], (1.0, 0.5, 0.3 + 1e-12)], "map"),
+        poses_path(POSES, "odom"),
+        poses_path([], "map"),
+    ]
+    assert len({path_hash(other) for other in [path, *others]}) == 1 + len(others)

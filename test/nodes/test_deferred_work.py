@@ -1,16 +1,18 @@
-"""What is put off runs after the callback, requests first, and a fault in it is not the end."""
+"""What is put off runs after the callback, requests first; messages wait for listeners."""
 
 import threading
 import time
 from functools import partial
 
 import pytest
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
 import rover_planner.ros.deferred_work
 from rover_planner.ros.deferred_work import MAX_WAITING, DeferredWork
+from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
+from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import call
 from support.waiting import TIMEOUT, wait_until
 
@@ -21,36 +23,31 @@ def busy(ros):
     return Node("busy", context=ros.context)
 
 
-def test_what_is_put_off_runs_answer_by_answer_and_only_when_the_node_spins(ros, busy):
-    executor = SingleThreadedExecutor(context=ros.context)
-    executor.add_node(busy)
-    deferred_work, done = DeferredWork(busy), []
-    for answer in "abc":
-        deferred_work.do(*(partial(done.append, f"{answer}{k}") for k in range(3)))
-    assert done == []
-    end = time.monotonic() + TIMEOUT
-    while len(done) < 9 and time.monotonic() < end:
-        executor.spin_once(timeout_sec=0.1)
-    assert done == ["a0", "a1", "a2", "b0", "b1", "b2", "c0", "c1", "c2"]
-    executor.shutdown()
-    busy.destroy_node()
+@pytest.fixture
+def serve(ros, client, busy):
+    """Return a function that spins the node with a service; it returns the service's client."""
+
+    def start(answer):
+        busy.create_service(Trigger, "ask", answer)
+        ros.spin(busy)
+        return client.create_client(Trigger, "ask")
+
+    return start
 
 
-def test_the_answer_does_not_wait_for_the_work(ros, client, busy):
+def test_the_answer_does_not_wait_for_the_work(busy, serve):
     deferred_work, answered, waited = DeferredWork(busy), threading.Event(), []
 
     def answer(_request, response):
         deferred_work.do(lambda: waited.append(answered.wait(TIMEOUT)))
         return response
 
-    busy.create_service(Trigger, "ask", answer)
-    ros.spin(busy)
-    call(client.create_client(Trigger, "ask"), Trigger.Request())
+    call(serve(answer), Trigger.Request())
     answered.set()
     wait_until(lambda: waited == [True], "the work")
 
 
-def test_a_request_goes_before_what_is_left_of_the_work(ros, client, busy):
+def test_a_request_goes_before_what_is_left_of_the_work(busy, serve):
     deferred_work, told, pieces = DeferredWork(busy), [], 2000
 
     def work(k):
@@ -66,9 +63,7 @@ def test_a_request_goes_before_what_is_left_of_the_work(ros, client, busy):
             deferred_work.do(*(partial(work, k) for k in range(pieces)))
         return response
 
-    busy.create_service(Trigger, "ask", answer)
-    ros.spin(busy)
-    ask = client.create_client(Trigger, "ask")
+    ask = serve(answer)
     call(ask, Trigger.Request())
     wait_until(lambda: 0 in told, "the first of the work")
     call(ask, Trigger.Request())
@@ -77,11 +72,10 @@ def test_a_request_goes_before_what_is_left_of_the_work(ros, client, busy):
     assert [one for one in told if isinstance(one, int)] == list(range(pieces))
 
 
-def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(
-    ros, client, busy, monkeypatch
-):
+def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(busy, serve, monkeypatch):
     monkeypatch.setattr(rover_planner.ros.deferred_work, "QUIET", 1e3)  # no pause is long enough
     deferred_work, done, asked = DeferredWork(busy), [], 3 * MAX_WAITING
+    numbers = iter(range(asked))
 
     def answer(_request, response):
         response.message = str(len(done))
@@ -89,10 +83,7 @@ def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(
         deferred_work.do(partial(done.append, (number, 0)), partial(done.append, (number, 1)))
         return response
 
-    numbers = iter(range(asked))
-    busy.create_service(Trigger, "ask", answer)
-    ros.spin(busy)
-    ask = client.create_client(Trigger, "ask")
+    ask = serve(answer)
     for k in range(asked):
         finished = int(call(ask, Trigger.Request()).message) // 2
         assert finished == max(0, k - MAX_WAITING)
@@ -105,7 +96,69 @@ def test_a_fault_leaves_the_rest_and_the_node(ros, client, busy):
     deferred_work.do(lambda: 1 / 0, lambda: done.append("the rest"))
     deferred_work.do(lambda: 1 / 0)
     deferred_work.do(lambda: done.append("the next"))
+    assert done == []
     ros.spin(busy)
     wait_until(lambda: done == ["the rest", "the next"], "the rest")
     assert ros.is_alive(busy)
     client.wait_for_log("ZeroDivisionError")
+
+
+def listen(ros, name="listener"):
+    """Return a new listener and the numbers that it hears."""
+    heard, node = [], Node(name, context=ros.context)
+    node.create_subscription(
+        Int32, "numbers", lambda number: heard.append(number.data), result_qos()
+    )
+    return ros.spin(node), heard
+
+
+@pytest.fixture
+def topic(busy):
+    """Return a lazy publisher of numbers."""
+    yield LazyPublisher(busy, Int32, "numbers")
+    busy.destroy_node()
+
+
+def test_nobody_listens_so_nothing_is_made_and_who_comes_gets_the_latest(ros, topic):
+    made = []
+    for number in range(3):
+        topic.publish(lambda number=number: made.append(number) or Int32(data=number))
+    assert made == [] and not topic.is_awaited
+    _, heard = listen(ros)
+    wait_until(lambda: topic.is_awaited, "the listener")
+    topic.catch_up()
+    topic.catch_up()
+    wait_until(lambda: heard == [2], "the latest")
+    assert made == [2] and not topic.is_awaited
+    for number in range(3, 6):
+        topic.publish(lambda number=number: Int32(data=number))
+    wait_until(lambda: heard == [2, 3, 4, 5], "all in order")
+    _, late = listen(ros, "late_listener")
+    wait_until(lambda: late == [5], "the latest alone")
+
+
+def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(ros, topic):
+    visitor, seen = listen(ros, "visitor")
+    wait_until(lambda: topic._publisher.has_listeners, "its match")
+    topic.publish(lambda: Int32(data=1))
+    wait_until(lambda: seen == [1], "the first")
+    visitor.destroy_node()
+    wait_until(lambda: not topic._publisher.has_listeners, "the leave")
+    topic.publish(lambda: Int32(data=2))
+    _, heard = listen(ros)
+
+    def catch_up():
+        topic.catch_up()
+        return heard
+
+    wait_until(catch_up, "the latest")
+    assert heard == [2]
+
+
+def test_a_message_that_cannot_be_made_is_not_tried_again(ros, topic):
+    topic.publish(lambda: 1 / 0)
+    listen(ros)
+    wait_until(lambda: topic.is_awaited, "the listener")
+    with pytest.raises(ZeroDivisionError):
+        topic.catch_up()
+    assert not topic.is_awaited

@@ -1,7 +1,6 @@
 """Recorded drives are judged again: from SQLite and MCAP, with maps, joints and odometry."""
 
 import json
-import os
 import re
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from rover_planner.cli import main
 from rover_planner.command.prediction_files import read_prediction
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.viewer.state.session import ViewSession
-from support.messages.grid_maps import grid_map_of, move_buffer
 from support.messages.recorded_drives import (
     BEGIN,
     LSR1,
@@ -29,7 +27,6 @@ from support.messages.recorded_drives import (
     odometry_at,
     path_to,
     record,
-    record_grid_map,
     replay,
     waves,
 )
@@ -53,30 +50,6 @@ def test_a_drive_is_judged_in_stretches_with_what_was_measured(storage, tmp_path
         assert (np.diff(measured["stamp"]) >= 0).all()
         assert np.ptp(measured["bogie_angle"]) > 0.1
     assert answers[0]["stamp"] == "1700000000.020000000"
-
-
-def test_joints_that_the_model_does_not_predict_show_in_the_difference(tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(2.0, off=0.1)])
-    (answer,), _ = replay(capsys, bag, tmp_path / "out")
-    assert answer["suspension"]["rms"] == pytest.approx(0.1 / np.sqrt(2.0), abs=0.02)
-    assert 0.1 < answer["suspension"]["largest"] < 0.2
-
-
-def test_both_storages_give_the_same_predictions(tmp_path, capsys):
-    messages = [
-        ("/elevation_cloud", cloud(waves())),
-        *drive(1.0),
-        ("/traverse_server/path", path_to(3.0)),
-    ]
-    told = {}
-    for storage in STORAGES:
-        bag = record(tmp_path / storage, messages, storage)
-        told[storage] = replay(capsys, bag, tmp_path / f"out_{storage}")
-    assert told["sqlite"] == told["mcap"]
-    for name in ("001_check_path.npz", "002_driven.npz"):
-        one, other = (np.load(tmp_path / f"out_{storage}" / name) for storage in STORAGES)
-        for key in one.files:
-            np.testing.assert_array_equal(one[key], other[key])
 
 
 def test_the_page_opens_predictions_on_their_maps(tmp_path, capsys):
@@ -128,21 +101,6 @@ def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
     np.testing.assert_allclose(first[[0, -1], 0], [1.0, 3.0], atol=1e-6)
 
 
-def test_a_grid_map_is_replayed_without_its_package_whatever_its_buffer(tmp_path, capsys):
-    heights = waves().elevation
-    centre = -1.0 + 0.04 * (heights.shape[1] - 1) / 2, -2.0 + 0.04 * (heights.shape[0] - 1) / 2
-    message = grid_map_of({"elevation": heights}, 0.04, centre)
-    told = []
-    for name, map_message in (("still", message), ("moved", move_buffer(message, 31, 17))):
-        bag = record_grid_map(tmp_path / name, map_message)
-        answers, total = replay(capsys, bag, tmp_path / f"out_{name}", "--goal", "3,0.2,0")
-        assert total["topics"]["map"] == "/elevation_map" and total["refused_messages"] == {}
-        told.append(answers)
-    assert told[0] == told[1] and len(told[0]) == 1 and told[0][0]["waypoints"] > 90
-    ground = load_terrain(tmp_path / "out_moved" / "map_001.npz")
-    np.testing.assert_allclose(ground.elevation, heights, atol=1e-6)
-
-
 def test_local_maps_merge_into_a_loaded_one_as_in_the_server(tmp_path, capsys):
     prior = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
     save_terrain(tmp_path / "prior.npz", prior)
@@ -172,23 +130,6 @@ def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
     assert json.loads(out)["refused_messages"] == {"map": 1, "odometry": 1, "joints": 1}
     assert err.count("not used: ") == 3
     assert "not used: /elevation_cloud at 1700000000.000000000" in err
-
-
-def test_a_parameter_file_of_the_server_sets_rover_and_policy(tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(1.0)])
-    file = tmp_path / "server.yaml"
-    file.write_text(
-        "/**:\n  ros__parameters: {policy: optimal, control_margin: 0.5, rover: m2020}\n"
-    )
-    (answer,), _ = replay(
-        capsys, bag, tmp_path / "out", "--parameters", str(file), "--rover", "lsr1"
-    )
-    (plain,), _ = replay(capsys, bag, tmp_path / "plain")
-    torques = [
-        np.load(tmp_path / folder / told["prediction"])["torque"]
-        for folder, told in (("out", answer), ("plain", plain))
-    ]
-    assert np.ptp(torques[0], axis=1).max() > 10.0 * np.ptp(torques[1], axis=1).max() + 1e-6
 
 
 @pytest.mark.parametrize(
@@ -231,27 +172,6 @@ def test_an_answer_is_never_written_over(tmp_path, capsys):
     (tmp_path / "out").mkdir()
     assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
     assert "exists already" in capsys.readouterr().err
-
-
-def test_clouds_of_spirits_hazcams_are_replayed(tmp_path, capsys):
-    beside = Path(__file__).resolve().parents[3] / "shared" / "bags"
-    folder = Path(os.environ.get("ROVER_BAG_DIR", beside))
-    bag = folder / "mer_spirit_sol1352_hazcam_mcap"
-    if not bag.is_dir():
-        pytest.skip(f"no bag {bag}; set ROVER_BAG_DIR to its folder")
-    file = tmp_path / "hazcam.yaml"
-    file.write_text(
-        "/**: {ros__parameters: {map_resolution: 0.05, cell_height: mean, max_gap: 0.5, "
-        "unknown_cells: interpolate}}\n"
-    )
-    words = ["--parameters", str(file), "--map-frame", "site"]
-    words += ["--start=-44.4,-19.4,-2.5", "--goal=-45.5,-20.2,-2.5"]
-    answers, total = replay(capsys, bag, tmp_path / "out", *words)
-    assert total["topics"] == {"map": "/hazcam/points"} and total["refused_messages"] == {}
-    assert [answer["traversable"] for answer in answers] == [True, False]
-    assert "cannot stand at the start: unknown ground under a wheel" in answers[1]["reason"]
-    prediction, reasons = read_prediction(tmp_path / "out" / answers[0]["prediction"])
-    assert prediction.settled.all() and not any(reasons)
 
 
 def test_orientation_of_odometry_is_its_heading(tmp_path, capsys):

@@ -1,13 +1,10 @@
 """Replays know the robot: IMU, mounted cameras, recorded transforms, names of joints."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.stamps import ns_to_stamp
@@ -18,7 +15,6 @@ from support.messages.grid_maps import grid_map_of
 from support.messages.recorded_drives import (
     BEGIN,
     cloud,
-    drive,
     imu_at,
     joints_of,
     odometry_at,
@@ -53,25 +49,6 @@ def test_ground_under_the_rover_is_filled_as_the_imu_says(imu_attitude, tmp_path
     ground = load_terrain(tmp_path / "out" / answer["map"])
     left, right = ground.elevation_at(np.array([1.0, 1.0]), np.array([0.3, -0.3]))
     assert left - right == pytest.approx(0.6 * np.tan(0.2) if imu_attitude else 0.0, abs=0.03)
-
-
-def test_clouds_of_a_mounted_camera_are_replayed(tmp_path, capsys):
-    file, maps = tmp_path / "server.yaml", []
-    file.write_text(
-        "/**: {ros__parameters: {map_resolution: 0.04, sensor_mounts: ['camera:0.5:0:1:0:0:0']}}\n"
-    )
-    moved = replace(waves(), elevation=waves().elevation - 1.0, origin=(-2.5, -2.0))
-    for name, one in (("map", cloud(waves())), ("camera", cloud(moved, frame="camera"))):
-        odometry = odometry_at(1.0)
-        odometry.header.stamp = ns_to_stamp(BEGIN)
-        bag = record(tmp_path / name, [("/odometry", odometry), ("/elevation_cloud", one)])
-        words = ["--parameters", str(file), "--goal", "3,0.2,0"]
-        (answer,), total = replay(capsys, bag, tmp_path / f"out_{name}", *words)
-        assert total["refused_messages"] == {}
-        maps.append(load_terrain(tmp_path / f"out_{name}" / answer["map"]))
-    assert maps[0].elevation.shape == maps[1].elevation.shape
-    np.testing.assert_allclose(maps[1].origin, maps[0].origin, atol=1e-5)
-    np.testing.assert_allclose(maps[1].elevation, maps[0].elevation, atol=1e-5)
 
 
 def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, capsys):
@@ -126,18 +103,6 @@ def test_a_grid_map_in_odom_is_laid_onto_the_loaded_map(tmp_path, capsys):
     assert ground.elevation_at(6.0, 1.0) == 0.0
 
 
-def test_joints_with_the_names_of_the_robot_are_measured(tmp_path, capsys):
-    messages = [("/elevation_cloud", cloud(waves())), *drive(1.0)]
-    for _, message in messages:
-        if isinstance(message, JointState):
-            message.name = [name.replace("bogie_right", "bogie_r") for name in message.name]
-    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
-    file.write_text("/**: {ros__parameters: {joint_map: ['bogie_right:bogie_r']}}\n")
-    (answer,), _ = replay(capsys, bag, tmp_path / "out", "--parameters", str(file))
-    measured = np.load(tmp_path / "out" / answer["measured"])
-    assert np.isfinite(measured["bogie_angle"]).all()
-
-
 def messages_on(bag, topic, kind):
     """Return the messages of a topic."""
     with Reader(bag) as reader:
@@ -167,16 +132,6 @@ def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_join
     np.testing.assert_allclose([plan.x, plan.y], [1.0, 0.0], atol=0.1)  # the rover leans
     for joints in messages_on(told, "/traverse_server/predicted_joints", JointTrajectory):
         assert "bogie_r" in joints.joint_names and "bogie_right" not in joints.joint_names
-
-
-def test_a_wrong_joint_map_is_bad_input(tmp_path, capsys):
-    bag, file = (
-        record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))]),
-        tmp_path / "p.yaml",
-    )
-    file.write_text("/**: {ros__parameters: {joint_map: ['bogie:b']}}\n")
-    assert main(["replay", str(bag), str(tmp_path / "out"), "--parameters", str(file)]) == 2
-    assert "joint_map has joint 'bogie', which the model does not have" in capsys.readouterr().err
 
 
 def test_a_goal_without_a_start_is_told(tmp_path, capsys):

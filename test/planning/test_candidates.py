@@ -37,6 +37,20 @@ def test_every_candidate_begins_at_the_start_and_ends_at_the_goal(start, goal):
 
 
 @FEW
+@given(POSES, POSES)
+def test_paths_point_where_they_lead_and_no_curve_is_too_tight(start, goal):
+    for path in generate_candidates(start, goal):
+        steps = np.diff(path[:, :2], axis=0)
+        gaps = np.hypot(*steps.T)
+        turned = angle_between(path[1:, 2], path[:-1, 2])
+        assert np.all(turned <= gaps / MIN_RADIUS * 1.01 + 1e-6)
+        along = np.arctan2(steps[:, 1], steps[:, 0])
+        middle = path[:-1, 2] + 0.5 * np.angle(np.exp(1j * np.diff(path[:, 2])))
+        # where an arc to the left meets one to the right, half-way in yaw is not half-way in path
+        assert np.all(angle_between(along, middle)[gaps > 1e-3] < 0.02 / MIN_RADIUS / 3)
+
+
+@FEW
 @given(POSES, POSES, st.sampled_from([0.02, 0.05, 0.13]))
 def test_waypoints_are_equally_far_apart(start, goal, waypoint_spacing):
     for path in generate_candidates(start, goal, waypoint_spacing=waypoint_spacing):
@@ -49,37 +63,9 @@ def test_waypoints_are_equally_far_apart(start, goal, waypoint_spacing):
         assert gaps.max() - gaps.min() <= gaps.max() * (1e-4 + 2 * shortening)
 
 
-@FEW
-@given(POSES, POSES)
-def test_headings_are_continuous_and_no_curve_is_too_tight(start, goal):
-    for path in generate_candidates(start, goal):
-        turned = angle_between(path[1:, 2], path[:-1, 2])
-        gaps = np.hypot(*np.diff(path[:, :2], axis=0).T)
-        assert np.all(turned <= gaps / MIN_RADIUS * 1.01 + 1e-6)
-
-
-@FEW
-@given(POSES, POSES)
-def test_yaw_is_the_direction_of_driving(start, goal):
-    for path in generate_candidates(start, goal):
-        steps = np.diff(path[:, :2], axis=0)
-        far_enough = np.hypot(*steps.T) > 1e-3
-        along = np.arctan2(steps[:, 1], steps[:, 0])
-        half_turn = 0.5 * np.angle(np.exp(1j * np.diff(path[:, 2])))
-        middle = path[:-1, 2] + half_turn
-        # where an arc to the left meets one to the right, half-way in yaw is not half-way in path
-        assert np.all(angle_between(along, middle)[far_enough] < 0.02 / MIN_RADIUS / 3)
-
-
-def test_the_first_candidate_between_aligned_poses_is_the_straight_line():
-    path = generate_candidates((1.0, 2.0, 0.0), (5.0, 2.0, 0.0))[0]
-    assert path[:, 1] == pytest.approx(2.0, abs=1e-12)
-    assert path[:, 2] == pytest.approx(0.0, abs=1e-12)
-    assert len(path) == 201
-
-
 def test_the_fan_spreads_by_the_spacing_to_both_sides():
     paths = generate_candidates((0, 0, 0), (10, 0, 0), count=7, spacing=0.4)
+    assert np.abs(paths[0][:, 1:]).max() < 1e-12 and len(paths[0]) == 501
     furthest = [path[np.argmax(np.abs(path[:, 1])), 1] for path in paths]
     assert furthest == pytest.approx([0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2], abs=1e-3)
     assert lateral_offsets(4, 0.5) == [0.0, 0.5, -0.5, 1.0]
@@ -94,7 +80,7 @@ def test_curves_too_tight_for_the_rover_are_dropped_but_never_all():
 
 @pytest.mark.parametrize(
     "goal",
-    [(-5, 0, 0), (5, 0, np.pi), (0.3, 0.3, 1.57), (0, 0, np.pi), (0, 0.01, 0), (-1, 0, np.pi)],
+    [(-5, 0, 0), (0.3, 0.3, 1.57), (0, 0, np.pi), (0, 0.01, 0), (-1, 0, np.pi)],
 )
 def test_awkward_goals_get_arcs_of_the_smallest_radius(goal):
     paths = generate_candidates((0, 0, 0), goal, min_radius=0.8)
@@ -106,11 +92,10 @@ def test_awkward_goals_get_arcs_of_the_smallest_radius(goal):
 
 def test_a_u_turn_swings_out_instead_of_turning_on_the_spot():
     path = generate_candidates((0, 0, 0), (0, 4, np.pi))[0]
-    assert path[:, 0].max() > 0.5
-    assert path[:, 0].min() > -1e-9
+    assert path[:, 0].max() > 0.5 and path[:, 0].min() > -1e-9
 
 
-@pytest.mark.parametrize("yaw", [0.0, 1.0, -np.pi, 7.0])
+@pytest.mark.parametrize("yaw", [0.0, 7.0])
 def test_start_equal_to_goal_is_a_single_pose(yaw):
     paths = generate_candidates((1, 2, yaw), (1, 2, yaw))
     assert len(paths) == 1

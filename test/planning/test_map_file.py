@@ -6,13 +6,13 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.hostile_files import make_oddities
 from rover_physics.errors import RoverError, TerrainError
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import map_limits
 from rover_planner.worlds.map_file import MapFileError, MapLimits, open_map
 from support.grounds import make_terrain, waves
+from support.hostile_files import make_oddities
 
 
 @pytest.fixture

@@ -30,28 +30,28 @@ def test_loads_are_even_where_the_bogie_hangs_midway_between_its_wheels():
     assert best.objective == pytest.approx(1.0, abs=0.02)
 
 
+def test_an_optimisation_finds_what_a_sweep_finds_without_ties():
+    found = run_study(study(method="optimise", evaluations=40))
+    assert len(found.trials) <= 40
+    assert found.best.values[0] == pytest.approx(0.2, abs=0.02)
+    assert found.ties == () and describe_ties(found) == ""
+    keys = [parameter.keys[0] for parameter in found.study.parameters]
+    best = vary(found.study.rover, dict(zip(keys, found.best.values, strict=True)))
+    assert find_rover(found.study, found.best) == best
+
+
 def test_equal_load_shares_need_the_least_friction_on_nearly_level_ground():
     drives = [{"slope": 0.05, "length": 0.1}, {"slope": -0.05, "length": 0.1}]
     best = run_study(study(objective="worst_utilisation", drives=drives)).best
     assert best.values[0] == pytest.approx(0.2, abs=0.026)
 
 
-def test_an_optimisation_finds_what_a_sweep_finds():
-    found = run_study(study(method="optimise", evaluations=40))
-    assert len(found.trials) <= 40
-    assert found.best.values[0] == pytest.approx(0.2, abs=0.02)
-
-
 def test_the_tallest_step_is_climbed_and_a_little_more_is_not():
     height = tallest_step(LSR1, "equal", 0.6)
+    assert tallest_step(LSR1, "optimal", 0.6) >= height
     assert 0.02 < height < 0.3
     assert climbs(LSR1, height, "equal", 0.6)
     assert not climbs(LSR1, height + 0.004, "equal", 0.6)
-
-
-@pytest.mark.slow
-def test_best_torques_climb_at_least_as_high_as_equal_ones():
-    assert tallest_step(LSR1, "optimal", 0.6) >= tallest_step(LSR1, "equal", 0.6)
 
 
 def test_a_rover_that_cannot_be_is_a_trial_with_a_note_and_no_value():
@@ -80,13 +80,16 @@ def test_on_level_sand_equal_load_shares_need_the_least_energy():
 
 
 def test_a_drive_that_breaks_another_limit_gives_no_value_but_the_reason():
-    parameters = [{"name": "belly.z", "from": -0.285, "to": -0.1, "count": 2}]
+    mass = {"name": "masses.body.mass", "from": 4.0, "to": 6.0, "count": 2}
+    parameters = [{"name": "belly.z", "from": -0.285, "to": -0.1, "count": 2}, mass]
     drives = [{"slope": 0.1, "length": 0.1}]
-    low, high = run_study(
+    trials = run_study(
         study(objective="worst_utilisation", drives=drives, parameters=parameters)
     ).trials
-    assert np.isnan(low.objective) and "drive 1: belly clearance" in low.note
-    assert high.objective > 0.0
+    assert len({trial.values for trial in trials}) == 4  # all combinations
+    for trial in trials:
+        is_low = trial.values[0] < -0.2
+        assert np.isnan(trial.objective) == is_low == ("drive 1: belly clearance" in trial.note)
 
 
 def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones():
@@ -126,15 +129,6 @@ def test_files_are_looked_for_beside_the_study(tmp_path):
     }  # fmt: skip
     task = study_from_dict(data, "study", tmp_path)
     assert np.isfinite([trial.objective for trial in run_study(task).trials]).all()
-
-
-def test_two_parameters_are_tried_in_all_combinations():
-    parameters = [
-        PIVOT_X | {"count": 2},
-        {"name": "masses.body.mass", "from": 4.0, "to": 6.0, "count": 3},
-    ]
-    result = run_study(study(parameters=parameters))
-    assert len({trial.values for trial in result.trials}) == 6
 
 
 @pytest.mark.parametrize(
@@ -202,12 +196,3 @@ def test_rovers_as_good_within_the_resolution_are_named():
     assert max(values) - min(values) < 0.002  # the heights are found to 2 mm
     assert len(result.ties) == 2 and result.best not in result.ties
     assert describe_ties(result).startswith("as good within 0.002 m: suspension.bogie_pivot.z = ")
-
-
-def test_an_optimisation_has_no_ties_and_the_best_rover_has_its_values():
-    result = run_study(study(method="optimise", evaluations=10))
-    assert result.ties == () and describe_ties(result) == ""
-    assert find_rover(result.study, result.best) == vary(
-        result.study.rover,
-        dict(zip((p.keys[0] for p in result.study.parameters), result.best.values, strict=True)),
-    )

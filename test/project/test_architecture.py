@@ -1,18 +1,12 @@
-"""The house: imports run one way between rooms, no folder is crowded, kernels stay small."""
+"""The house: no circle of imports, and they run one way between rooms."""
 
 import ast
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-import pytest
-
 TOP = Path(__file__).resolve().parents[2]
 PACKAGES = ("rover_physics", "msg_adapters", "rover_planner")
-MAX_ENTRIES = 16
-"""Files and folders that a person finds in one folder."""
-MAX_LINES = 400
-MAX_KERNEL_ARGUMENTS = 5
 
 
 @lru_cache
@@ -99,28 +93,6 @@ def test_a_circle_would_be_found():
     assert find_circle({"a": {"b", "c"}, "b": {"c"}}) == []
 
 
-def folders() -> list[Path]:
-    tops = [TOP / name for name in (*PACKAGES, "test", "support", "config", "docs")]
-    below = [path for top in tops for path in sorted(top.rglob("*")) if path.is_dir()]
-    return [path for path in [*tops, *below] if path.name != "__pycache__"]
-
-
-@pytest.mark.parametrize("folder", folders(), ids=lambda path: str(path.relative_to(TOP)))
-def test_no_folder_is_crowded(folder):
-    entries = [
-        path.name
-        for path in folder.iterdir()
-        if path.name not in ("__pycache__", "__init__.py", "__main__.py")
-        and path.suffix not in (".png", ".npz")
-    ]
-    assert len(entries) <= MAX_ENTRIES, sorted(entries)
-
-
-@pytest.mark.parametrize("name", sorted(modules()))
-def test_a_file_holds_one_concept(name):
-    assert len(modules()[name].read_text(encoding="utf-8").splitlines()) <= MAX_LINES
-
-
 def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:
     for name, path in modules().items():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -128,18 +100,3 @@ def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:
                 decorators = [getattr(item, "id", "") for item in node.decorator_list]
                 if any(decorator.endswith("kernel") for decorator in decorators):
                     yield f"{name}.{node.name}", node
-
-
-def test_kernels_take_few_arguments():
-    counts = {name: len(node.args.args) for name, node in kernels()}
-    assert len(counts) > 150
-    assert {k: n for k, n in counts.items() if n > MAX_KERNEL_ARGUMENTS} == {}
-
-
-def test_public_kernels_say_what_they_do():
-    silent = [
-        name
-        for name, node in kernels()
-        if not node.name.startswith("_") and not ast.get_docstring(node)
-    ]
-    assert silent == []

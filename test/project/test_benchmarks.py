@@ -3,148 +3,171 @@
 import importlib
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
-TOPICS = sorted(path.stem.removeprefix("bench_") for path in BENCHMARKS.glob("bench_*.py"))
+pytest.importorskip("rclpy", reason="benchmarks start nodes")
+from benchmarks.measure import Figure, median_times, print_figures, quantile, write_figures
+from benchmarks.run import TOPICS, compare
+from rover_physics import load_rover
+
 SMALL = {
-    "fan": {"ARCS": (2, 2, 2), "MAP_CELLS": 60, "MAP_ROWS": (0, 40)},
-    "growth": {
-        "LENGTHS": (1.0, 2.0),
-        "CANDIDATES": (1,),
-        "MAP_SIZES": (200, 240),
-        "RESOLUTIONS": (0.05,),
-    },
-    "hazards": {"CELLS": 120, "CHANGE": 8, "HEADINGS": 2},
-    "ingestion": {"CELLS": 60},
-    "maps": {"SIZES": (80,), "LOCAL": 20, "SECONDS": 0.5, "PERIOD": 0.1},
-    "mujoco": {"POSES": 2, "MANY": 20},
-    "parts": {"POSES": 20, "REPEATS": 2},
+    "faults": {"REPEATS": 1},
+    "load": {"QUESTIONS": 10, "BURSTS": {"light": (1.5, 0.05)}, "SECONDS": 2.0, "REPEATS": 1},
     "paths": {"REPEATS": 1, "MANY": 5_000},
-    "reachable": {"SIDE": 300},
+    "poses": {"POSES": 20, "ARCS": (2, 2, 2), "MAP_CELLS": 60, "MAP_ROWS": (0, 40)},
     "rough": {"POSES": 10, "LOOKED_AT": 3, "CELLS": (0.4,)},
-    "poses": {"POSES": 20, "FLOOR_POSES": 10, "LINES": 2, "SPACING": 0.2},
-    "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2},
+    "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2, "CELLS": 60},
     "start": {"STARTS": 1, "COLD_STARTS": 0},
-    "scheduler": {
-        "SIDES": (600,),
-        "WORKERS": 3,
-        "POSES_PER_SECOND": 1e7,
-        "MANY_WORKERS": 4,
-    },
-    "survey": {"CELLS": 96, "REPEATS": 1, "TURNS": 1, "COUNT": 2},
+    "survey": {"CELLS": (48, 96), "POSES": 500},
     "traction": {"ALONE_TIME": 0.5, "TOGETHER_TIME": 1.0},
-    "view": {"PATHS": 1, "LENGTH": 2.0, "SLIDERS": {"friction [-]": (0.6,)}},
-    "walls": {"POSES": 5, "HEIGHTS": (0.3,)},
 }
 """Values of each topic's constants with which it takes seconds."""
-QUICK = ("fan", "growth", "ingestion")
-"""Topics that take less than two seconds in the small size."""
+QUICK = ("poses", "rough")
+"""Topics that take a few seconds in the small size."""
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def threads():
     """Leave numba with the threads that it had."""
-    numba = pytest.importorskip("numba")
+    import numba
+
     before = numba.get_num_threads()
     yield
     numba.set_num_threads(before)
 
 
-LONGER = ("rough", "scheduler", "service", "start", "survey", "view")
-"""Topics that take more than ten seconds in the small size."""
-
-
-def params_of_topics():
-    """Return the topics with their marks."""
-    marks = {topic: (pytest.mark.slow,) for topic in TOPICS if topic not in QUICK}
-    marks |= {topic: (pytest.mark.slow, pytest.mark.long) for topic in LONGER}
-    return [pytest.param(topic, marks=marks.get(topic, ())) for topic in TOPICS]
-
-
-@pytest.mark.parametrize("topic", params_of_topics())
-def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, capsys, threads):
-    if topic == "mujoco":
-        pytest.importorskip("mujoco", reason="install the extra bench")
-    if topic in ("reachable", "survey", "scheduler"):
+@pytest.mark.parametrize(
+    "topic",
+    [
+        pytest.param(topic, marks=() if topic in QUICK else (pytest.mark.slow, pytest.mark.long))
+        for topic in TOPICS
+    ],
+)
+def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, capsys):
+    if topic == "survey":
         pytest.importorskip("distributed", reason="install the extra survey")
     module = importlib.import_module(f"benchmarks.bench_{topic}")
     for name, value in SMALL[topic].items():
         monkeypatch.setattr(module, name, value)
     figures = module.measure()
-    names = [(figure.topic, figure.name) for figure in figures]
+    names = [figure.name for figure in figures]
     assert names and len(set(names)) == len(names)
     assert all(math.isfinite(figure.value) for figure in figures)
     assert any(figure.value > 0.0 for figure in figures)
-    measure = importlib.import_module("benchmarks.measure")
-    measure.write(figures, tmp_path / "results.json")
+    write_figures(figures, tmp_path / "results.json")
     rows = json.loads((tmp_path / "results.json").read_text())
-    assert [(row["topic"], row["name"]) for row in rows] == names
-    measure.show(figures)
+    assert [row["name"] for row in rows] == names
+    print_figures(figures)
     assert figures[0].topic in capsys.readouterr().out
 
 
 def test_medians_are_of_calls_in_turns():
-    measure = importlib.import_module("benchmarks.measure")
     calls, ticks = [], iter(range(1000))
     functions = [lambda: calls.append("a"), lambda: calls.append("b")]
-    assert measure.median_times(functions, 3, lambda: float(next(ticks))) == [1.0, 1.0]
+    assert median_times(functions, 3, lambda: float(next(ticks))) == [1.0, 1.0]
     assert calls == ["a", "b"] * 4
-    assert [measure.quantile(range(1, 101), share) for share in (0.0, 0.5, 0.99, 1.0)] == [
-        1,
-        50,
-        99,
-        100,
-    ]
+    shares = (0.0, 0.5, 0.99, 1.0)
+    assert [quantile(range(1, 101), share) for share in shares] == [1, 50, 99, 100]
 
 
 @pytest.mark.parametrize(
     ("value", "target", "at_least", "met"),
-    [
-        (3.0, 4.0, False, True),
-        (5.0, 4.0, False, False),
-        (5.0, 4.0, True, True),
-        (5.0, None, 0, None),
-    ],
-)
+    [(3.0, 4.0, False, True), (5.0, 4.0, False, False), (5.0, 4.0, True, True),
+     (5.0, None, False, None)],
+)  # fmt: skip
 def test_figures_say_whether_their_target_is_met_and_become_a_file(
     value, target, at_least, met, tmp_path, capsys
 ):
-    measure = importlib.import_module("benchmarks.measure")
-    figure = measure.Figure("topic", "name", value, "us", target, bool(at_least))
-    measure.write([figure], tmp_path / "new" / "results.json")
+    figure = Figure("topic", "name", value, "us", target, at_least)
+    write_figures([figure], tmp_path / "new" / "results.json")
     (row,) = json.loads((tmp_path / "new" / "results.json").read_text())
     assert row["met"] is met and row["value"] == value and row["repeats"] >= 5
-    measure.show([figure])
+    print_figures([figure])
     assert ("\u2713" in capsys.readouterr().out) == bool(met)
 
 
-def test_the_fan_has_as_many_paths_as_enav(monkeypatch):
-    fan = (
-        importlib.import_module("benchmarks.bench_fan").enav_fan(0.0).reshape(14 * 11 * 11, 24, 3)
-    )
+def test_another_checkout_is_measured_in_turns_and_ratios_are_of_medians(tmp_path):
+    """A checkout need not have the same figures; its module answers as this one's does."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    for checkout, name in ((here, "slow"), (there, "fast")):
+        (checkout / "benchmarks").mkdir(parents=True)
+        (checkout / "benchmarks" / "run.py").write_text(
+            "import json, pathlib, sys\n"
+            f"log = pathlib.Path({str(tmp_path / 'log')!r})\n"
+            f"said = log.read_text() if log.exists() else ''\n"
+            f"log.write_text(said + '{name[0]}')\n"
+            f"value = {6.0 if name == 'slow' else 3.0} * (1 + said.count('{name[0]}'))\n"
+            "rows = [dict(topic='t', name=n, value=value, unit='s', met=None)\n"
+            f"        for n in ('both', '{name}')]\n"
+            "assert sys.argv[1:3] == ['--only', 'bench_t']\n"
+            "pathlib.Path(sys.argv[3]).write_text(json.dumps(rows))\n"
+        )
+    (figure,) = compare("t", there, 3, here)
+    assert (tmp_path / "log").read_text() == "fssffs"
+    assert (figure.name, figure.value, figure.unit, figure.repeats) == ("both", 2.0, "x", 3)
+
+
+def test_the_fan_has_as_many_paths_as_enav():
+    poses = importlib.import_module("benchmarks.bench_poses")
+    fan = poses.enav_fan(0.0).reshape(14 * 11 * 11, 24, 3)
     steps = np.linalg.norm(np.diff(fan[:, :, :2], axis=1), axis=2)
     np.testing.assert_allclose(steps, 0.25)
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_ways_are_compared_with_the_best_of_the_lattice_in_a_small_size(capsys):
-    ways = importlib.import_module("benchmarks.ways")
-    trials = importlib.import_module("benchmarks.way_trials.grounds")
-    rover = importlib.import_module("rover_physics.rover.rover_file").load_rover("lsr1")
-    worlds = importlib.import_module("rover_planner.worlds.mars_terrain")
-    case = trials.Case("small", rover, worlds.make_mars_terrain(3, 8.0), "equal")
+    from benchmarks.ways import Case, run_case, show
+    from rover_planner.worlds.mars_terrain import make_mars_terrain
+
+    case = Case("small", load_rover("lsr1"), make_mars_terrain(3, 8.0))
     asked = {"count": 2, "seed": 0, "budget": 2.0, "truth": 2, "truth_seconds": 100.0, "warm": 1}
-    asked |= {"ompl": 0, "threads": 1, "nodes": 1000, "edges": 60}
-    rows = list(ways.run_case(case, asked))
-    assert [row.get("outcome") for row in rows] == ["found", "found", None, None]
-    assert all(row["passes"] and 0.0 < row["best"] < np.inf for row in rows[:2])
-    assert rows[0]["warm_outcome"] == "found" and rows[0]["same_on_threads"] is not False
-    assert rows[2]["wrong"] == 0
-    assert rows[3]["ranked"] == 60 and 0 < rows[3]["refused"] < 60
-    assert 0.5 < rows[3]["rank"] <= 1.0
-    ways.show(rows)
+    rows = list(run_case(case, asked))
+    assert [row["outcome"] for row in rows] == ["found", "found"]
+    assert all(row["passes"] and 0.0 < row["best"] < np.inf for row in rows)
+    assert rows[0]["warm_outcome"] == "found"
+    show(rows)
     assert "found of connected" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_hostile_inputs_over_dds_do_no_harm():
+    from benchmarks.fuzz import fuzz
+
+    fuzzer = fuzz(seed=7, count=150)
+    assert fuzzer.defects == []
+    assert fuzzer.counts.total() == 150 and fuzzer.commands > 0
+
+
+def test_the_same_seed_damages_the_same_way_and_every_type_of_field():
+    from benchmarks.fuzz import MESSAGES, REQUESTS, Mutator, serialise
+
+    makes = [*MESSAGES.values(), *(make for _, make in REQUESTS.values())] * 20
+    ours, others = ([repr(m.damage(make())) for make in makes] for m in (Mutator(7), Mutator(7)))
+    assert ours == others
+    assert sum(one != repr(make()) for one, make in zip(ours, makes, strict=True)) > 150
+    mutator = Mutator(8)
+    assert all(serialise(mutator.damage(make())) for make in makes)  # DDS can carry them
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_energy_is_compared_with_drives_in_mujoco(capsys):
+    pytest.importorskip("mujoco", reason="install the extra bench")
+    importlib.import_module("benchmarks.validate").print_energy(step=19)
+    assert "median error" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_controllers_are_compared_in_mujoco(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("mujoco", reason="install the extra bench")
+    traction = importlib.import_module("benchmarks.traction")
+    monkeypatch.setattr(traction, "QUICK_STEP", 19)
+    traction.main(quick=True, out=tmp_path)
+    assert "Rocks and relief" in capsys.readouterr().out
+    assert (tmp_path / "traction.png").is_file()
+    assert len(json.loads((tmp_path / "traction.json").read_text())["drives"]) == 8

@@ -13,7 +13,7 @@ import pytest
 TOP = Path(__file__).resolve().parents[2]
 PAGES = sorted(
     path.relative_to(TOP)
-    for path in [TOP / "README.md", TOP / "CHANGELOG.md", *(TOP / "docs").rglob("*.md")]
+    for path in [*TOP.glob("*.md"), *(TOP / "docs").rglob("*.md"), TOP / "examples/README.md"]
 )
 CODE = re.compile(r"`([^`\n]+)`")
 PACKAGES = ("rover_physics", "rover_planner", "msg_adapters", "support", "benchmarks")

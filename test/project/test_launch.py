@@ -176,17 +176,6 @@ def test_a_layout_shows_topics_that_the_nodes_publish(path):
     assert shown <= published | OF_OTHERS
 
 
-def test_foxglove_places_every_panel_once():
-    layout = json.loads((TOP / "config" / "views" / "foxglove.json").read_text())
-
-    def panels(part: Any) -> list[str]:
-        if isinstance(part, str):
-            return [part]
-        return panels(part["first"]) + panels(part["second"])
-
-    assert sorted(panels(layout["layout"])) == sorted(layout["configById"])
-
-
 def test_launch_and_configuration_files_are_installed():
     installed = dict(setup_arguments()["data_files"])
     assert installed["share/rover_planner/launch"] == [f"launch/{name}" for name in LAUNCH_FILES]

@@ -17,20 +17,21 @@ from support.survey_maps import (
     layers_of,
     make_request,
     make_rough_map,
+    prepare_here,
     survey_here,
 )
 
 
-def test_four_chunkings_give_the_same_bits(tmp_path):
-    terrain, request = make_rough_map(), make_request()
-    whole = layers_of(survey_here(tmp_path / "a", terrain, request, chunk=192))
-    assert len(np.unique(whole["first_limit"])) > 5
-    for chunk in (64, 128, 2000):
+def test_three_chunkings_give_the_same_bits(tmp_path):
+    terrain, request = make_rough_map(130, 140), make_request(headings=2)
+    whole = layers_of(survey_here(tmp_path / "a", terrain, request, chunk=2000))
+    assert len(np.unique(whole["first_limit"])) > 3
+    for chunk in (64, 128):
         other = survey_here(tmp_path / str(chunk), terrain, request, chunk=chunk)
         assert_same_bits(whole, layers_of(other))
 
 
-@pytest.mark.parametrize("step", [2, 3, 7, 100])
+@pytest.mark.parametrize("step", [3, 100])
 def test_steps_over_cells_do_not_depend_on_chunks_either(tmp_path, step):
     terrain, request = make_rough_map(), make_request(step=step)
     one = survey_here(tmp_path / "one", terrain, request, chunk=1)
@@ -40,12 +41,12 @@ def test_steps_over_cells_do_not_depend_on_chunks_either(tmp_path, step):
 
 
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
-@pytest.mark.parametrize("spoilt", [np.nan, 5.0])
-def test_ground_beyond_the_halo_is_not_looked_at(policy, spoilt):
+def test_ground_beyond_the_halo_is_not_looked_at(policy):
     request, terrain = make_request(policy=policy, turns=True), make_rough_map(120, 120)
     terrain = replace(terrain, origin=(0.0, 0.0))
     halo, first, end = find_halo(request.rover, terrain.resolution), 40, 80
-    heights = np.full_like(terrain.elevation, spoilt)
+    heights = np.full_like(terrain.elevation, np.nan)
+    heights[:, 60:] = 5.0
     near = (slice(first - halo, end + halo),) * 2
     heights[near] = terrain.elevation[near]
     cells = np.arange(first, end, 3) * terrain.resolution
@@ -55,7 +56,7 @@ def test_ground_beyond_the_halo_is_not_looked_at(policy, spoilt):
 
 
 def test_ground_within_the_halo_matters(tmp_path):
-    job = survey_here(tmp_path, make_rough_map(), make_request(), chunk=64).job
+    job = prepare_here(tmp_path, make_rough_map(), make_request(), chunk=64).job
     nearer = replace(job, layout=replace(job.layout, halo=4))
     ours, theirs = (compute_chunk(one, (1, 1)) for one in (job, nearer))
     assert (ours["first_limit"] != theirs["first_limit"]).any()
@@ -119,7 +120,7 @@ def test_chunks_take_some_seconds_and_are_not_too_many():
 
 
 def test_memory_grows_with_chunk_and_step(tmp_path):
-    job = survey_here(tmp_path, make_rough_map(), make_request(), chunk=64).job
+    job = prepare_here(tmp_path, make_rough_map(), make_request(), chunk=64).job
     large = replace(job, layout=SurveyLayout((100_000, 100_000), 1, 6400, 16))
     wide = replace(job, layout=SurveyLayout((100_000, 100_000), 100, 64, 16))
     assert estimate_memory(job) < 600_000_000

@@ -88,16 +88,7 @@ def compare_with_scipy(open_at, turns_at, numbers, distance):
     assert numbers.longest == distance[np.isfinite(distance)].max() == distance[numbers.farthest]
 
 
-@pytest.mark.parametrize("headings", [1, 4, 8, 12, 16])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_ways_are_the_shortest_of_the_graph_and_lead_back(headings, seed):
-    open_at, turns_at = make_flags((22, 25), headings, seed, 0.85)
-    numbers, distance = search(open_at, turns_at, 8)
-    compare_with_scipy(open_at, turns_at, numbers, distance)
-    assert headings < 8 or numbers.cells > 20
-
-
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     shape=st.tuples(st.integers(1, 13), st.integers(1, 13)),
     headings=st.sampled_from([1, 2, 3, 4, 8, 16, 24]),
@@ -149,10 +140,9 @@ def test_the_area_is_kept_in_the_store_until_more_is_surveyed(tmp_path):
     assert open_area(prepared.store) is None
 
 
-@pytest.mark.parametrize("headings", range(1, 65))
-def test_moves_lead_along_their_headings(headings):
-    moves = find_moves(headings, CELL)
-    for k in range(headings):
+def test_moves_lead_along_their_headings():
+    for headings, k in ((count, k) for count in range(1, 65) for k in range(count)):
+        moves = find_moves(headings, CELL)
         row, column = moves.steps[k, moves.counts[k] - 1]
         yaw = 2 * np.pi * k / headings
         off = (np.arctan2(row, column) - yaw + np.pi) % (2 * np.pi) - np.pi
@@ -160,8 +150,7 @@ def test_moves_lead_along_their_headings(headings):
         assert moves.lengths[k] == pytest.approx(CELL * np.hypot(row, column))
         steps = np.vstack([[0, 0], moves.steps[k, : moves.counts[k]]])
         assert np.abs(np.diff(steps, axis=0)).max() == 1
-    if headings == 8:
-        assert (moves.counts == 1).all()
+    assert (find_moves(8, CELL).counts == 1).all()
 
 
 def test_a_wall_bounds_what_can_be_reached_and_a_step_has_no_return(tmp_path):
@@ -179,7 +168,7 @@ def test_a_wall_bounds_what_can_be_reached_and_a_step_has_no_return(tmp_path):
 
 
 def test_judged_turns_bound_the_area(tmp_path):
-    terrain = make_rough_map(100, 100)
+    terrain = make_rough_map(70, 70)
     areas = []
     for turns in (False, True):
         request = make_request(headings=8, turns=turns)
@@ -189,17 +178,9 @@ def test_judged_turns_bound_the_area(tmp_path):
     assert judged.sum() < assumed.sum() and not (judged & ~assumed).any()
 
 
-def test_a_start_where_the_rover_cannot_stand_reaches_nothing(tmp_path):
-    heights = np.zeros((60, 60))
-    store = survey_here(tmp_path, Terrain(heights, 0.1), make_request(headings=8)).store
-    area = find_reachable(store, 0.0, 0.0)
-    assert area.cells == 0 and area.farthest is None
-    with pytest.raises(PlanningError, match=r"from \(99, 0\) is off the map; .* x 0 to 5.9"):
-        find_reachable(store, 99.0, 0.0)
-
-
 def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd):
-    store = survey_here(tmp_path, Terrain(np.zeros((60, 70)), 0.1), make_request(headings=8)).store
+    request = make_request(headings=8)
+    store = survey_here(tmp_path, Terrain(np.zeros((60, 70)), 0.1), request, chunk=64).store
     picture, tif = tmp_path / "area.png", tmp_path / "area.tif"
     words = ["reachable", str(store.path), "--from", "3,3", "--picture", str(picture)]
     assert main([*words, "--geotiff", str(tif)]) == 0
@@ -211,9 +192,14 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     assert report["cells_without_return"] == area.reached - area.cells > 0
     assert picture.stat().st_size > 10_000 and tif.stat().st_size > 100
     assert report["chunks_missing"] == 0
+    store.mark_failed((0, 1))
+    assert main(words) == 0
+    assert json.loads(capfd.readouterr().out)["chunks_missing"] == 1
     store.mark_failed((0, 0))
     with pytest.raises(PlanningError, match="not surveyed yet"):
         find_reachable(store, 3.0, 3.0)
+    with pytest.raises(PlanningError, match=r"from \(99, 0\) is off the map; .* x 0 to 6.9"):
+        find_reachable(store, 99.0, 0.0)
 
 
 def test_a_start_where_the_rover_cannot_stand_says_why(tmp_path, capfd):
@@ -229,15 +215,6 @@ def test_a_start_where_the_rover_cannot_stand_says_why(tmp_path, capfd):
     assert main(["reachable", str(store.path), "--from", "1.5,3"]) == 0
     report = json.loads(capfd.readouterr().out)
     assert report["cells"] > 0 and report["reason"] == ""
-
-
-def test_chunks_that_are_not_surveyed_are_told(tmp_path, capfd):
-    store = survey_here(
-        tmp_path, Terrain(np.zeros((60, 140)), 0.1), make_request(), chunk=64
-    ).store
-    store.mark_failed((0, 2))
-    assert main(["reachable", str(store.path), "--from", "3,3"]) == 0
-    assert json.loads(capfd.readouterr().out)["chunks_missing"] == 1
 
 
 def test_places_in_the_coordinates_of_a_projection_are_told_to_a_millimetre(tmp_path):

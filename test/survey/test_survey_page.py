@@ -16,11 +16,9 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_NUMBERS
 from rover_planner.survey.palette import CLASS_COLOURS
 from rover_planner.survey.reach.reachable import find_reachable
-from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.panel.survey_legend import draw_survey_legend
 from rover_planner.viewer.scene.survey_mesh import build_survey_mesh
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
-from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import (
     BEST_CLASS,
     CLASS,
@@ -31,8 +29,6 @@ from rover_planner.viewer.state.survey_layers import (
     open_survey,
 )
 from support.survey_maps import make_request, survey_here
-from support.viewer.browser import needs_browser, wait_until
-from support.viewer.visits import open_browser, visit
 
 LSR1 = load_rover("lsr1")
 PASSABLE, WALL, HOLE = (1.5, 1.5), (4.55, 3.0), (1.5, 4.5)
@@ -86,13 +82,10 @@ def test_every_layer_has_colours_and_a_meaning(shown):
         assert (found.scale is None) != (not found.keys), name
         assert len(np.unique(found.colours.reshape(-1, 3), axis=0)) > 1, name
     assert shown.colour(HEADINGS, at, at).scale.high == 8
-    assert any("off map" in text for _, text in shown.colour(LIMIT, at, at).keys)
-
-
-def test_the_reachable_area_ends_at_the_wall(shown):
     assert "can go and return" in shown.describe(REACHABLE)
     assert colour_at(shown, REACHABLE, PASSABLE) != UNKNOWN
     assert colour_at(shown, REACHABLE, (5.3, 3.0)) == UNKNOWN
+    assert any("off map" in text for _, text in shown.colour(LIMIT, at, at).keys)
 
 
 def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
@@ -124,14 +117,11 @@ def test_what_differs_from_the_page_is_said(shown):
     ],
 )
 def test_a_survey_of_another_rover_or_map_is_refused(surveyed, rover, heights, said):
+    with pytest.raises(PlanningError, match="60 x 60 cells; --max-cells is 100"):
+        load_map(surveyed, 100)
     terrain = load_map(surveyed, 10_000) if heights is None else Terrain(heights, 0.1)
     with pytest.raises(PlanningError, match=said):
         open_survey(surveyed, rover, terrain)
-
-
-def test_a_map_that_is_too_large_is_refused(surveyed):
-    with pytest.raises(PlanningError, match="60 x 60 cells; --max-cells is 100"):
-        load_map(surveyed, 100)
 
 
 @pytest.mark.parametrize(
@@ -147,23 +137,3 @@ def test_the_command_refuses_what_is_no_survey(words, said, tmp_path, monkeypatc
     assert main(["view", "lsr1", "--port", "0", *words]) == 2
     err = capfd.readouterr().err
     assert said in err and err.count("\n") == 1
-
-
-@needs_browser
-@pytest.mark.slow
-def test_the_page_shows_the_survey_and_says_when_the_policy_is_another(shown, surveyed):
-    session = ViewSession(LSR1, load_map(surveyed, 10_000), (1.5, 1.5, 0.0), (2.5, 1.5, 0.0))
-    page = Page(session, port=0, survey=shown)
-    with open_browser() as browser, visit(page, browser) as visitor:
-        visitor.open_tab("Ground and path")
-        visitor.wait_for("impassable")
-        wait_until(lambda: "survey: class" in visitor.text("#scale"), "the legend")
-        before = visitor.picture()
-        visitor.choose("Colour by", REACHABLE)
-        visitor.wait_for("can go and return")
-        wait_until(lambda: visitor.picture() != before, "other colours")
-        visitor.choose("Torques", "speed servos")
-        visitor.wait_for("torque policy equal in the survey, servo here")
-        visitor.choose("Colour by", "height")
-        visitor.wait_for("a line every metre")
-        assert not visitor.page_errors

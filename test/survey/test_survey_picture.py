@@ -19,7 +19,7 @@ def find_unknown_colour(picture) -> np.ndarray:
     return np.asarray(pixels[..., 2] - pixels[..., 0] > 0.03)
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(3, 200), (6, 7), (6, 40), (120, 3)])
+@pytest.mark.parametrize(("rows", "columns"), [(3, 200), (120, 3)])
 def test_a_map_that_is_all_edge_has_the_colour_of_edges_and_no_legend_above_it(
     tmp_path, rows, columns
 ):

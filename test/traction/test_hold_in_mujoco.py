@@ -9,8 +9,7 @@ pytest.importorskip("mujoco", reason="install the extra bench")
 SLOPE = np.radians(20.0)
 
 
-@pytest.mark.parametrize("rover", ["lsr1", "m2020"])
-@pytest.mark.parametrize("event", ["imu lost", "emergency stop", "commanded to stop"])
+@pytest.mark.parametrize(("rover", "event"), [("lsr1", "emergency stop"), ("m2020", "imu lost")])
 def test_hold_stops_a_rover_that_climbs_and_keeps_it_there(rover, event):
     hold = importlib.import_module("benchmarks.hold")
     rest = hold.rest_on_slope(rover, "hold", event, SLOPE, 2.0)

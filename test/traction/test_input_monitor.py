@@ -1,28 +1,31 @@
-"""Inputs that are missing, bad or stale are named, in this order."""
+"""Inputs that are missing, bad or stale are named; frozen, delayed and future stamps are seen."""
 
 import pytest
 
-from rover_planner.traction.input_monitor import InputMonitor
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_planner.traction.clock_watch import ClockWatch
+from rover_planner.traction.input_monitor import NEVER, InputMonitor
+from rover_planner.traction.joint_memory import JointMemory
+from rover_planner.traction.stamps import NANOSECONDS, StampCheck, StampError
+
+CLOCK = 1_000_000 * NANOSECONDS
+MILLISECOND = NANOSECONDS // 1000
+ANGLES = dict.fromkeys(SUSPENSION_JOINTS, 0.1)
+RATES = dict.fromkeys(WHEEL_JOINTS, 0.2)
 
 
 def test_missing_inputs_are_named_first_then_bad_ones_then_stale_ones():
     monitor = InputMonitor({"a": 0.1, "b": 0.1})
     assert monitor.find_fault(0.0) == "waiting for a, b"
-    monitor.take("a", 0.0)
-    monitor.refuse("b", "b is nan")
-    assert monitor.find_fault(0.0) == "b is nan"
-    monitor.take("b", 0.05)
-    assert monitor.find_fault(0.1) == ""
-    assert monitor.find_fault(0.12) == "a stale: none for 100 ms"
-
-
-def test_an_input_is_fresh_from_its_first_good_message_until_the_timeout():
-    monitor = InputMonitor({"a": 0.1})
     assert not monitor.is_fresh("a", -1e12)
     monitor.take("a", 0.0)
-    assert monitor.is_fresh("a", 0.1) and not monitor.is_fresh("a", 0.11)
-    monitor.refuse("a", "a is nan")
-    assert not monitor.is_fresh("a", 0.0)
+    monitor.refuse("b", "b is nan")
+    assert monitor.find_fault(0.0) == "b is nan" and not monitor.is_fresh("b", 0.0)
+    monitor.take("b", 0.05)
+    assert monitor.find_fault(0.1) == "" and monitor.is_fresh("a", 0.1)
+    assert monitor.find_fault(0.12) == "a stale: none for 100 ms" and not monitor.is_fresh(
+        "a", 0.12
+    )
 
 
 def test_each_input_has_a_timeout_of_its_own():
@@ -30,8 +33,6 @@ def test_each_input_has_a_timeout_of_its_own():
     monitor.take("joints", 0.0)
     monitor.take("command", 0.0)
     assert monitor.expiry == pytest.approx(0.07)
-    monitor.take("joints", 0.4)
-    assert monitor.find_fault(0.45) == ""
     monitor.take("joints", 0.52)
     assert monitor.find_fault(0.52) == "command stale: none for 500 ms"
 
@@ -53,3 +54,94 @@ def test_why_messages_were_not_used_is_told_with_the_fault():
     monitor.ignore("a", "stamps do not advance")
     assert monitor.find_fault(0.05) == ""
     assert monitor.find_fault(0.2) == "a stale: none for 100 ms (stamps do not advance)"
+
+
+def test_wheels_and_suspension_may_come_in_messages_of_their_own_and_an_arm_changes_nothing():
+    memory = JointMemory()
+    assert memory.is_empty and memory.time == NEVER
+    assert memory.take(ANGLES, {}, 1.0)
+    assert memory.describe_older(0.5) == f"no velocity of {', '.join(WHEEL_JOINTS)}"
+    assert memory.take({}, RATES, 1.1)
+    assert not memory.take({"arm_yaw": 1.0}, {"arm_yaw": 0.1}, 2.0)
+    assert memory.time == 1.0 and memory.wheel_time == 1.1
+    assert memory.suspension_angles == pytest.approx([0.1] * 4)
+    assert memory.wheel_rates == pytest.approx([0.2] * 6)
+
+
+def test_a_wheel_that_is_missing_from_messages_gets_old_by_itself():
+    memory = JointMemory()
+    memory.take(ANGLES, RATES, 1.0)
+    rest = {name: rate for name, rate in RATES.items() if name != "rear_left_wheel"}
+    memory.take(ANGLES, rest, 1.1)
+    assert memory.time == memory.wheel_time == 1.0
+    assert memory.describe_older(1.05) == "no velocity of rear_left_wheel"
+
+
+def test_values_with_a_stamp_that_does_not_advance_are_not_taken():
+    memory = JointMemory()
+    assert memory.take(ANGLES, RATES, 1.0, stamp=5)
+    for stamp in (5, 4):
+        assert not memory.take(ANGLES, RATES, 2.0, stamp=stamp)
+    assert memory.time == 1.0
+    assert memory.take(ANGLES, {}, 2.0, stamp=6) and memory.wheel_time == 1.0
+    assert memory.take(ANGLES, RATES, 2.1) and not memory.take(ANGLES, RATES, 2.2, stamp=5)
+    memory.forget()
+    assert memory.time == NEVER
+    assert memory.take(ANGLES, RATES, 3.0, stamp=2)
+
+
+def test_rates_of_the_suspension_are_known_only_while_all_are_recent():
+    memory = JointMemory()
+    memory.take(ANGLES, RATES | dict.fromkeys(SUSPENSION_JOINTS, 0.3), 1.0)
+    assert memory.find_suspension_rates(0.9) == pytest.approx([0.3] * 4)
+    memory.take({}, {"rocker_left": 0.4}, 1.2)
+    assert memory.find_suspension_rates(1.1) is None
+
+
+def test_the_time_of_a_measurement_is_its_arrival_less_its_age():
+    check = StampCheck(0.05)
+    assert check.find_time("imu", CLOCK - 30 * MILLISECOND, CLOCK, 7.0) == pytest.approx(6.97)
+    assert check.find_time("imu", CLOCK - 3600 * NANOSECONDS, CLOCK, 7.0, merged=True) < -3500.0
+    assert check.find_time("imu", 0, CLOCK, 7.1) == 7.1  # has no stamp
+
+
+def test_a_stamp_that_does_not_advance_is_refused_in_its_stream_only():
+    check = StampCheck(0.05)
+    check.find_time("imu", CLOCK, CLOCK, 7.0)
+    for stamp in (CLOCK, CLOCK - MILLISECOND):
+        with pytest.raises(StampError, match="do not advance"):
+            check.find_time("imu", stamp, CLOCK, 7.0)
+    assert check.find_time("cmd_vel", CLOCK, CLOCK, 7.0) == 7.0
+    check.forget()
+    assert check.find_time("imu", CLOCK - MILLISECOND, CLOCK, 7.0) == pytest.approx(6.999)
+
+
+def test_a_stamp_from_the_future_is_refused_beyond_the_tolerance():
+    check = StampCheck(0.05)
+    assert check.find_time("imu", CLOCK + 40 * MILLISECOND, CLOCK, 7.0) == 7.0
+    with pytest.raises(StampError, match="more than 50 ms ahead"):
+        check.find_time("imu", CLOCK + 60 * MILLISECOND, CLOCK, 7.0)
+
+
+@pytest.mark.parametrize(("step", "text"), [(-3600, "back"), (3600, "ahead"), (-1, "back")])
+def test_a_step_of_the_system_clock_is_seen_at_once_and_passes(step, text):
+    watch = ClockWatch(0.07)
+    for k in range(5):
+        assert watch.check(k * 0.02, CLOCK + k * 20 * MILLISECOND, False) == ""
+    stepped = CLOCK + step * NANOSECONDS
+    fault = watch.check(0.1, stepped + 100 * MILLISECOND, False)
+    assert fault == f"the clock was stepped {text}" and watch.stepped
+    assert watch.check(0.12, stepped + 120 * MILLISECOND, False) == "" and not watch.stepped
+    later = stepped + 120 * MILLISECOND + 5 * NANOSECONDS
+    assert watch.check(5.12, later, False) == ""  # a late update is no step
+
+
+def test_a_simulated_clock_may_run_fast_or_slow_but_not_stop_or_go_back():
+    watch = ClockWatch(0.07)
+    for k, ticks in enumerate([0, 200, 400, 401, 402]):
+        assert watch.check(k * 0.02, CLOCK + ticks * MILLISECOND, True) == ""
+    for now in (0.1, 0.12):
+        assert watch.check(now, CLOCK + 402 * MILLISECOND, True) == ""
+    assert watch.check(0.14, CLOCK + 402 * MILLISECOND, True) == "/clock stands still"
+    assert watch.check(0.18, CLOCK + 403 * MILLISECOND, True) == ""
+    assert "back" in watch.check(0.20, CLOCK, True)

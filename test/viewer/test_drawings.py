@@ -6,11 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from support.viewer.sessions import LSR1, ramp, session_on
-from support.waiting import wait_until
+from support.viewer.sessions import (
+    GOAL,
+    LSR1,
+    PATIENCE,
+    START,
+    lowered_reef,
+    ramp,
+    session_on,
+    slow_options,
+    tolerant_rover,
+)
+from support.waiting import start_watch, wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
+from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.pages import page as page_module
 from rover_planner.viewer.pages.drawings import Drawings
 from rover_planner.viewer.pages.page import Page
@@ -19,9 +30,10 @@ from rover_planner.viewer.scene.rover_visual import RoverVisual
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.judging import POLICY
 from rover_planner.viewer.state.reasons.explanation import explain
+from rover_planner.viewer.state.session import ViewSession
 
-PATIENCE = 60.0
-"""Longest wait for the page [s]."""
+MAX_PAUSE = 1.0
+"""Longest pause of the playback [s]; without the judgement in its way it is 0.1 s."""
 
 
 @pytest.fixture(scope="module")
@@ -93,23 +105,29 @@ def test_other_policies_are_judged_after_the_drawings(page, monkeypatch):
     assert not any(one.is_old for one in page.session.shown.by_policy)
 
 
-def test_the_pictures_go_on_between_drawings(page, monkeypatch):
-    pictures, between = [], []
-    advance, draw_next = page.advance, page.drawings.draw_next
+@pytest.mark.timed
+def test_the_rover_drives_on_while_a_change_is_judged_and_drawn():
+    options, search = slow_options(2, 2e-4), LatticeSettings(budget=0.1)
+    session = ViewSession(tolerant_rover(), lowered_reef(), START, GOAL, options, search)
+    page = Page(session, port=0)
+    try:
+        wait_until(lambda: not page.is_busy, "the ground", PATIENCE)
+        page.playback.speed = 1.0
+        page.requests.add(page.playback.play)
+        change_friction(page, 1.9)
+        longest, last, paused = 0.0, page.playback.time, start_watch()
 
-    def draw_slowly() -> None:
-        if page.drawings.waiting:
-            between.append(len(pictures))
-            threading.Event().wait(0.05)
-        draw_next()
+        def is_judged() -> bool:
+            nonlocal longest, last, paused
+            if page.playback.time != last:
+                last, paused = page.playback.time, start_watch()
+            longest = max(longest, paused())
+            return session.rover.friction == 1.9 and not page.is_busy
 
-    monkeypatch.setattr(
-        page, "advance", lambda seconds: (pictures.append(seconds), advance(seconds))
-    )
-    monkeypatch.setattr(page.drawings, "draw_next", draw_slowly)
-    change_friction(page, 0.4)
-    wait_until(lambda: len(between) > 3 and not page.is_busy, "the drawings", PATIENCE)
-    assert between[3] >= between[0] + 3
+        wait_until(is_judged, "the new verdict", PATIENCE)
+        assert longest < MAX_PAUSE
+    finally:
+        page.close()
 
 
 def test_a_drawing_that_is_asked_for_again_is_done_once_at_its_old_place(drawings):

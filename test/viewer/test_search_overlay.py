@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 from support.grounds import gap, make_terrain, wall_with_gap, whole_wall
-from support.viewer.sessions import LSR1, walled_session
+from support.viewer.sessions import walled_session
 from support.waiting import wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-import viser
 
 from rover_planner.planning.lattice.nodes import nodes_within
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.scene.search_overlay import ASKED, CLOSED, SearchOverlay, cover_places
+from rover_planner.viewer.scene.search_overlay import ASKED, CLOSED, cover_places
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, SEARCHED, UNKNOWN
 
 BEYOND = np.array([1.6, 0.0])
@@ -37,39 +36,9 @@ def test_a_layer_covers_the_known_ground_of_its_places_and_nothing_else():
     assert not np.any((x > 0.51) & (x < 0.99))  # unknown ground
     column, row = np.rint((vertices[:, :2] - ground.origin) / ground.resolution).astype(int).T
     np.testing.assert_array_equal(z, ground.elevation[row, column])
-
-
-def test_no_places_and_no_ground_at_places_give_no_layer():
-    nodes = nodes_within(0.2, (-4.0, -4.0), (4.0, 4.0))
-    none, unknown = np.zeros((2, *nodes.shape), bool)
+    unknown = np.zeros(nodes.shape, bool)
     unknown[:, 24] = True  # x = 0.8 m
-    for places in (none, unknown):
-        assert not len(cover_places(make_terrain(gap), nodes, places)[1])
-
-
-def test_what_was_searched_is_hidden_until_it_is_wanted_and_a_new_search_replaces_an_old_one():
-    session = walled_session(whole_wall)
-    session.plan_to(BEYOND)
-    way, ground = session.finished.way, session.terrain
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
-        overlay = SearchOverlay(server.scene)
-        overlay.show(LSR1, ground, way)
-        closed, asked = (overlay._layers[name][0] for name in (CLOSED, ASKED))
-        assert closed.visible and not asked.visible
-        assert tuple(closed.color) == (REFUSED if way.closed.around_goal else PASSABLE)
-        overlay.show_asked(True)
-        assert asked.visible and tuple(asked.color) == SEARCHED
-        overlay.mark_old(True)
-        assert tuple(closed.color) == tuple(asked.color) == UNKNOWN
-        overlay.mark_old(False)
-        assert tuple(asked.color) == SEARCHED
-        overlay.show(LSR1, ground, way)
-        assert overlay._layers[ASKED][0].visible
-        overlay.show(LSR1, ground, None)
-        assert not overlay._layers
-    finally:
-        server.stop()
+    assert not len(cover_places(ground, nodes, unknown)[1])
 
 
 @pytest.fixture(params=[wall_with_gap, whole_wall])
@@ -92,6 +61,17 @@ def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page
     overlay = page.scene.search
     closes = session.finished.way.closed is not None
     wait_until(lambda: set(overlay._layers) == ({CLOSED, ASKED} if closes else {ASKED}), "layers")
+    asked = overlay._layers[ASKED][0]
+    assert not asked.visible
+    overlay.show_asked(True)
+    assert asked.visible and tuple(asked.color) == SEARCHED
+    overlay.mark_old(True)
+    assert tuple(asked.color) == UNKNOWN
+    overlay.mark_old(False)
+    if closes:
+        is_refused = session.finished.way.closed.around_goal
+        colour = tuple(overlay._layers[CLOSED][0].color)
+        assert colour == (REFUSED if is_refused else PASSABLE)
     text = page.drive_tab._verdict.content + page.drive_tab._details.content
     if closes:
         assert "no way within the map" in text and count_rows(page) == 5

@@ -10,7 +10,6 @@ import pytest
 
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.traversability.judge import judge_path
-from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.way_search import FOUND, NO_WAY, OUT_OF_TIME
 from rover_planner.viewer.state.judging import (
     BETTER,
@@ -67,14 +66,9 @@ def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_sh
     np.testing.assert_allclose(poses[[0, -1], :2], [found.start[:2], BEYOND], atol=1e-9)
     assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
     assert judge_path(LSR1, found.terrain, poses, found.sweep_options())[1].traversable
-
-
-def test_the_way_has_the_same_board_as_other_paths(found):
     shown = found.shown
     assert [one.policy for one in shown.by_policy] == list(TORQUE_POLICIES)
     assert not any(one.is_old for one in shown.by_policy)
-    assert shown.by_policy[0].traversable and found.finished.reason == ""
-    assert shown.trajectory.length == len(shown.candidate.poses)
     assert f"way of {shown.candidate.length:.1f} m around" in shown.summary
 
 
@@ -87,6 +81,8 @@ def test_where_there_is_no_way_the_closed_area_and_the_reason_are_kept(closed):
     assert reason.endswith(closed.shown.verdict.reason)
     ends = [value_at(way, way.closed.places, pose) for pose in (closed.start, closed.goal)]
     assert ends == [not way.closed.around_goal, way.closed.around_goal]
+    assert 0 < way.asked.sum() < way.asked.size
+    assert value_at(way, way.asked, (0.0, 0.0))  # the wall between the ends
 
 
 def value_at(way, places, pose) -> bool:
@@ -112,18 +108,14 @@ def test_the_first_way_is_shown_at_once_and_replaced_only_by_a_better_one(found)
     assert len(judged[-1].answer.candidates) == 6
 
 
-def test_nothing_is_searched_where_a_candidate_passes_or_the_goal_is_off_the_map():
+def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recorded_path():
     session = walled_session(wall_with_gap)
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
         assert session.plan_to(np.array(goal))
         assert session.finished.way is None and session.answer.traversable == passes
         assert WAY not in steps_of(session)
-
-
-def test_nothing_is_searched_for_a_recorded_path():
-    session = walled_session(wall_with_gap)
-    shown = session.shown
-    session.replay(shown.candidate.prediction, shown.verdict.reasons)
+    assert session.plan_to(np.array([-1.1, 0.1]))
+    session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
     assert session.change_rover(FRICTION, 0.05) and session.plan_again()
     assert not session.shown.verdict.traversable and session.finished.way is None
 
@@ -141,26 +133,6 @@ def test_a_search_that_runs_out_of_time_says_that_there_may_be_a_way(closed):
     *_, judged = judge_request(JudgeRequest(hurried), lambda *_: None)
     assert judged.way.outcome == OUT_OF_TIME and judged.way.closed is None
     assert "there may be one" in judged.reason
-
-
-def test_what_was_searched_is_where_the_model_was_asked(found, closed):
-    for session in (found, closed):
-        way = session.finished.way
-        assert way.asked.shape == way.nodes.shape
-        assert 0 < way.asked.sum() < way.asked.size
-        assert value_at(way, way.asked, (0.0, 0.0))  # the wall between the ends
-
-
-def test_a_second_search_remembers_what_the_first_has_asked():
-    session = walled_session(wall_with_gap)
-    session.plan_to(BEYOND)
-    first = session.finished.way
-    session.plan_to(np.array([1.6, 0.1]))
-    second = session.finished.way
-    assert second.outcome == FOUND and second.edges_judged < first.edges_judged
-    assert np.all(second.asked >= first.asked)
-    *_, anew = judge_request(JudgeRequest(session.wanted), lambda *_: None, EdgeMemory())
-    np.testing.assert_array_equal(anew.shown.candidate.poses[-1], second.path.poses[-1])
 
 
 def test_a_slider_judges_the_shown_way_again_and_then_searches_another():
@@ -207,8 +179,14 @@ def test_while_a_way_is_searched_the_verdict_on_the_candidates_is_there(session)
     with searching(session):
         assert not session.is_outdated and len(session.candidates) == 5
         assert not session.shown.verdict.traversable
+        other = 1 if session.shown.index != 1 else 2
+        assert session.show_candidate(other)  # it stays, and the way is listed
     finish(session)
-    assert session.shown.index == 5 and session.shown.verdict.traversable
+    assert session.shown.index == other and len(session.candidates) == 6
+    assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
+    assert session.show_candidate(5)
+    finish(session)
+    assert session.shown.verdict.traversable
 
 
 def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begun_again(session):
@@ -220,18 +198,6 @@ def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begu
     assert session.plan_again()
     finish(session)
     assert session.finished.way.outcome == FOUND
-
-
-def test_a_path_that_is_chosen_during_the_search_stays_and_the_way_is_listed(session):
-    with searching(session):
-        other = 1 if session.shown.index != 1 else 2
-        assert session.show_candidate(other)
-    finish(session)
-    assert session.shown.index == other and len(session.candidates) == 6
-    assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
-    assert session.show_candidate(5)
-    finish(session)
-    assert session.shown.verdict.traversable
 
 
 def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wall():

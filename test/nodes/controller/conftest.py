@@ -3,8 +3,8 @@
 import pytest
 from rclpy.parameter import Parameter
 
-from benchmarks.driven_rover import RATE, DrivenRover
 from rover_planner.nodes.traction_controller import TractionController
+from support.driven_rover import RATE, DrivenRover
 from support.ros_fixtures import PATIENT
 from support.waiting import wait_until
 

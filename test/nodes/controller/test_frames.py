@@ -7,7 +7,6 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from rover_planner.nodes.navigation import frames
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.messages.transforms import send_transforms
@@ -63,19 +62,6 @@ def test_odometry_of_a_robot_with_another_origin_is_that_of_the_body(
     controller = start_controller(base_offset=[0.3, 0.0, 0.2, 0.0, 0.0, 0.0], map_frame="odom")
     drive_in_odom(lambda: controller.service._pose.any(), "odometry")
     np.testing.assert_allclose(controller.service._pose, (0.8, 0.0, 0.2, 0.0), atol=1e-9)
-
-
-def test_tf_is_heard_only_if_odometry_needs_it(
-    rover, start_controller, drive_in_odom, monkeypatch
-):
-    monkeypatch.setattr(frames, "tf_message", lambda: Odometry)  # stands for TFMessage
-    needs_none = start_controller(map_frame="odom")
-    drive_in_odom(lambda: needs_none.service._pose.any(), "odometry")
-    assert needs_none.count_subscribers("/tf") == 0
-    start_controller()
-    drive_in_odom(lambda: needs_none.count_subscribers("/tf") == 1, "the subscription")
-    refusal = "odometry not used: odometry is in frame 'odom'; it must be in 'map'"
-    wait_until(lambda: rover.count_lines(refusal), "the refusal without a transform")
 
 
 def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(

@@ -13,7 +13,7 @@ from support.rough_grounds import plane
 
 LSR1 = load_rover("lsr1")
 MAP = plane(0.0, 0.0, half=4.0)
-STEP = 0.02
+STEP = 0.1
 SETTINGS = DriveSettings(within=0.1, patience=0.3)
 
 
@@ -21,7 +21,7 @@ class SimulatedRover:
     """A rover on a ground that its map does not show; time runs as fast as it is computed."""
 
     def __init__(self, ground):
-        self.plant = QuasiStaticPlant(LSR1, ground, (-1.5, 0.0, 0.0))
+        self.plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
         self.follower = PathFollower(self.plant.pose()[None], 0.3)
         self.asked = []
 

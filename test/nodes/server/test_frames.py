@@ -5,12 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, TransformStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from geometry_msgs.msg import PoseStamped
 
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from rover_planner.nodes.nav2_services import PathValidity
-from rover_planner.nodes.navigation import frames
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
 from support.messages.transforms import send_transforms, transform_message
@@ -92,26 +90,6 @@ def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, last
     assert "start is without a frame_id" in verdict_of(results)["reason"]
 
 
-def test_an_empty_start_is_where_tf_says_the_rover_is(in_odom, client, lasting):
-    client.send_odometry((0.5, 0.5, 0.0), "odom")  # less sure than /tf
-    wait_until(lambda: in_odom.service.fresh_pose() is not None, "odometry")
-    here = Rigid.from_rpy(*START[:2], 0.1, 0.05, 0.02, START[2])
-    send(in_odom, ("odom", "base_link", here))
-    plan, _ = client.next_results(lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "odom")))
-    np.testing.assert_allclose(path_to_poses(plan, "odom")[0], START, atol=1e-9)
-
-
-def test_the_monitor_follows_tf_without_odometry(start_server, client):
-    server = start_server(monitor=True, planner="fan", transform_timeout=60.0)
-    server.service.take_terrain(make_terrain(rocky))
-    send(server, ("map", "base_link", Rigid.from_rpy(*START[:2], 0.0, 0.0, 0.0, START[2])))
-    assert client.can_traverse(START, GOAL).poses
-    wait_until(lambda: server.watch.finding.place is not None, "the place")
-    found = server.watch.finding
-    assert found.place.index == 0 and found.state == "watching"
-    assert server.service.fresh_pose() is None
-
-
 def test_odometry_in_another_frame_is_transformed(mapped, client, lasting):
     send(mapped, ("map", "odom", MAP_ODOM), take="take_static")
     client.send_odometry((1.0, 2.0, 0.5), "odom")
@@ -141,36 +119,16 @@ def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, c
     assert json.loads(client.check_path().message)["traversable"]
 
 
-def test_tf_topics_are_heard_where_their_type_is_installed(monkeypatch, start_server, client, ros):
-    monkeypatch.setattr(frames, "tf_message", lambda: TransformStamped)  # stands for TFMessage
-    monkeypatch.setattr(
-        frames.Frames, "take", lambda self, one: self._take([one], is_static=False)
-    )
-    monkeypatch.setattr(
-        frames.Frames, "take_static", lambda self, one: self._take([one], is_static=True)
-    )
-    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    static = client.create_publisher(TransformStamped, "/tf_static", latched)
-    moving = client.create_publisher(TransformStamped, "/tf", 10)
-    stamp = client.get_clock().now().to_msg()
-    static.publish(transform_message("base_link", "camera", MAP_ODOM, stamp))
-    server = start_server(transform_timeout=60.0)
-    wait_until(lambda: moving.get_subscription_count(), "the subscription")
-    here = Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.3)
-    moving.publish(transform_message("map", "base_link", here, client.get_clock().now().to_msg()))
-    wait_until(lambda: server.frames._tree.has_parent("base_link"), "/tf")
-    wait_until(lambda: server.frames._tree.has_parent("camera"), "/tf_static")
-    np.testing.assert_allclose(server.frames.find_here(), (1.0, 2.0, 0.3), atol=1e-9)
-
-
-@pytest.mark.parametrize("wrong", ["nan", "length", "name"])
-def test_a_transform_that_is_none_is_refused(server, wrong):
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda message: setattr(message.transform.translation, "x", np.nan),
+        lambda message: setattr(message.transform.rotation, "w", 2.0),
+        lambda message: setattr(message, "child_frame_id", ""),
+    ],
+)
+def test_a_transform_that_is_none_is_refused(server, spoil):
     message = transform_message("map", "odom", MAP_ODOM, server.get_clock().now().to_msg())
-    if wrong == "nan":
-        message.transform.translation.x = np.nan
-    elif wrong == "length":
-        message.transform.rotation.w += 0.5
-    else:
-        message.child_frame_id = ""
+    spoil(message)
     server.frames.take(SimpleNamespace(transforms=[message]))
     assert not server.frames._tree.knows("map")

@@ -6,7 +6,7 @@ from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics.terrain.grid import Terrain
 from rover_planner.nodes.maps import map_topics
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos
@@ -37,21 +37,29 @@ def tf2_msgs(tmp_path_factory):
         yield messages
 
 
-def test_a_grid_map_with_a_moved_buffer_is_the_map_over_dds(grid_map_msgs, start_server, client):
-    server = start_server()
+def test_layers_of_a_grid_map_with_a_moved_buffer_are_the_map_over_dds(
+    grid_map_msgs, start_server, client
+):
+    server = start_server(
+        planner="fan", elevation_layer="height", variance_layer="none", friction_layer="mu"
+    )
     publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
     wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
-    plain = grid_map_of({"elevation": PRIOR.elevation}, PRIOR.resolution)
+    layers = {"height": PRIOR.elevation, "variance": np.full(PRIOR.elevation.shape, 4.0)}
+    plain = grid_map_of(layers, PRIOR.resolution)
     publisher.publish(to_message(grid_map_msgs.GridMap, move_buffer(plain, 17, 130)))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    np.testing.assert_array_equal(server.service.terrain.elevation, PRIOR.elevation)
-    assert server.service.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
-    known = server.service.known_map
-    assert (known.source, known.frame) == ("elevation_map", "map")
+    first = wait_until(lambda: server.service.known_map, "the map")
+    np.testing.assert_array_equal(first.terrain.elevation, PRIOR.elevation)
+    assert first.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
+    assert (first.source, first.frame) == ("elevation_map", "map")
+    assert first.terrain.elevation_std is None
     _, verdict, _ = ask(client)
     assert verdict["traversable"] == "true" and verdict["blind_share"] == "0.0"
+    slippery = grid_map_of(layers | {"mu": 0.01 + 0.0 * PRIOR.elevation}, PRIOR.resolution)
+    publisher.publish(to_message(grid_map_msgs.GridMap, slippery))
+    wait_until(lambda: server.service.known_map is not first, "the second map")
+    assert ask(client)[1]["code"] == "friction"
     # A map that cannot be used is refused by the name of its topic, and the last one stays.
-    client.logs.clear()
     turned = to_message(grid_map_msgs.GridMap, plain)
     turned.info.pose.orientation.z, turned.info.pose.orientation.w = 0.1, 0.995
     publisher.publish(turned)
@@ -63,22 +71,6 @@ def test_without_grid_map_msgs_the_server_has_no_such_topic(start_server, monkey
     server = start_server()
     topics = {name for name, _ in server.get_topic_names_and_types()}
     assert "/elevation_cloud" in topics and "/elevation_map" not in topics
-
-
-def test_friction_and_deviation_of_a_grid_map_are_used(grid_map_msgs, start_server, client):
-    server = start_server(elevation_layer="height", variance_layer="none", friction_layer="mu")
-    publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
-    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
-    layers = {
-        "height": PRIOR.elevation,
-        "variance": np.full(PRIOR.elevation.shape, 4.0),
-        "mu": np.full(PRIOR.elevation.shape, 0.01),
-    }
-    publisher.publish(to_message(grid_map_msgs.GridMap, grid_map_of(layers, PRIOR.resolution)))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    assert server.service.terrain.elevation_std is None
-    _, verdict, _ = ask(client)
-    assert verdict["code"] == "friction"
 
 
 class Robot:
@@ -119,54 +111,6 @@ class Robot:
 @pytest.fixture
 def robot(client, grid_map_msgs, tf2_msgs):
     return Robot(client, grid_map_msgs.GridMap, tf2_msgs.TFMessage)
-
-
-def local_map(layers=True) -> Terrain:
-    """Return a rough local map whose numbers float32 holds exactly, with holes."""
-    rng = np.random.default_rng(7)
-    z = rng.integers(-64, 64, (41, 61)) / 512.0
-    z[rng.uniform(size=z.shape) < 0.05] = np.nan
-    known = np.isfinite(z)
-    std = np.where(known, rng.integers(1, 8, z.shape) / 64.0, np.nan)
-    friction = np.where(known, rng.integers(30, 60, z.shape) / 64.0, np.nan)
-    origin = -30 * CELL, -20 * CELL
-    return (
-        Terrain(z, CELL, origin, friction, elevation_std=std)
-        if layers
-        else Terrain(z, CELL, origin)
-    )
-
-
-def test_a_map_in_odom_that_is_shifted_by_whole_cells_merges_to_the_bit(
-    robot, start_server, client, tmp_path
-):
-    save_terrain(tmp_path / "prior.npz", PRIOR)
-    server = start_server(terrain_file=str(tmp_path / "prior.npz"), transform_timeout=30.0)
-    wait_until(robot.is_heard, "the subscriptions")
-    robot.send_transform(Rigid.from_rpy(7 * CELL, -11 * CELL, 0.25, 0.0, 0.0, 0.0))
-    wait_until(lambda: server.frames._tree.knows("odom"), "/tf")
-    local, before = local_map(), server.service.known_map
-    robot.send_map(local)
-    wait_until(lambda: server.service.known_map is not before, "the map")
-    merged = server.service.terrain
-    assert (merged.origin, merged.elevation.shape) == (PRIOR.origin, PRIOR.elevation.shape)
-    row, column = (
-        round((at - start) / CELL)
-        for at, start in zip(
-            (local.origin[1] - 11 * CELL, local.origin[0] + 7 * CELL),
-            PRIOR.origin[::-1],
-            strict=True,
-        )
-    )
-    window = slice(row, row + 41), slice(column, column + 61)
-    known = np.isfinite(local.elevation)
-    np.testing.assert_array_equal(merged.elevation[window][known], local.elevation[known] + 0.25)
-    old = PRIOR.elevation[window][~known]
-    np.testing.assert_array_equal(merged.elevation[window][~known], old)
-    np.testing.assert_array_equal(merged.friction[window][known], local.friction[known])
-    np.testing.assert_array_equal(merged.elevation_std[window][known], local.elevation_std[known])
-    assert server.service.known_map.frame == "map"
-    assert server.service.known_map.cells.count()["elevation_map"] == known.sum()
 
 
 def test_a_turned_map_in_odom_is_the_same_ground_in_the_map_frame(robot, start_server):
@@ -224,16 +168,3 @@ def test_a_map_that_comes_before_its_transform_is_taken_when_that_has_come(
     wait_until(lambda: server.service.terrain is not None, "the map")
     right = PRIOR.elevation.astype(np.float32) + 1.0
     np.testing.assert_allclose(server.service.terrain.elevation, right, atol=1e-12)
-
-
-def test_a_refusal_that_repeats_with_each_map_is_logged_once_in_ten_seconds(
-    robot, start_server, client
-):
-    start_server()
-    wait_until(robot.is_heard, "the subscriptions")
-    for height in range(5):
-        robot.send_map(Terrain(np.full((3, 3), float(height)), CELL))
-        client.wait_for_log(f"{REFUSED}the message is in frame 'odom'")
-    robot.send_map(PRIOR, frame="")
-    client.wait_for_log("without a frame_id")  # comes after the others
-    assert sum("the message is in frame 'odom'" in line for line in client.logs) == 1

@@ -143,22 +143,6 @@ def test_what_was_judged_before_a_withdrawal_is_not_shown_after_it(
     assert not any(is_free([grid]) for grid in worst[before:])
 
 
-def test_switched_off_and_on_the_same_map_is_published_again(mapping, client, ros):
-    costmap = ros.spin(Costmap(ros, ("worst",)))
-    worst = costmap.grids["worst"]
-    wait_until(lambda: is_free(worst), "the map", 60.0)
-    assert client.set_parameter("hazard_map", False)[0]
-    wait_until(lambda: not is_free(worst), "the withdrawal")
-    assert client.set_parameter("hazard_map", True)[0]
-    wait_until(lambda: is_free(worst), "the same map", 60.0)
-
-
-def test_without_the_parameter_there_is_no_map(mapped, ros):
-    costmap = ros.spin(Costmap(ros, ("worst",)))
-    assert len(call(costmap.ask, GetMap.Request()).map.data) == 0
-    assert costmap.grids["worst"] == []
-
-
 def test_an_empty_answer_says_in_the_log_what_is_missing(start_server, client):
     start_server()
     ask = client.create_client(GetMap, f"{SERVER}/get_hazard_map")

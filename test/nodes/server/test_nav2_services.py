@@ -10,9 +10,7 @@ from rover_planner.nodes.nav2_services import (
     NO_VALID_PATH,
     PathComputation,
     PathValidity,
-    find_invalid_poses,
 )
-from rover_planner.planning.path_geometry import densify, next_given_poses
 from support.grounds import make_terrain, wall_at, waves
 from support.waiting import wait_until
 
@@ -45,19 +43,6 @@ def test_the_poses_behind_a_wall_are_named(server):
 def test_a_path_that_cannot_be_judged_has_only_bad_poses(server):
     answer = ask(server, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])  # there is no map
     assert not answer.is_valid and answer.invalid_pose_indices == [0, 1]
-
-
-def test_each_waypoint_knows_the_given_pose_at_or_after_it():
-    poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.3, 1.0]])
-    given = next_given_poses(poses, 0.1)
-    dense = densify(poses, 0.1)
-    assert len(given) == len(dense) and given[0] == 0 and given[-1] == 3
-    places = [int(np.argmin(np.abs(dense - pose).sum(axis=1))) for pose in poses]
-    np.testing.assert_array_equal(given[places], range(4))
-    assert np.all(np.diff(given) >= 0)
-    codes = [""] * len(given)
-    codes[places[1] - 1] = "friction"
-    assert find_invalid_poses(codes, given) == [1]
 
 
 class GoalHandle:

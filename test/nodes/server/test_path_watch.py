@@ -5,7 +5,6 @@ import threading
 import time
 from statistics import median
 
-import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
@@ -18,7 +17,7 @@ from std_srvs.srv import SetBool
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import stamped_pose
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.traversability.judge import judge_path
 from rover_planner.nodes.navigation.path_watch import PathWatch
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, wall_at, waves
@@ -34,11 +33,6 @@ WATCHFUL = {"planner": "fan", "candidate_count": 1, "monitor_timeout": 60.0}
 def rock_ahead(x, y):
     """Return waves with a rock of 0.4 m across the way from START to GOAL."""
     return waves(x, y) + 0.4 * ((abs(x - 1.2) < 0.15) & (abs(y) < 2.0))
-
-
-def rock_behind(x, y):
-    """Return waves with such a rock behind the rover."""
-    return waves(x, y) + 0.4 * (x < -3.3)
 
 
 class Rover(Node):
@@ -86,18 +80,6 @@ class Rover(Node):
             return last.level == level and text in last.message and key in values and values
 
         return wait_until(said, f"a status with {text!r} and {key}")
-
-
-def wait_for_sight_of(server, pose):
-    """Wait until the monitor has looked at a rover that is at a pose (3,)."""
-
-    def is_at(found):
-        return found is not None and np.array_equal(found, pose)
-
-    wait_until(lambda: is_at(server.service.fresh_pose()), f"odometry of {pose}")
-    for _ in range(2):  # a look may be under way, at what was known before
-        last = server.watch.finding
-        wait_until(lambda last=last: server.watch.finding is not last, "a look")
 
 
 @pytest.fixture
@@ -171,17 +153,6 @@ def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros, endles
     assert median(delays) < 0.5, delays
 
 
-def test_a_stop_lasts_until_another_path_is_accepted(watched, client):
-    _, rover = watched
-    client.send_terrain(make_terrain(rock_ahead))
-    rover.wait_for_stop()
-    client.send_terrain(make_terrain(waves))
-    time.sleep(0.5)
-    assert rover.stops[-1][0]
-    assert client.can_traverse(START, GOAL).poses
-    rover.wait_for_stop(False)
-
-
 def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
     watched, client, monkeypatch
 ):
@@ -207,58 +178,9 @@ def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
     rover.wait_for_stop(False)
 
 
-def test_a_rock_behind_the_rover_stops_nothing(watched, client):
-    server, rover = watched
-    judged = server.watch.finding.judged
-    client.send_terrain(make_terrain(rock_behind))
-    wait_until(lambda: server.watch.finding.judged > judged, "the judgement on the new map")
-    assert server.watch.finding.state == "watching" and not rover.stops[-1][0]
-
-
-def test_only_the_rest_of_the_path_counts(start_server, client, ros, watched):
-    server, rover = watched
-    for x in (-1.0, 0.0, 1.0, 1.8):
-        rover.pose = (x, 0.0, 0.0)
-
-        def is_there(x=x):
-            place = server.watch.finding.place
-            return place is not None and place.remaining < 2.1 - x
-
-        wait_until(is_there, f"the rover at {x} m")
-    judged = server.watch.finding.judged
-    client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.4 * (abs(x + 1.0) < 0.1)))
-    wait_until(lambda: server.watch.finding.judged > judged, "the judgement on the new map")
-    assert not rover.stops[-1][0]
-    rover.pose = GOAL
-    wait_until(lambda: server.watch.finding.state == "arrived", "the end of the path")
-
-
-def test_a_rover_beside_its_path_or_without_a_pose_is_stopped(watched, client):
-    server, rover = watched
-    rover.pose = (-2.0, 0.8, 0.0)
-    rover.wait_for_stop()
-    rover.wait_for_status(DiagnosticStatus.ERROR, "off_path")
-    rover.pose = START
-    wait_for_sight_of(server, START)
-    assert client.can_traverse(START, GOAL).poses
-    rover.wait_for_stop(False)
-    assert client.set_parameter("monitor_timeout", 0.5)[0]
-    rover.pose = None
-    rover.wait_for_stop()
-    rover.wait_for_status(DiagnosticStatus.ERROR, "no_pose")
-
-
-def test_a_question_about_another_place_does_not_replace_the_watched_path(watched, client):
-    server, rover = watched
-    path = server.watch.finding.path_hash
-    assert client.can_traverse((-1.0, 2.0, 0.0), (1.0, 2.0, 0.0)).poses
-    time.sleep(0.5)
-    assert server.watch.finding.path_hash == path and not rover.stops[-1][0]
-
-
 def test_drift_of_the_suspension_is_a_warning_with_its_size_then_a_stop(watched):
     server, rover = watched
-    standing = sweep_path(server.service.settings.rover, server.service.terrain, [START])
+    standing = judge_path(server.service.settings.rover, server.service.terrain, [START])[0]
     right = {"bogie_left": standing.bogie_angle[0, 1], "bogie_right": standing.bogie_angle[0, 0]}
     rover.angles = right
     values = rover.wait_for_status(DiagnosticStatus.OK, key="suspension_drift")

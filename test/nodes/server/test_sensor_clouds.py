@@ -1,12 +1,8 @@
 """Clouds in the frame of a sensor become the map that the same cloud in the map frame becomes."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
-from rclpy.duration import Duration
 from sensor_msgs.msg import PointField
 
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -78,52 +74,3 @@ def test_a_cloud_of_a_camera_gives_the_map_of_the_same_cloud_in_the_map_frame(
     np.testing.assert_allclose(found.origin, right.origin, atol=1e-9)
     np.testing.assert_allclose(found.elevation, right.elevation, atol=2e-6)
     assert np.isfinite(found.elevation).mean() > 0.99
-
-
-def take_transform(server, parent: str, child: str, rigid: Rigid, stamp) -> None:
-    """Give the server a TFMessage; tf2_msgs is not on PyPI."""
-    message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = parent, stamp
-    place, turn = message.transform.translation, message.transform.rotation
-    place.x, place.y, place.z = rigid.translation.tolist()
-    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
-    server.frames.take(SimpleNamespace(transforms=[message]))
-
-
-def test_tf_places_the_robot_and_the_camera_and_is_refused_when_stale(start_server, client):
-    server = start_server(map_resolution=CELL, transform_timeout=30.0)
-    points, now = points_of(make_terrain(rocky)), client.get_clock().now()
-    back = ROBOT.then(MOUNT).inverse()
-    seen = back.rotation.apply(points) + back.translation
-    old = (now - Duration(seconds=100.0)).to_msg()
-    take_transform(server, "base_link", "mast_camera", MOUNT, now.to_msg())
-    take_transform(server, "map", "base_link", ROBOT, old)
-    client.send_cloud(cloud_of(seen, "mast_camera", now.to_msg()))
-    client.wait_for_log("the transform from 'base_link' to 'map' is stale: it is 10")
-    now = client.get_clock().now()
-    take_transform(server, "map", "base_link", ROBOT, now.to_msg())
-    client.send_cloud(cloud_of(seen, "mast_camera", client.get_clock().now().to_msg()))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    found = server.service.terrain
-    x, y, _ = points[::50].T
-    near = np.abs(found.elevation_at(x, y) - make_terrain(rocky).elevation_at(x, y))
-    assert np.nanmax(near) < 0.05 and np.nanmedian(near) < 2e-3
-    assert np.isfinite(near).mean() > 0.9
-
-
-def test_a_cloud_whose_pose_is_stale_missing_or_unknown_is_refused_with_the_reason(
-    camera_server, client, lasting
-):
-    points, now = points_of(make_terrain(rocky)), client.get_clock().now()
-    refused = "elevation_cloud refused, there is no map yet: "
-    client.send_cloud(cloud_of(points, "front_camera", now.to_msg()))
-    client.wait_for_log(refused + "neither /tf nor odometry says where 'base_link' is in 'map'")
-    send_odometry(client, (now - Duration(seconds=100.0)).to_msg())
-    wait_until(lambda: camera_server.service.fresh_pose() is not None, "odometry")
-    client.send_cloud(cloud_of(points + 1.0, "front_camera", now.to_msg()))
-    client.wait_for_log(
-        refused + "by odometry: the transform from 'base_link' to 'map' is stale: it is 10"
-    )
-    client.send_cloud(cloud_of(points, "rear_camera", now.to_msg()))
-    client.wait_for_log(refused + "the message is in frame 'rear_camera'; it must be in 'map', or")
-    assert camera_server.service.terrain is None

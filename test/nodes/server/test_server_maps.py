@@ -28,34 +28,6 @@ def local_map(column, row, height=0.0, cells=20):
     return Terrain(np.full((cells, cells), height), 0.05, origin)
 
 
-def test_a_loaded_map_survives_100_local_updates(server, client, tmp_path):
-    file = tmp_path / "prior.npz"
-    save_terrain(file, PRIOR)
-    assert client.load_map(file).result == 0
-    rng = np.random.default_rng(2)
-    seen = np.zeros(PRIOR.elevation.shape, bool)
-    for k in range(100):
-        row, column = rng.integers(0, 60, 2)
-        seen[row : row + 20, column : column + 20] = True
-        before = server.service.known_map
-        # Float32 holds the heights of both exactly.
-        cloud = terrain_to_point_cloud(local_map(column, row, 0.5 + k), "map")
-        client.send_cloud(cloud)
-        wait_until(lambda b=before: server.service.known_map is not b, "the map")
-    terrain = server.service.terrain
-    assert terrain.origin == PRIOR.origin
-    np.testing.assert_array_equal(terrain.elevation[~seen], PRIOR.elevation[~seen])
-    assert (terrain.elevation[seen] >= 0.5).all() and 0.1 < seen.mean() < 0.5
-    cells = server.service.known_map.cells
-    assert cells.count() == {
-        "unknown": 0,
-        "loaded": int((~seen).sum()),
-        "contact": 0,
-        "footprint": 0,
-        "elevation_cloud": int(seen.sum()),
-    }
-
-
 def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, tmp_path):
     file = tmp_path / "prior.npz"
     save_terrain(file, PRIOR)
@@ -74,22 +46,13 @@ def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, t
     assert values[..., 4].min() >= 0.0 and values[..., 4].max() < 60.0
 
 
-def test_without_a_loaded_map_a_cloud_replaces_the_last_one(server, client):
-    client.send_terrain(PRIOR)
-    client.send_terrain(local_map(0, 0))
-    assert server.service.terrain.elevation.shape == (20, 20)
-    assert client.set_parameter("map_updates", "merge")[0]
-    client.send_terrain(local_map(60, 60))
-    assert server.service.terrain.elevation.shape > (20, 20)
-
-
 @pytest.mark.timed
 def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
     start_server, client, tmp_path, monkeypatch
 ):
     file = tmp_path / "prior.npz"
     save_terrain(file, PRIOR)
-    server = start_server(terrain_file=str(file))
+    server = start_server(terrain_file=str(file), planner="fan")
     before = server.service.known_map.fingerprint
     merge, began, go_on = MapKeeper.take, threading.Event(), threading.Event()
 

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from benchmarks.hostile_files import archive_of, npy
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import NpzReader, open_npz
+from support.hostile_files import archive_of, npy
 
 MOST = 1_000_000
 DTYPES = ["f2", "f4", "f8", ">f4", ">f8", "i1", "i2", "i4", ">i8", "u1", "u8", "?", "<U3", ">U5"]

@@ -110,11 +110,13 @@ def test_numbers_in_quotes_get_a_hint_in_lists_too():
     assert "YAML" not in refusal(gait="1e3")
 
 
-def test_the_part_of_a_file_is_named_from_the_top():
+def test_errors_name_the_part_of_a_file_from_the_top_and_open_with_the_file():
     with pytest.raises(RoverFileError, match=r"^dune\.legs\[0\]\.length is 0; "):
         read_as(Walker, walker(legs=[{"length": 0}]), "a walker file", ("dune",))
     with pytest.raises(RoverFileError, match="^dune is 3; it must be a mapping with name, hip"):
         read_as(Walker, 3, "a walker file", ("dune",))
+    with pytest.raises(RoverError, match="^mine: no key"), errors_of("mine"):
+        raise RoverFileError("no key")
 
 
 @pytest.mark.parametrize(
@@ -143,21 +145,13 @@ def test_a_rule_checks_only_values_of_the_right_type():
     assert seen == [2.0]
 
 
-@pytest.mark.parametrize("value", ["x" * 100, list(range(100)), {k: k for k in range(100)}])
-def test_a_long_value_is_described_briefly(value):
-    assert len(describe(value)) <= 60
-    assert "..." in describe(value)
-
-
-def test_keys_are_shown_as_they_are_written():
+def test_long_values_and_keys_are_shown_briefly():
+    for value in ("x" * 100, list(range(100)), {k: k for k in range(100)}):
+        assert len(describe(value)) <= 60
+        assert "..." in describe(value)
     assert show_key(("drives", 0, "length")) == "drives[0].length"
     assert show_key(("my soil", "n")) == "my soil.n"
     assert len(show_key(("x" * 1000,))) <= 60
-
-
-def test_errors_of_a_file_open_with_its_name():
-    with pytest.raises(RoverError, match="^mine: no key"), errors_of("mine"):
-        raise RoverFileError("no key")
 
 
 def test_pydantic_is_loaded_when_a_file_is_read_and_not_before():

@@ -1,33 +1,72 @@
-"""One wheel on a speed servo: forces of servo line and friction law, and their derivatives."""
+"""One wheel on a speed servo, on firm ground and on soil: its forces and their derivatives."""
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from rover_physics.forces.servo_record import SERVO
+from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import D, S, T, roll_wheel
+from rover_physics.forces.soil import (
+    SHEAR_MODULUS,
+    contact_length,
+    find_sinkage,
+    mobilised_share,
+    motion_resistance,
+    pack_soils,
+    shear_strength,
+    thrust_at_slip,
+)
 from rover_physics.numerics.records import new_record
 
-CREEP = 0.01
+CREEP, FULL = 0.01, 0.2
+RADIUS, WIDTH, WEIGHT = 0.1, 0.1, 80.0
+SOILS = {
+    name: pack_soils((name,))[-1]
+    for name in ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
+}
+soils = st.sampled_from(sorted(SOILS))
 ways = st.floats(-1.5, 1.5)
-spins = st.floats(-0.05, 0.05)
+velocities = st.tuples(ways, ways, st.floats(-0.05, 0.05))
+"""Speeds of a wheel along and across, and of its turn about the contact [nominal speeds]."""
 grips = st.floats(1e-3, 0.5)
+loads = st.floats(0.01, 0.4)
 droops = st.floats(0.0, 0.9)
 limits = st.floats(0.02, 0.5)
-many = settings(max_examples=300, deadline=None)
+many = settings(max_examples=200)
 
 
-def roll(grip, velocity, droop=0.3, limit=0.2, full=0.2):
+def servo_of(limit, droop=0.3, share=1.0):
     """Return the SERVO of one wheel that is commanded to roll at the nominal speed."""
-    servo = new_record(SERVO, droop=droop, full_traction=full, max_traction=limit, creep=CREEP)
+    servo = new_record(
+        SERVO, droop=droop, full_traction=FULL, max_traction=limit, creep=CREEP,
+        friction_share=share, radius=RADIUS, width=WIDTH, weight=WEIGHT,
+    )  # fmt: skip
     servo.command[0] = 1.0
+    return servo
+
+
+def roll(grip, velocity, droop=0.3, limit=0.2):
+    """Return the SERVO of a wheel on firm ground with the friction force `grip` [weights]."""
+    servo = servo_of(limit, droop)
     roll_wheel(servo, 0, grip, velocity)
     return servo
 
 
-def expected(grip, velocity, droop, limit, full=0.2) -> np.ndarray:
+def roll_soft(soil, load, velocity, droop=0.3, limit=0.2, share=1.0):
+    """Return the SERVO of a wheel on soil with a load [weights]."""
+    servo = servo_of(limit, droop, share)
+    servo.soil[0], servo.load[0], servo.slip[0] = SOILS[soil], load, np.nan
+    roll_on_soil(servo, 0, velocity)
+    return servo
+
+
+# Firm ground
+
+
+def expected(grip, velocity, droop, limit) -> np.ndarray:
     """Return T, S, D by bisection."""
     along, across, spin = velocity
     wide = np.hypot(across, CREEP)
@@ -39,7 +78,7 @@ def expected(grip, velocity, droop, limit, full=0.2) -> np.ndarray:
         return np.array([pulls.sum(), -0.5 * grip * across * (1 / size).sum(), -np.diff(pulls)[0]])
 
     def excess(slip):
-        return slip - (along - 1.0) - droop / full * forces(slip)[T]
+        return slip - (along - 1.0) - droop / FULL * forces(slip)[T]
 
     slip = brentq(excess, -10.0, 10.0, xtol=1e-15)
     if abs(forces(slip)[T]) > limit:
@@ -49,63 +88,113 @@ def expected(grip, velocity, droop, limit, full=0.2) -> np.ndarray:
 
 
 @many
-@given(grips, ways, ways, spins, droops, limits)
-def test_forces_are_those_of_servo_and_friction_law(grip, along, across, spin, droop, limit):
-    servo = roll(grip, (along, across, spin), droop, limit)
-    if abs(limit - grip) < 1e-3 * grip:
-        return  # all friction is needed along the wheel: the slip is unbounded
-    np.testing.assert_allclose(
-        servo.force[0], expected(grip, (along, across, spin), droop, limit), atol=1e-7
-    )
+@given(grips, velocities, droops, limits)
+def test_forces_are_those_of_servo_and_friction_law(grip, velocity, droop, limit):
+    assume(abs(limit - grip) >= 1e-3 * grip)  # all friction along the wheel: slip is unbounded
+    force = roll(grip, velocity, droop, limit).force[0]
+    np.testing.assert_allclose(force, expected(grip, velocity, droop, limit), atol=1e-7)
+    assert np.hypot(force[T], force[S]) <= grip + 1e-9
+    assert abs(force[T]) <= limit + 1e-12
 
 
 @many
-@given(grips, ways, ways, spins, droops, limits)
-@example(0.46875, 1.125, 0.8125, 0.0234375, 0.25, 0.5)  # the servo's own rest moves differences
-def test_rates_are_the_differences_of_the_forces(grip, along, across, spin, droop, limit):
-    at = np.array([along, across, spin, grip])
-    servo = roll(grip, (along, across, spin), droop, limit)
-    rates, found = servo.force_rate[0].copy(), np.empty((3, 4))
-    if abs(abs(servo.force[0, T]) - limit) < 1e-4 or abs(limit - grip) < 0.02:
-        return  # the forces have a kink where the torque limit begins
-    step = 1e-6
+@given(grips, velocities, droops, limits)
+@example(0.46875, (1.125, 0.8125, 0.0234375), 0.25, 0.5)  # the servo's rest moves differences
+def test_rates_are_the_differences_of_the_forces(grip, velocity, droop, limit):
+    at = np.array([*velocity, grip])
+    servo = roll(grip, velocity, droop, limit)
+    rates, found, step = servo.force_rate[0].copy(), np.empty((3, 4)), 1e-6
+    beyond = abs(servo.force[0, T]) - limit
+    assume(abs(beyond) >= 1e-4 and abs(limit - grip) >= 0.02)  # a kink where the limit begins
     for k in range(4):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = at + sign * step * np.eye(4)[k]
-            ends.append(expected(moved[3], tuple(moved[:3]), droop, limit))
-        found[:, k] = (ends[0] - ends[1]) / (2.0 * step)
-    if abs(abs(servo.force[0, T]) - limit) < 1e-9:
-        rates[T] = found[T] = 0.0
+        ends = (at + sign * step * np.eye(4)[k] for sign in (1.0, -1.0))
+        one, two = (expected(moved[3], tuple(moved[:3]), droop, limit) for moved in ends)
+        found[:, k] = (one - two) / (2.0 * step)
     np.testing.assert_allclose(rates, found, atol=2e-4 * max(1.0, np.abs(found).max()))
 
 
-@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (1.5, 0.3, 0.01), (0.9, -0.2, -0.02)])
-def test_no_force_exceeds_the_friction_or_the_torque_limit(velocity):
-    for limit in (0.02, 0.05, 0.3):
-        force = roll(0.1, velocity, limit=limit).force[0]
-        assert np.hypot(force[T], force[S]) <= 0.1 + 1e-9
-        assert abs(force[T]) <= limit + 1e-12
-
-
-def test_a_wheel_that_has_to_go_farther_is_dragged_and_one_that_lags_pushes():
-    assert roll(0.1, (1.2, 0.0, 0.0)).force[0, T] < 0.0
-    assert roll(0.1, (0.8, 0.0, 0.0)).force[0, T] > 0.0
-    assert roll(0.1, (1.0, 0.0, 0.0)).force[0, T] == 0.0
-
-
 def test_at_full_torque_the_servo_loses_its_droop():
-    servo = roll(10.0, (0.7, 0.0, 0.0), droop=0.3, limit=0.5, full=0.2)
-    assert servo.force[0, T] == pytest.approx(0.2, rel=1e-2)
-
-
-def test_a_turning_wheel_scrubs_against_the_turn():
-    turning = roll(0.1, (1.0, 0.0, 0.02)).force[0]
-    assert turning[D] * 0.02 < 0.0
-    assert turning[D] == pytest.approx(-0.1 * 2.0 / np.sqrt(5.0), rel=1e-6)
-    assert turning[T] == pytest.approx(0.0, abs=1e-12)
+    servo = roll(10.0, (0.7, 0.0, 0.0), droop=0.3, limit=0.5)
+    assert servo.force[0, T] == pytest.approx(FULL, rel=1e-2)
 
 
 def test_a_wheel_without_load_has_no_force():
     servo = roll(-0.1, (0.5, 0.2, 0.01))
     assert not servo.force[0].any() and not servo.force_rate[0].any()
+
+
+# Soil
+
+
+def soil_forces(soil, load, velocity, rim) -> tuple[np.ndarray, float]:
+    """Return F_x, S, D and R over the weight at the speed of the rim, by the notes on soil."""
+    row, N = SOILS[soil], load * WEIGHT
+    sinkage = find_sinkage(row, RADIUS, WIDTH, N)
+    length = contact_length(RADIUS, sinkage)
+    strength = shear_strength(row, WIDTH * length, N) / WEIGHT
+    along, across, spin = velocity
+    ends = []
+    for way in (along + spin, along - spin):
+        slide = np.array([rim - way, -across])
+        size = np.hypot(*slide)
+        slip = min(size / max(abs(rim), 1e-9), 1.0)
+        share = mobilised_share(slip * length / row[SHEAR_MODULUS])
+        ends.append(0.5 * strength * share * slide / max(size, 1e-12))
+    resistance = motion_resistance(row, WIDTH, sinkage) / WEIGHT * np.clip(along / CREEP, -1, 1)
+    shear = np.array([ends[0][0] + ends[1][0], ends[0][1] + ends[1][1], ends[0][0] - ends[1][0]])
+    return shear, resistance
+
+
+@many
+@given(soils, loads, velocities, droops, st.floats(0.5, 1.0))
+def test_forces_are_those_of_servo_and_soil(soil, load, velocity, droop, share):
+    servo = roll_soft(soil, load, velocity, droop, 10.0, share)
+
+    def excess(rim):
+        shear, resistance = soil_forces(soil, load, velocity, rim)
+        thrust = share * (shear[0] - resistance) + resistance
+        return rim - 1.0 + droop / FULL * thrust
+
+    rim = brentq(excess, -50.0, 50.0, xtol=1e-14)
+    assume(abs(rim) > 0.05)  # where the rim stands, a creep keeps the slip regular
+    shear, resistance = soil_forces(soil, load, velocity, rim)
+    assert velocity[0] - servo.slip[0] == pytest.approx(rim, abs=1e-8)
+    forces = share * (shear - [resistance, 0.0, 0.0])
+    np.testing.assert_allclose(servo.force[0], forces, atol=1e-7)
+
+
+@many
+@given(soils, loads, velocities, droops, limits)
+def test_rates_on_soil_are_the_differences_of_the_forces(soil, load, velocity, droop, limit):
+    at, step = np.array([*velocity, load]), 1e-6
+
+    def forces(moved):
+        return roll_soft(soil, moved[3], tuple(moved[:3]), droop, limit).force[0].copy()
+
+    rates = roll_soft(soil, load, velocity, droop, limit).force_rate[0].copy()
+    for k in range(4):
+        one, here, two = (forces(at + sign * step * np.eye(4)[k]) for sign in (1.0, 0.0, -1.0))
+        left, right = (here - two) / step, (one - here) / step
+        assume(np.abs(left - right).max() < 1e-2 * max(1.0, np.abs(left).max()))  # no kink
+        scale = max(1.0, np.abs(left).max())
+        np.testing.assert_allclose(rates[:, k], 0.5 * (left + right), atol=5e-3 * scale)
+
+
+@many
+@given(soils, loads, velocities, st.floats(0.01, 0.5))
+def test_no_force_exceeds_the_strength_of_the_soil_or_the_torque(soil, load, velocity, limit):
+    assume(abs(velocity[0]) > CREEP)
+    force, row = roll_soft(soil, load, velocity, limit=limit).force[0], SOILS[soil]
+    resistance = motion_resistance(row, WIDTH, find_sinkage(row, RADIUS, WIDTH, load * WEIGHT))
+    thrust = force[T] + np.sign(velocity[0]) * resistance / WEIGHT
+    largest = thrust_at_slip(row, RADIUS, WIDTH, load * WEIGHT, 1.0) / WEIGHT
+    assert np.hypot(thrust, force[S]) <= largest * (1.0 + 1e-9)
+    assert abs(thrust) <= limit + 1e-9
+
+
+@pytest.mark.parametrize("turn", [0.02, -0.02])
+def test_a_turning_wheel_scrubs_against_the_turn(turn):
+    firm = roll(0.1, (1.0, 0.0, turn)).force[0]
+    assert firm[D] == pytest.approx(-0.1 * 2.0 / np.sqrt(5.0) * np.sign(turn), rel=1e-6)
+    assert firm[T] == pytest.approx(0.0, abs=1e-12)
+    assert roll_soft("dry_sand", 0.17, (0.8, 0.0, turn)).force[0, D] * turn < 0.0

@@ -1,4 +1,4 @@
-"""Balance with turned wheels: it holds for any angles, and nothing that it leaves free is lost."""
+"""Balance with turned wheels: any angles carry the weight, and no free force is lost."""
 
 from dataclasses import replace
 
@@ -9,14 +9,12 @@ from hypothesis import strategies as st
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES, balance_forces
 from rover_physics.prediction.evaluation import new_work
-from rover_physics.prediction.sweep import sweep_path, sweep_poses
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.model import Rover, Steering
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from support.rough_grounds import fractal, plane, random_poses, smooth
-from support.rover_geometry import balance_residuals, contact_frames
+from rover_physics.traversability.judge import judge_path, judge_poses
+from support.rough_grounds import plane, random_poses, smooth
+from support.rover_geometry import contact_frames
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 curvatures = st.one_of(st.floats(-20.0, 20.0), st.sampled_from([np.inf, -np.inf, 1 / 0.31]))
@@ -38,22 +36,14 @@ def balance_of(rover: Rover, steering, roll: float = 0.0, pitch: float = 0.0):
     return work, balance_forces(linkage, work.placement, work.contacts, columns, work.balance)
 
 
-def sums_of(work, forces: np.ndarray) -> np.ndarray:
-    """Return sum and moment about the origin (6,) of forces (6, 3) along n, t, a of each wheel."""
+def sums_of(work, column: int) -> tuple[np.ndarray, float]:
+    """Return sum and moment about the origin (6,) of a column of forces, and the largest force."""
+    balance = work.balance
+    forces = np.stack([balance.normal, balance.tangential, balance.lateral], axis=1)[..., column]
     on_wheels = np.einsum("wk,wkx->wx", forces, work.balance.frames)
     arms = work.contacts.point - work.placement.origin
-    return np.concatenate([on_wheels.sum(axis=0), np.cross(arms, on_wheels).sum(axis=0)])
-
-
-@few
-@given(st.integers(0, 10_000), curvatures, st.sampled_from(["equal", "optimal"]))
-def test_all_nine_balance_equations_hold_with_turned_wheels(seed, curvature, policy):
-    poses, ground = random_poses(seed, 3, 0.5), (smooth(seed) if seed % 2 else fractal(seed % 20))
-    bends, options = np.full(3, curvature), SweepOptions(policy=policy)
-    prediction = sweep_poses(LSR1, ground, poses, bends, options)
-    for i in np.flatnonzero(prediction.settled):
-        assert np.abs(balance_residuals(LSR1, prediction, i)).max() <= 1e-9
-    assert not (prediction.status == PoseStatus.NO_EQUILIBRIUM).any()
+    moments = np.cross(arms, on_wheels)
+    return np.concatenate([on_wheels.sum(axis=0), moments.sum(axis=0)]), np.abs(forces).max()
 
 
 @few
@@ -64,35 +54,22 @@ def test_weight_is_carried_at_any_steering_angles_even_of_wheels_that_disagree(
     work, solved = balance_of(rover, steering, roll, pitch)
     if not solved:
         return
-    balance = work.balance
-    forces = np.stack([balance.normal, balance.tangential, balance.lateral], axis=1)[..., 0]
-    sums = sums_of(work, forces)
-    assert sums[:3] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert sums_of(work, 0)[0][:3] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
     for k in range(1, 1 + FREE_FORCES):
-        free = np.stack([balance.normal, balance.tangential, balance.lateral], axis=1)[..., k]
-        size = np.abs(free).max()
-        assert np.abs(sums_of(work, free)).max() <= 1e-9 * size
+        sums, size = sums_of(work, k)
+        assert np.abs(sums).max() <= 1e-9 * size
 
 
 @few
 @given(curvatures)
 def test_all_lateral_forces_and_tractions_are_free_at_any_curvature(curvature):
-    prediction = sweep_poses(LSR1, smooth(1), [[0.1, 0.2, 0.3]], [curvature])
+    prediction = judge_poses(LSR1, smooth(1), [[0.1, 0.2, 0.3]], [curvature])[0]
     work, solved = balance_of(LSR1, prediction.steering_angle[0])
     assert solved
     common, free = work.balance.shares.common, work.balance.shares.free
     assert np.linalg.matrix_rank(work.balance.tangential[:, 1 : 1 + FREE_TORQUES]) == FREE_TORQUES
     every = np.column_stack([common[:, :2], np.eye(6)[:, free]])
     assert np.linalg.cond(every) <= 100.0
-
-
-@few
-@given(st.floats(-0.2, 0.2), st.floats(-0.3, 0.3))
-def test_straight_wheels_share_evenly_and_linearly(roll, pitch):
-    work, _ = balance_of(M2020, np.zeros(6), roll, pitch)
-    along = work.placement.centres @ work.placement.R[:, 0] / (0.881 + 1.379)
-    expected = np.column_stack([np.ones(6), along, np.ones(6)])
-    assert work.balance.shares.common == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("turn", [1e-6, -1e-6])
@@ -105,7 +82,7 @@ def test_wheels_that_are_hardly_turned_share_as_straight_ones(turn):
 
 
 def test_in_a_turn_on_the_spot_the_tractions_drive_the_turn():
-    prediction = sweep_poses(LSR1, smooth(3), [[0.1, 0.2, 0.3]], [np.inf])
+    prediction = judge_poses(LSR1, smooth(3), [[0.1, 0.2, 0.3]], [np.inf])[0]
     T = prediction.tangential[0]
     assert T[:3] == pytest.approx(np.full(3, T[0])) and T[3:] == pytest.approx(-T[:3])
 
@@ -114,7 +91,7 @@ def test_in_a_crab_up_a_slope_the_tractions_carry_the_weight_along_it():
     crab = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
     y = np.linspace(-0.2, 0.2, 9)
     poses = np.column_stack([0.0 * y, y, 0.0 * y])
-    prediction = sweep_path(crab, plane(0.0, np.tan(0.2)), poses)
+    prediction = judge_path(crab, plane(0.0, np.tan(0.2)), poses)[0]
     assert prediction.steering_angle == pytest.approx(np.full((9, 6), np.pi / 2))
     expected = np.full((9, 6), LSR1.weight * np.sin(0.2) / 6.0)
     assert prediction.tangential == pytest.approx(expected, rel=1e-4)
@@ -123,7 +100,7 @@ def test_in_a_crab_up_a_slope_the_tractions_carry_the_weight_along_it():
 
 def test_contact_frames_are_those_of_the_turned_wheels():
     poses, ground = random_poses(4, 10, 0.5), smooth(5)
-    prediction = sweep_poses(LSR1, ground, poses, np.linspace(-2.0, 2.0, 10))
+    prediction = judge_poses(LSR1, ground, poses, np.linspace(-2.0, 2.0, 10))[0]
     for i in np.flatnonzero(prediction.settled):
         radial = prediction.wheel_centres[i] - prediction.contact_points[i]
         n, t, a = contact_frames(LSR1, prediction, i).swapaxes(0, 1)

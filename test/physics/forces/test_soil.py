@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rover_physics.errors import SoilError
@@ -35,16 +35,19 @@ MU = 0.8
 RIGID = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
 
 
-def solve(soil, mu, radius, width, N, T, S):
-    return solve_wheel(soil, SoilWheel(radius, width, mu), N, T, S)
+def solve(soil, radius, width, N, T, S):
+    return solve_wheel(soil, SoilWheel(radius, width, MU), N, T, S)
 
 
-def friction_of(soil, mu, radius, width, N):
+def friction_of(soil, radius, width, N, mu=MU):
     return effective_friction(soil, SoilWheel(radius, width, mu), N)
 
 
+SOILS = {name: pack_soils((name,))[1] for name in (*RIGID, "firm_ground")}
+
+
 def packed(name):
-    return pack_soils((name,))[1]
+    return SOILS[name].copy()
 
 
 # Worked from Wong's formulas by hand, with D = 2 r, k = k_c + b k_phi, x = i l / K:
@@ -82,39 +85,35 @@ HAND = [
 
 @pytest.mark.parametrize(("name", "r", "b", "N", "z0", "R", "pull", "torque", "largest"), HAND)
 def test_the_model_gives_the_values_worked_by_hand(name, r, b, N, z0, R, pull, torque, largest):
-    result = solve(packed(name), MU, r, b, N, pull, 0.0)
+    result = solve(packed(name), r, b, N, pull, 0.0)
     assert result.slip_ratio == pytest.approx(0.2, abs=2e-6)
     assert result.sinkage == pytest.approx(z0, rel=1e-6)
     assert result.resistance == pytest.approx(R, rel=1e-6)
     assert result.torque == pytest.approx(torque, rel=1e-5)
     assert result.drawbar_pull == pytest.approx(largest, rel=5e-6)
     assert result.utilisation == pytest.approx(pull / largest, rel=5e-6)
-    assert friction_of(packed(name), MU, r, b, N) == pytest.approx(largest / N, rel=5e-6)
+    assert friction_of(packed(name), r, b, N) == pytest.approx(largest / N, rel=5e-6)
 
 
 @pytest.mark.parametrize(("name", "r", "b", "N"), [case[:4] for case in HAND])
-def test_the_resistance_is_the_work_of_pressing_the_rut(name, r, b, N):
-    """R = b times the integral of p = (k_c / b + k_phi) z^n; and R / N = 3 sqrt(z0 / D) / ..."""
+def test_resistance_and_load_are_integrals_of_the_pressure(name, r, b, N):
+    """R = b times the integral of p = (k_c / b + k_phi) z^n down to z0, the work of the rut.
+
+    R / N = 3 sqrt(z0 / D) / ((3 - n) (n + 1)) by Wong's expansion of two terms, whose load is that
+    of the arc of the rim within 6 %.
+    """
     soil = packed(name)
-    z0 = find_sinkage(soil, r, b, N)
-    z = (np.arange(100_000) + 0.5) / 100_000 * z0
-    pressed = b * np.mean((soil[K_C] / b + soil[K_PHI]) * z ** soil[EXPONENT]) * z0
-    n = soil[EXPONENT]
-    assert motion_resistance(soil, b, z0) == pytest.approx(pressed, rel=1e-6)
+    n, z0, shares = soil[EXPONENT], find_sinkage(soil, r, b, N), (np.arange(1e5) + 0.5) / 1e5
+
+    def pressed(z):
+        return np.mean((soil[K_C] + b * soil[K_PHI]) * z**n)
+
+    assert motion_resistance(soil, b, z0) == pytest.approx(pressed(shares * z0) * z0, rel=1e-6)
     ratio = 3.0 * math.sqrt(z0 / (2.0 * r)) / ((3.0 - n) * (n + 1.0))
     assert motion_resistance(soil, b, z0) / N == pytest.approx(ratio, rel=1e-12)
-
-
-@pytest.mark.parametrize(("name", "r", "b", "N"), [case[:4] for case in HAND])
-def test_the_pressure_under_the_wheel_carries_its_load(name, r, b, N):
-    """Wong's two-term expansion against the integral over the arc of the rim."""
-    soil = packed(name)
-    z0 = find_sinkage(soil, r, b, N)
     half_length = math.sqrt(2.0 * r * z0 - z0 * z0)
-    x = (np.arange(100_000) + 0.5) / 100_000 * half_length
-    z = np.sqrt(r * r - x * x) - (r - z0)
-    load = np.mean((soil[K_C] + b * soil[K_PHI]) * z ** soil[EXPONENT]) * half_length
-    assert load == pytest.approx(N, rel=0.06)
+    z = np.sqrt(r * r - (shares * half_length) ** 2) - (r - z0)
+    assert pressed(z) * half_length == pytest.approx(N, rel=0.06)
 
 
 loads = st.floats(0.5, 2000.0)
@@ -123,41 +122,38 @@ wheels = st.tuples(st.floats(0.05, 0.6), st.floats(0.03, 0.5))
 
 
 @given(names, wheels, loads, st.floats(-0.999, 0.999))
-@settings(deadline=None)
 def test_slip_to_pull_and_back_is_the_same_slip(name, wheel, N, slip):
     soil, (r, b) = packed(name), wheel
-    result = solve(soil, MU, r, b, N, 0.0, 0.0)
+    result = solve(soil, r, b, N, 0.0, 0.0)
     assume(result.sinkage < r)
     pull = thrust_at_slip(soil, r, b, N, slip) - result.resistance
     # Full slip of a long contact is the flat end of an exponential: digits of pull become slip.
     steepness = contact_length(r, result.sinkage) / soil[SHEAR_MODULUS]
-    again = solve(soil, MU, r, b, N, pull, 0.0)
+    again = solve(soil, r, b, N, pull, 0.0)
     if result.drawbar_pull > 0.0:
         assert again.utilisation <= 1.0
     assert again.slip_ratio == pytest.approx(slip, abs=1e-10 * (1.0 + steepness))
 
 
 @given(names, wheels, loads, st.floats(-0.9, 0.9), st.floats(1e-6, 0.1))
-@settings(deadline=None)
 def test_slip_rises_with_the_pull_needed(name, wheel, N, share, more):
     soil, (r, b) = packed(name), wheel
-    largest = solve(soil, MU, r, b, N, 0.0, 0.0).drawbar_pull
+    largest = solve(soil, r, b, N, 0.0, 0.0).drawbar_pull
     assume(largest > 0.0)
     less, pull = share * largest, (share + more) * largest
-    low = solve(soil, MU, r, b, N, less, 0.0)
-    high = solve(soil, MU, r, b, N, pull, 0.0)
+    low = solve(soil, r, b, N, less, 0.0)
+    high = solve(soil, r, b, N, pull, 0.0)
     assert low.slip_ratio < high.slip_ratio
     assert low.torque < high.torque
 
 
 @given(names, wheels, loads, st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
-@settings(deadline=None)
 def test_forces_within_the_effective_friction_are_within_the_strength(name, wheel, N, t, s):
-    soil, (r, b) = packed(name), wheel
-    friction = friction_of(soil, MU, r, b, N)
+    soil = packed(name)
+    friction = friction_of(soil, *wheel, N)
     assume(friction > MIN_FRICTION)
     T, S = t * friction * N, s * friction * N
-    result = solve(soil, MU, r, b, N, T, S)
+    result = solve(soil, *wheel, N, T, S)
     circle = math.hypot(t, s)
     assert result.utilisation <= circle * (1.0 + 1e-9)
     thrust = math.hypot(T + result.resistance, S)
@@ -165,28 +161,15 @@ def test_forces_within_the_effective_friction_are_within_the_strength(name, whee
     if abs(thrust / strength - 1.0) > 1e-9:
         assert (result.utilisation > 1.0) == (thrust > strength)
     assert -1.0 <= result.slip_ratio <= 1.0
+    if friction > 1e-3 and circle > 1e-3:  # utilisation is the share of what this way allows
+        T, S = T / result.utilisation, S / result.utilisation
+        resistance = solve(soil, *wheel, N, T, S).resistance
+        assert math.hypot(T + resistance, S) == pytest.approx(strength, rel=1e-9)
 
 
-@given(names, wheels, loads, st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
-@settings(deadline=None)
-def test_utilisation_is_the_share_of_the_largest_forces_in_that_direction(name, wheel, N, t, s):
-    soil, (r, b) = packed(name), wheel
-    largest = solve(soil, MU, r, b, N, 0.0, 0.0).drawbar_pull
-    assume(largest > 1e-3 * N and math.hypot(t, s) > 1e-3)
-    used = solve(soil, MU, r, b, N, t * largest, s * largest).utilisation
-    T, S = t * largest / used, s * largest / used
-    resistance = solve(soil, MU, r, b, N, T, S).resistance
-    assert math.hypot(T + resistance, S) == pytest.approx(largest + resistance, rel=1e-9)
-
-
-@given(st.floats(0.0, 1.0, exclude_max=True))
-def test_the_mobilisation_found_has_the_share_asked_for(share):
-    x = find_mobilisation(share)
-    assert mobilised_share(x) == pytest.approx(share, rel=1e-9, abs=1e-15)
-
-
-@given(st.floats(0.0, 500.0), st.floats(1e-6, 1.0))
-def test_more_slip_mobilises_more_shear(x, more):
+@given(st.floats(0.0, 1.0, exclude_max=True), st.floats(0.0, 500.0), st.floats(1e-6, 1.0))
+def test_more_slip_mobilises_more_shear_and_the_inverse_is_one(share, x, more):
+    assert mobilised_share(find_mobilisation(share)) == pytest.approx(share, rel=1e-9, abs=1e-15)
     assert 0.0 <= mobilised_share(x) < mobilised_share(x + more) < 1.0
 
 
@@ -197,22 +180,11 @@ def test_the_share_is_half_of_a_small_displacement_and_goes_on_smoothly():
 
 
 @pytest.mark.parametrize("name", RIGID)
-def test_thrust_starts_with_half_the_strength_over_the_shear_modulus(name):
-    """F -> (A c + N tan(phi)) i l / (2 K) for i -> 0."""
-    soil, r, b, N, slip = packed(name), 0.2, 0.15, 80.0, 1e-7
-    length = r * math.acos(1.0 - find_sinkage(soil, r, b, N) / r)
-    strength = b * length * soil[COHESION] + N * soil[TAN_PHI]
-    slope = strength * length / (2.0 * soil[SHEAR_MODULUS])
-    assert thrust_at_slip(soil, r, b, N, slip) / slip == pytest.approx(slope, rel=1e-6)
-    assert thrust_at_slip(soil, r, b, N, -slip) == -thrust_at_slip(soil, r, b, N, slip)
-
-
-@pytest.mark.parametrize("name", RIGID)
 def test_slip_is_one_at_the_largest_pull_and_beyond(name):
     soil, wheel = packed(name), (0.2, 0.15, 80.0)
-    largest = solve(soil, MU, *wheel, 0.0, 0.0).drawbar_pull
-    at = solve(soil, MU, *wheel, largest * (1.0 - 1e-12), 0.0)
-    beyond = solve(soil, MU, *wheel, largest * 1.5, 0.0)
+    largest = solve(soil, *wheel, 0.0, 0.0).drawbar_pull
+    at = solve(soil, *wheel, largest * (1.0 - 1e-12), 0.0)
+    beyond = solve(soil, *wheel, largest * 1.5, 0.0)
     assert at.slip_ratio == pytest.approx(1.0, abs=1e-9)
     assert (beyond.slip_ratio, beyond.utilisation) == (1.0, pytest.approx(1.5))
     assert beyond.torque == pytest.approx(0.2 * (1.5 * largest + beyond.resistance))
@@ -222,119 +194,55 @@ def test_slip_is_one_at_the_largest_pull_and_beyond(name):
 @pytest.mark.parametrize("name", RIGID)
 def test_a_wheel_that_is_dragged_against_its_resistance_rolls_freely(name):
     soil, wheel = packed(name), (0.2, 0.15, 80.0)
-    resistance = solve(soil, MU, *wheel, 0.0, 0.0).resistance
-    free = solve(soil, MU, *wheel, -resistance, 0.0)
-    braked = solve(soil, MU, *wheel, -1.2 * resistance, 0.0)
-    locked = solve(soil, MU, *wheel, -10.0 * 80.0, 0.0)
+    resistance = solve(soil, *wheel, 0.0, 0.0).resistance
+    free = solve(soil, *wheel, -resistance, 0.0)
+    braked = solve(soil, *wheel, -1.2 * resistance, 0.0)
+    locked = solve(soil, *wheel, -10.0 * 80.0, 0.0)
     assert free.slip_ratio == 0.0 and free.torque == 0.0
     assert -1.0 < braked.slip_ratio < 0.0 and braked.torque < 0.0
     assert locked.slip_ratio == -1.0 and locked.utilisation > 1.0
 
 
-def test_a_lateral_force_needs_more_slip_but_makes_none_alone():
-    soil, wheel = packed("dry_sand"), (0.2, 0.15, 80.0)
-    straight = solve(soil, MU, *wheel, 8.0, 0.0)
-    resistance = straight.resistance
-    right, left = (solve(soil, MU, *wheel, 8.0, S) for S in (-9.0, 9.0))
-    assert right == left
-    assert right.slip_ratio > straight.slip_ratio and right.utilisation > straight.utilisation
-    assert solve(soil, MU, *wheel, -resistance, 9.0).slip_ratio == 0.0
-
-
 @given(names, wheels, loads, st.floats(1.01, 5.0))
-@settings(deadline=None)
-def test_a_heavier_wheel_sinks_deeper(name, wheel, N, factor):
-    soil = packed(name)
-    assert find_sinkage(soil, *wheel, factor * N) > find_sinkage(soil, *wheel, N)
-
-
-@given(names, wheels, loads, st.floats(1.01, 3.0))
-@settings(deadline=None)
-def test_the_largest_pull_rises_with_the_friction_angle_and_the_cohesion(name, wheel, N, factor):
-    soil = packed(name)
-    assume(find_sinkage(soil, *wheel, N) < wheel[0])
-    before = solve(soil, MU, *wheel, N, 0.0, 0.0).drawbar_pull
-    for column in (TAN_PHI, COHESION):
-        stronger = soil.copy()
-        stronger[column] *= factor
-        assert solve(stronger, MU, *wheel, N, 0.0, 0.0).drawbar_pull > before
-
-
-@given(names, wheels, loads, st.floats(1.01, 5.0))
-@settings(deadline=None)
-def test_a_softer_soil_lets_a_wheel_sink_deeper_against_more_resistance(name, wheel, N, factor):
+def test_weight_and_soft_soil_sink_a_wheel_and_strong_soil_lets_it_pull(name, wheel, N, factor):
     soil, softer = packed(name), packed(name)
-    softer[K_C] /= factor
-    softer[K_PHI] /= factor
-    firm = solve(soil, MU, *wheel, N, 0.0, 0.0)
-    soft = solve(softer, MU, *wheel, N, 0.0, 0.0)
-    assert soft.sinkage > firm.sinkage
-    assert soft.resistance > firm.resistance
-
-
-@pytest.mark.parametrize("name", RIGID)
-def test_without_cohesion_a_softer_soil_pulls_less_once_the_contact_is_long(name):
-    """Before that, and by cohesion, the longer contact of a deeper wheel gains more shear."""
-    soil, radius, width, N = packed(name), 0.25, 0.2, 200.0
-    soil[COHESION] = 0.0
-    long = math.sqrt(2.0 * soil[SHEAR_MODULUS] * 2.0 * radius)
-    pulls = []
-    for _ in range(300):
-        result = solve(soil, MU, radius, width, N, 0.0, 0.0)
-        if result.sinkage > radius:
-            break
-        if contact_length(radius, result.sinkage) > long:
-            pulls.append(result.drawbar_pull)
-        soil[K_C] *= 0.97
-        soil[K_PHI] *= 0.97
-    assert len(pulls) > 50
-    assert (np.diff(pulls) < 0.0).all()
+    softer[[K_C, K_PHI]] /= factor
+    firm, soft = (solve(one, *wheel, N, 0.0, 0.0) for one in (soil, softer))
+    assert find_sinkage(soil, *wheel, factor * N) > firm.sinkage
+    assert soft.sinkage > firm.sinkage and soft.resistance > firm.resistance
+    for column in (TAN_PHI, COHESION) if firm.sinkage < wheel[0] else ():
+        stronger = packed(name)
+        stronger[column] *= factor
+        assert solve(stronger, *wheel, N, 0.0, 0.0).drawbar_pull > firm.drawbar_pull
 
 
 def test_a_wheel_sunk_to_its_axle_gives_no_pull():
     soil = packed("mars_simulant")
-    result = solve(soil, MU, 0.1, 0.08, 2000.0, 1.0, 0.0)
+    result = solve(soil, 0.1, 0.08, 2000.0, 1.0, 0.0)
     assert result.sinkage > 0.1
-    assert not is_sinkage_moderate(result.sinkage, 0.1)
+    assert is_sinkage_moderate(0.0333, 0.1) and not is_sinkage_moderate(0.0334, 0.1)  # D / 6
     assert result.drawbar_pull == -result.resistance < 0.0
     assert result.slip_ratio == 1.0 and result.utilisation == np.inf
-    assert friction_of(soil, MU, 0.1, 0.08, 2000.0) == MIN_FRICTION
+    assert friction_of(soil, 0.1, 0.08, 2000.0) == MIN_FRICTION
 
 
 def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged():
     soil = packed("mars_simulant")
     wheel = (0.1, 0.08, 90.0)
-    idle = solve(soil, MU, *wheel, 0.0, 0.0)
+    idle = solve(soil, *wheel, 0.0, 0.0)
     assert idle.sinkage < 0.1 and idle.drawbar_pull < 0.0
     assert idle.utilisation == np.inf and idle.slip_ratio == 1.0
-    dragged = solve(soil, MU, *wheel, -idle.resistance, 0.0)
+    dragged = solve(soil, *wheel, -idle.resistance, 0.0)
     assert dragged.utilisation == 0.0 and dragged.slip_ratio == 0.0
-
-
-def test_sinkage_is_moderate_up_to_a_sixth_of_the_diameter():
-    assert is_sinkage_moderate(0.0333, 0.1)
-    assert not is_sinkage_moderate(0.0334, 0.1)
 
 
 @pytest.mark.parametrize("name", [None, *RIGID])
 @pytest.mark.parametrize("N", [0.0, -5.0, math.nan])
 def test_a_lifted_wheel_has_no_grip(name, N):
     soil = pack_soils(default=name)[0]
-    slip, sinkage, resistance, largest, torque, utilisation = solve(
-        soil, MU, 0.1, 0.08, N, 2.0, 0.0
-    )
-    assert (slip, sinkage, resistance, largest) == (1.0, 0.0, 0.0, 0.0)
-    assert (torque, utilisation) == (0.2, np.inf)
+    assert tuple(solve(soil, 0.1, 0.08, N, 2.0, 0.0)) == (1.0, 0.0, 0.0, 0.0, 0.2, np.inf)
     if name is not None:
-        assert friction_of(soil, MU, 0.1, 0.08, N) == MIN_FRICTION
-
-
-@pytest.mark.parametrize("name", RIGID)
-def test_the_smallest_load_keeps_its_digits(name):
-    soil = packed(name)
-    result = solve(soil, MU, 0.1, 0.08, 1e-9, 1e-11, 0.0)
-    assert all(math.isfinite(value) for value in result)
-    assert 0.0 < result.slip_ratio <= 1.0
+        assert friction_of(soil, 0.1, 0.08, N) == MIN_FRICTION
 
 
 # Coulomb ground.
@@ -343,18 +251,18 @@ def test_the_smallest_load_keeps_its_digits(name):
 @given(st.floats(0.1, 1000.0), st.floats(-1000.0, 1000.0), st.floats(-1000.0, 1000.0))
 def test_coulomb_ground_sticks_or_slips(N, T, S):
     soil = pack_soils()[0]
-    slip, sinkage, resistance, largest, torque, utilisation = solve(soil, MU, 0.1, 0.08, N, T, S)
+    slip, sinkage, resistance, largest, torque, utilisation = solve(soil, 0.1, 0.08, N, T, S)
     assert (sinkage, resistance, largest) == (0.0, 0.0, MU * N)
     assert utilisation == pytest.approx(math.hypot(T, S) / (MU * N))
     assert torque == 0.1 * T
     assert slip == coulomb_slip(utilisation) == (0.0 if utilisation <= 1.0 else 1.0)
-    assert friction_of(soil, MU, 0.1, 0.08, N) == MU
+    assert friction_of(soil, 0.1, 0.08, N) == MU
 
 
 def test_a_coulomb_soil_with_friction_of_its_own_keeps_it():
     soil = packed("firm_ground")
     own = load_soils()["firm_ground"].friction
-    assert friction_of(soil, 0.3, 0.1, 0.08, 10.0) == own
+    assert friction_of(soil, 0.1, 0.08, 10.0, mu=0.3) == own
 
 
 # Packing.
@@ -365,7 +273,6 @@ def test_soils_are_packed_after_the_default():
     assert table.shape == (3, 8)
     assert table[:, EXPONENT].tolist() == [1.0, 1.1, 0.79]
     assert table[1, TAN_PHI] == pytest.approx(math.tan(math.radians(28.0)), rel=1e-6)
-    assert pack_soils().shape == (1, 8)
 
 
 def test_soils_are_looked_up_where_asked():

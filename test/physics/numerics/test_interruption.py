@@ -8,9 +8,10 @@ import pytest
 from rover_physics.bounds.path import bound_path
 from rover_physics.numerics import interruption
 from rover_physics.numerics.interruption import check_interruption, interruptible, slices
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.judge import judge_path
 from support.grounds import make_terrain, waves
+from support.uncertain_grounds import with_std
 
 
 class StoppedError(Exception):
@@ -34,12 +35,9 @@ def along_x(count: int) -> np.ndarray:
     return poses
 
 
-def test_without_a_check_there_is_one_slice():
+def test_slices_cover_all_items_once_and_in_order_and_without_a_check_there_is_one():
     check_interruption()
     assert list(slices(10**6)) == [slice(0, 10**6)]
-
-
-def test_slices_cover_all_items_once_and_in_order():
     with interruptible(lambda: None):
         parts = list(slices(3000))
     assert parts[0].start == 0 and parts[-1].stop == 3000 and len(parts) > 1
@@ -49,25 +47,19 @@ def test_slices_cover_all_items_once_and_in_order():
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
     rover, ground, poses = load_rover("lsr1"), make_terrain(waves), along_x(2000)
     with pytest.raises(StoppedError), interruptible(stop_at(2)):
-        sweep_path(rover, ground, poses)
-    assert sweep_path(rover, ground, poses).settled.all()
+        judge_path(rover, ground, poses)[0]
+    assert judge_path(rover, ground, poses)[0].settled.all()
 
 
 def test_slices_change_no_bit_of_a_prediction_or_its_bounds(monkeypatch):
     rover, poses = load_rover("lsr1"), along_x(300)
-    ground = make_terrain(waves)
-    ground = type(ground)(
-        ground.elevation,
-        ground.resolution,
-        ground.origin,
-        elevation_std=np.full(ground.elevation.shape, 0.002),
-    )
-    whole = sweep_path(rover, ground, poses)
+    ground = with_std(make_terrain(waves), 0.002)
+    whole = judge_path(rover, ground, poses)[0]
     whole_bounds = bound_path(rover, ground, whole)
     monkeypatch.setattr(interruption, "FIRST_SLICE", 7)
     monkeypatch.setattr(interruption, "MAX_GROWTH", 1.0)
     with interruptible(lambda: None):
-        parts = sweep_path(rover, ground, poses)
+        parts = judge_path(rover, ground, poses)[0]
         parts_bounds = bound_path(rover, ground, parts)
     for name in ("position", "wheel_loads", "friction_utilisation", "tip_over_ratio"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))

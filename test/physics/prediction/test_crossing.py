@@ -5,12 +5,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import Verdict, hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane, smooth
 from support.rover_geometry import balance_residuals
@@ -33,8 +33,8 @@ def sharp(kind: str, size: float, resolution: float = 0.005) -> Terrain:
 
 
 def drive(ground: Terrain, spacing: float = 0.01, **options) -> tuple[PathPrediction, Verdict]:
-    prediction = sweep_path(FREE, ground, drive_path(spacing), SweepOptions(**options))
-    return prediction, judge(FREE, prediction)
+    prediction = judge_path(FREE, ground, drive_path(spacing), SweepOptions(**options))[0]
+    return prediction, hold_against_limits(FREE, prediction)
 
 
 @lru_cache(maxsize=8)
@@ -232,9 +232,9 @@ def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_w
     needed = []
     for shift in (0.0, 0.0034, 0.0068, 0.0071, 0.0142):
         poses = drive_path(0.02) + np.array([shift, 0.0, 0.0])
-        prediction = sweep_path(
+        prediction = judge_path(
             FREE, sharp("step", height), poses, SweepOptions(policy="optimal", friction=0.5)
-        )
+        )[0]
         between = prediction.between
         front = (between.poses[:, 0] < -0.3) & (between.contact_angle[:, 2] > 0.0)
         needed.append(between.friction_utilisation[front].max())
@@ -249,7 +249,7 @@ def test_at_the_foot_of_a_step_every_pose_settles(height):
     reach = np.sqrt(RADIUS**2 - max(RADIUS - height, 0.0) ** 2)
     place = -LSR1.suspension.wheels["front"][0] - reach
     x = place + np.arange(-0.03, 0.03, 0.0001)
-    prediction = sweep_path(FREE, sharp("step", height), np.column_stack([x, 0 * x, 0 * x]))
+    prediction = judge_path(FREE, sharp("step", height), np.column_stack([x, 0 * x, 0 * x]))[0]
     assert prediction.settled.all()
 
 
@@ -259,7 +259,7 @@ def test_at_the_foot_of_a_wall_a_wheel_touches_tread_and_face_at_once(height):
     ground = sharp("step", height)
     place = -LSR1.suspension.wheels["front"][0] - RADIUS
     x = place + np.arange(-0.01, 0.02, 0.0005)
-    prediction = sweep_path(FREE, ground, np.column_stack([x, 0 * x, 0 * x]))
+    prediction = judge_path(FREE, ground, np.column_stack([x, 0 * x, 0 * x]))[0]
     centre = prediction.wheel_centres[:, 2]
     before = centre[:, 2] < RADIUS + 1e-3
     assert prediction.settled.all()

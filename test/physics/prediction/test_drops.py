@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.drops import FACE
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import Verdict, hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane
 
@@ -32,8 +32,8 @@ def edge_down(height: float) -> Terrain:
 def drive(
     ground: Terrain, rover: Rover = FREE, spacing: float = 0.01, **options
 ) -> tuple[PathPrediction, Verdict]:
-    prediction = sweep_path(rover, ground, drive_path(spacing), SweepOptions(**options))
-    return prediction, judge(rover, prediction)
+    prediction = judge_path(rover, ground, drive_path(spacing), SweepOptions(**options))[0]
+    return prediction, hold_against_limits(rover, prediction)
 
 
 def with_drop_limit(limit: float) -> Rover:
@@ -73,7 +73,9 @@ def test_no_friction_hides_a_fall_from_a_wall_that_is_too_high(friction, policy)
 def test_a_drop_does_not_depend_on_where_waypoints_are():
     moved = [drive_path(0.02) + np.array([x, 0.0, 0.0]) for x in (0.0, 0.004, 0.009, 0.015)]
     drops = [
-        sweep_path(FREE, edge_down(0.15), path, SweepOptions(friction=0.8)).wheel_drop.max(axis=0)
+        judge_path(FREE, edge_down(0.15), path, SweepOptions(friction=0.8))[0].wheel_drop.max(
+            axis=0
+        )
         for path in moved
     ]
     assert np.ptp(drops, axis=0).max() < 1e-3
@@ -134,7 +136,7 @@ def test_up_a_step_no_wheel_drops():
 
 def test_backwards_up_an_edge_is_a_climb_and_no_fall():
     backwards = drive_path()[::-1]
-    prediction = sweep_path(FREE, edge_down(0.1), backwards)
+    prediction = judge_path(FREE, edge_down(0.1), backwards)[0]
     assert not prediction.wheel_drop[1:].max() > 0.0
 
 

@@ -11,7 +11,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.long_path import judge_long_path
+from rover_physics.traversability.partwise import PartwiseJudge
 from support.rough_grounds import plane
 
 ROVERS = {name: load_rover(name) for name in ("lsr1", "m2020")}
@@ -65,8 +65,9 @@ def test_a_path_that_stops_at_its_failure_and_a_long_one_judge_turns_too():
     rover, ground = ROVERS["lsr1"], ground_with_a_post(np.radians(65.0))
     verdict = ask(HALF_TURN, ground)[1]
     stopped = judge_path(rover, ground, HALF_TURN, SweepOptions(), stop_at_failure=True)[1]
-    in_parts = judge_long_path(rover, ground, HALF_TURN, SweepOptions(), take=lambda part: None)
-    assert stopped.reasons == in_parts.reasons == verdict.reasons
+    in_parts = PartwiseJudge(rover, ground, HALF_TURN)
+    assert len(list(in_parts.parts())) == 1
+    assert stopped.reasons == in_parts.verdict().reasons == verdict.reasons
 
 
 @pytest.mark.parametrize("name", ROVERS)

@@ -6,11 +6,10 @@ import pytest
 import rover_physics.prediction.map_sweep as map_sweep
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.prediction.map_sweep import score_poses, sweep_map
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.limit_checks import tilt_of
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, rocky
 
@@ -30,14 +29,14 @@ def test_scores_are_those_of_a_sweep_on_one_thread_and_on_several(ground, shape)
     terrain = make_terrain(ground)
     poses = poses_on(terrain, shape)
     scores = score_poses(ROVER, terrain, poses, SweepOptions(friction=0.5))
-    path = sweep_path(ROVER, terrain, poses.reshape(-1, 3), SweepOptions(friction=0.5))
+    path = judge_path(ROVER, terrain, poses.reshape(-1, 3), SweepOptions(friction=0.5))[0]
     expected = {
         "status": path.status,
         "friction_utilisation": path.friction_utilisation.max(axis=1),
         "torque_saturation": path.torque_saturation.max(axis=1),
         "least_load": path.wheel_loads.min(axis=1),
         "tip_over_ratio": path.tip_over_ratio,
-        "tilt": tilt_of(path),
+        "tilt": path.tilt,
         "belly_clearance": path.belly_clearance,
     }
     assert 0 < path.settled.sum() < path.settled.size
@@ -50,8 +49,11 @@ def test_scores_are_those_of_a_sweep_on_one_thread_and_on_several(ground, shape)
 def test_what_is_within_limits_is_what_a_verdict_passes():
     terrain = make_terrain(rocky)
     poses = poses_on(terrain, (60,))
-    within = score_poses(ROVER, terrain, poses).within_limits(ROVER)
-    passed = [judge(ROVER, sweep_path(ROVER, terrain, pose[None])).traversable for pose in poses]
+    within = score_poses(ROVER, terrain, poses).passable
+    passed = [
+        hold_against_limits(ROVER, judge_path(ROVER, terrain, pose[None])[0]).traversable
+        for pose in poses
+    ]
     assert within.tolist() == passed and 0 < sum(passed) < 60
 
 

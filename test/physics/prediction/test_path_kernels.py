@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from rover_physics.prediction.evaluation import new_results
 from rover_physics.prediction.path_kernels import (
     JumpLimits,
     PathPoints,
@@ -12,6 +11,7 @@ from rover_physics.prediction.path_kernels import (
     find_jumps,
     sort_pieces,
 )
+from rover_physics.results.record import new_results
 from rover_physics.status import PoseStatus
 
 LIMITS = JumpLimits(
@@ -19,6 +19,7 @@ LIMITS = JumpLimits(
     min_spacing=1e-4,
     height=0.025,
     reach=0.5,
+    on_servos=False,
     friction=1.0,
     torque=1.0,
     peak_spacing=0.004,
@@ -35,6 +36,7 @@ def results_with(contact_angles, statuses=PoseStatus.SETTLED, heights=0.0):
     results["status"] = statuses
     results["motion"] = [0.03, 0.0, 0.0]
     results["steering_angle"] = 0.0
+    results["kept_share"] = 1.0
     return results
 
 

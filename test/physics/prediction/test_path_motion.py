@@ -10,13 +10,12 @@ from hypothesis import strategies as st
 from rover_physics.errors import PoseError
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import sweep_path, sweep_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Steering
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.judge import judge_path, judge_poses
 from support.rough_grounds import fractal, mirrored, plane, random_poses, smooth
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
@@ -66,7 +65,7 @@ def test_a_straight_path_is_exactly_straight(yaw, backward):
     poses = straight(yaw=yaw)[:: -1 if backward else 1]
     speed = -SPEED if backward else SPEED
     assert motions(poses, backward=backward).tolist() == [[speed, 0.0, 0.0]] * 20
-    prediction = sweep_path(LSR1, LEVEL, poses[5:15], SweepOptions(backward=backward))
+    prediction = judge_path(LSR1, LEVEL, poses[5:15], SweepOptions(backward=backward))[0]
     assert (prediction.steering_angle == 0.0).all()
     assert prediction.wheel_speed == pytest.approx(np.full((10, 6), speed / 0.1))
 
@@ -190,7 +189,7 @@ def test_a_long_step_leaves_the_way_open():
 def test_no_wheel_is_faster_than_its_drive():
     fast = replace(LSR1, nominal_speed=0.1)
     found = motions(arc(1.5), fast)
-    prediction = sweep_path(fast, LEVEL, arc(1.5))
+    prediction = judge_path(fast, LEVEL, arc(1.5))[0]
     assert found[0, 0] < 0.1 and found[0, 2] == pytest.approx(1.5 * found[0, 0])
     assert np.abs(prediction.wheel_speed).max() == pytest.approx(LSR1.wheel.max_speed)
 
@@ -220,7 +219,7 @@ def test_infinite_curvature_is_a_turn_on_the_spot_to_its_side():
 )
 def test_curvatures_that_are_none_are_refused(curvature, what):
     with pytest.raises(PoseError, match=what):
-        sweep_poses(LSR1, LEVEL, np.zeros((3, 3)), curvature)
+        judge_poses(LSR1, LEVEL, np.zeros((3, 3)), curvature)[0]
 
 
 # What follows from the motions
@@ -230,8 +229,8 @@ def test_curvatures_that_are_none_are_refused(curvature, what):
 @given(st.integers(0, 10_000), st.floats(0.2, 1.5))
 def test_a_mirrored_curve_has_a_mirrored_result(seed, curvature):
     ground, poses = smooth(seed), arc(curvature, length=0.5)
-    here = sweep_path(LSR1, ground, poses)
-    there = sweep_path(LSR1, *mirrored(ground, poses))
+    here = judge_path(LSR1, ground, poses)[0]
+    there = judge_path(LSR1, *mirrored(ground, poses))[0]
     loose = 2e-3 * LSR1.weight
     assert there.steering_angle == pytest.approx(-here.steering_angle[:, SWAP], abs=1e-9)
     assert there.wheel_speed == pytest.approx(here.wheel_speed[:, SWAP], abs=1e-9)
@@ -250,31 +249,31 @@ def test_a_full_turn_on_level_ground_comes_back_with_equal_loads():
 
 
 def test_a_turn_on_the_spot_takes_the_time_of_its_outermost_wheel():
-    prediction = sweep_path(LSR1, LEVEL, spot())
+    prediction = judge_path(LSR1, LEVEL, spot())[0]
     assert prediction.time[-1] == pytest.approx(2.0 * np.pi * np.hypot(0.40, 0.31) / SPEED)
     assert prediction.distance[-1] == 0.0
 
 
 def test_an_arc_takes_the_time_of_its_length():
-    prediction = sweep_path(LSR1, LEVEL, arc(1.0, spacing=0.3, length=1.6))
+    prediction = judge_path(LSR1, LEVEL, arc(1.0, spacing=0.3, length=1.6))[0]
     assert prediction.time[-1] == pytest.approx(1.5 / SPEED)
 
 
 def test_the_drive_waits_for_wheels_that_turn():
     path = np.vstack([straight(11, yaw=0.0), moved(spot(np.pi, 19)[1:], 0.5)])
-    prediction = sweep_path(LSR1, LEVEL, path)
+    prediction = judge_path(LSR1, LEVEL, path)[0]
     turning = np.arctan2(0.40, 0.31) / 0.35
     step = np.pi / 18.0 * np.hypot(0.40, 0.31) / SPEED
     assert np.diff(prediction.time)[10] == pytest.approx(max(turning, step))
     quick = replace(LSR1, steering=replace(LSR1.steering, rate=0.01))
-    slow = sweep_path(quick, LEVEL, path)
+    slow = judge_path(quick, LEVEL, path)[0]
     assert np.diff(slow.time)[10] == pytest.approx(np.arctan2(0.40, 0.31) / 0.01)
     assert slow.energy == pytest.approx(prediction.energy)
 
 
 def test_where_wheels_turn_the_rover_is_also_evaluated_with_turned_wheels():
     path = np.vstack([straight(11, yaw=0.0), moved(spot(np.pi, 19)[1:], 0.5)])
-    between = sweep_path(LSR1, LEVEL, path).between
+    between = judge_path(LSR1, LEVEL, path)[0].between
     assert between.poses.tolist() == [[0.5, 0.0, 0.0]]
     assert between.waypoint.tolist() == [11]
     assert between.steering_angle[0, 2] == pytest.approx(np.arctan2(0.40, 0.31))
@@ -293,26 +292,28 @@ def test_wheels_that_turn_beside_a_wall_are_judged_whole_and_split_alike():
 
 def test_single_poses_have_no_way_between_them():
     ground, poses = fractal(3), random_poses(2, 30, 1.0)
-    prediction = sweep_poses(LSR1, ground, poses, np.linspace(-2.0, 2.0, 30))
+    prediction = judge_poses(LSR1, ground, poses, np.linspace(-2.0, 2.0, 30))[0]
     assert prediction.between is None and prediction.wheel_drop.max() == 0.0
     assert (prediction.time[prediction.settled] == 0.0).all()
-    alone = sweep_poses(
+    alone = judge_poses(
         LSR1, ground, poses[7:8], [prediction.motion[7, 2] / prediction.motion[7, 0]]
-    )
+    )[0]
     assert alone.wheel_loads[0] == pytest.approx(prediction.wheel_loads[7])
 
 
 @pytest.mark.parametrize("soil", ["dry_sand", None])
 def test_power_is_what_each_wheel_spends_on_its_own_way(soil):
-    prediction = sweep_path(LSR1, plane(0.05, 0.0), arc(1.0, length=0.6), SweepOptions(soil=soil))
+    prediction = judge_path(LSR1, plane(0.05, 0.0), arc(1.0, length=0.6), SweepOptions(soil=soil))[
+        0
+    ]
     speed = prediction.wheel_speed / (1.0 - prediction.slip_ratio)
     spent = np.maximum(prediction.torque * speed, 0.0).sum(axis=1)
     assert prediction.power == pytest.approx(spent)
 
 
 def test_on_soil_a_wheel_that_rolls_back_is_held_back_too():
-    on_the_spot = sweep_poses(
+    on_the_spot = judge_poses(
         LSR1, LEVEL, np.zeros((1, 3)), [np.inf], SweepOptions(soil="dry_sand")
-    )
+    )[0]
     assert (np.sign(on_the_spot.torque[0]) == [1, 1, 1, -1, -1, -1]).all()
     assert (on_the_spot.slip_ratio[0] > 0.0).all()

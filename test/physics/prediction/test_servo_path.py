@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.parts import sweep_in_parts
 from rover_physics.prediction.servo_path import add_up_rate
-from rover_physics.prediction.sweep import sweep_in_full, sweep_path
+from rover_physics.prediction.sweep import sweep_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
@@ -29,13 +30,15 @@ def test_a_wheel_that_hops_stops_no_rover_with_servos():
     bump = drive_ground("bump_one_side", 0.18)
     options = replace(SERVO, friction=1.0, max_torque=2.44)
     rover = unlimited(LSR1)
-    servo = sweep_path(rover, bump, drive_path(), options)
+    servo = judge_path(rover, bump, drive_path(), options)[0]
     lifts = np.concatenate([servo.lift_height.max(axis=1), servo.between.lift_height.max(axis=1)])
     assert (servo.wheel_loads >= 0.0).all()
     assert 0.0 < lifts.max() < LSR1.wheel.radius
-    assert judge(rover, servo).traversable
+    assert hold_against_limits(rover, servo).traversable
     assert (
-        judge(rover, sweep_path(rover, bump, drive_path(), replace(options, policy="equal"))).code
+        hold_against_limits(
+            rover, judge_path(rover, bump, drive_path(), replace(options, policy="equal"))[0]
+        ).code
         == "wheel_lift"
     )
 
@@ -43,7 +46,7 @@ def test_a_wheel_that_hops_stops_no_rover_with_servos():
 def test_lift_heights_are_the_sums_of_the_speeds():
     bump = drive_ground("bump_one_side", 0.238)
     options = replace(SERVO, friction=0.8, max_torque=1.63)
-    found = sweep_path(unlimited(LSR1), bump, drive_path(), options)
+    found = judge_path(unlimited(LSR1), bump, drive_path(), options)[0]
     row = int(np.flatnonzero((found.lift_rate > 0.0).any(axis=1))[0])
     wheel = int(np.argmax(found.lift_rate[row]))
     end = row + int(np.argmin(found.lift_rate[row:, wheel] > 0.0))
@@ -56,19 +59,21 @@ def test_lift_heights_are_the_sums_of_the_speeds():
 def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged():
     rover, options = unlimited(LSR1), replace(SERVO, friction=0.8, max_torque=2.44)
     slot = drive_ground("ditch", 0.183)
-    verdict = judge(rover, sweep_path(rover, slot, drive_path(), options))
+    verdict = hold_against_limits(rover, judge_path(rover, slot, drive_path(), options)[0])
     assert (verdict.code, "wedged" in verdict.reason) == ("friction", True)
-    narrow = judge(rover, sweep_path(rover, drive_ground("ditch", 0.10), drive_path(), options))
+    narrow = hold_against_limits(
+        rover, judge_path(rover, drive_ground("ditch", 0.10), drive_path(), options)[0]
+    )
     assert narrow.traversable
 
 
 def test_a_rover_that_cannot_steer_turns_off_an_arc_and_one_that_can_does_not():
     fixed, flat = replace(LSR1, steering=None), plane(0.0, 0.0, half=2.0)
     path = arc(0.6)
-    drift = sweep_path(fixed, flat, path, SERVO).drift
+    drift = judge_path(fixed, flat, path, SERVO)[0].drift
     assert drift[-1, 0] > 0.2 and (np.diff(drift[:40, 0]) >= -1e-9).all()
     assert "turns off its path" in judge_path(fixed, flat, path, SERVO)[1].reason
-    assert sweep_path(LSR1, flat, path, SERVO).drift.max() < 0.02
+    assert judge_path(LSR1, flat, path, SERVO)[0].drift.max() < 0.02
     assert judge_path(LSR1, flat, path, SERVO)[1].traversable
 
 
@@ -76,9 +81,9 @@ def test_straight_ahead_on_level_ground_nothing_drifts():
     x = np.linspace(-0.5, 0.5, 21)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
     np.testing.assert_allclose(
-        sweep_path(LSR1, plane(0.0, 0.0), path, SERVO).drift, 0.0, atol=1e-9
+        judge_path(LSR1, plane(0.0, 0.0), path, SERVO)[0].drift, 0.0, atol=1e-9
     )
-    aside = sweep_path(LSR1, plane(0.0, 0.35), path, replace(SERVO, friction=0.5))
+    aside = judge_path(LSR1, plane(0.0, 0.35), path, replace(SERVO, friction=0.5))[0]
     assert 0.0 < aside.drift[-1, 1] < 0.1
 
 
@@ -86,7 +91,7 @@ def test_straight_ahead_on_level_ground_nothing_drifts():
 def test_other_policies_neither_drift_nor_lift(policy):
     x = np.linspace(-0.5, 0.5, 21)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
-    found = sweep_path(LSR1, bouldered(3), path, SweepOptions(policy=policy))
+    found = judge_path(LSR1, bouldered(3), path, SweepOptions(policy=policy))[0]
     assert (found.speed_share == 1.0).all()
     assert not (found.drift.any() or found.lift_height.any() or found.deviation.any())
 
@@ -104,7 +109,7 @@ def test_a_path_in_parts_is_the_whole_path(monkeypatch):
     monkeypatch.setattr("rover_physics.prediction.parts.PART", 50)
     rover, ground = unlimited(LSR1), drive_ground("bump_one_side", 0.18)
     options = replace(SERVO, friction=1.0, max_torque=2.44)
-    whole = sweep_path(rover, ground, drive_path(), options)
+    whole = judge_path(rover, ground, drive_path(), options)[0]
     for part in sweep_in_parts(rover, ground, drive_path(), options):
         rows = slice(part.context, None)
         here = part.first + np.arange(len(part.prediction.poses) - part.context)
@@ -117,7 +122,7 @@ def test_a_path_in_parts_is_the_whole_path(monkeypatch):
 def energies(heights, spacing=0.01) -> np.ndarray:
     options = SweepOptions(policy="servo", friction=0.8)
     swept = [
-        sweep_path(ROVER, drive_ground("step", height), drive_path(spacing), options)
+        judge_path(ROVER, drive_ground("step", height), drive_path(spacing), options)[0]
         for height in heights
     ]
     return np.array([prediction.energy[-1] for prediction in swept])
@@ -137,7 +142,7 @@ def test_energy_and_time_over_steps_hardly_depend_on_the_spacing_of_waypoints():
 def test_the_sum_of_a_rate_counts_poses_between_waypoints_with_their_time():
     options = SweepOptions(policy="servo", friction=0.8)
     ground, path = drive_ground("step", 0.13), drive_path()
-    swept = sweep_in_full(ROVER, ground, [path], options)[0]
+    (swept,) = sweep_paths(ground, pack_model(ROVER, ground, options), [path], False)
     time = swept.prediction.time
     ones = swept.results.copy()
     crossings = replace(swept.crossings, results=swept.crossings.results.copy())

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.errors import SoilError
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Part
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane, random_poses, smooth
@@ -57,9 +57,9 @@ def bekker_wong(name: str, N: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 @pytest.mark.parametrize("soil", SOFT)
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_every_wheel_obeys_the_formulas_under_its_own_load(soil, policy):
-    prediction = sweep_path(
+    prediction = judge_path(
         LSR1, smooth(2), random_poses(3, 4, 0.6), SweepOptions(soil=soil, policy=policy)
-    )
+    )[0]
     sinkage, resistance, largest = bekker_wong(soil, prediction.wheel_loads)
     assert prediction.sinkage == pytest.approx(sinkage, rel=1e-9)
     assert prediction.motion_resistance == pytest.approx(resistance, rel=1e-9)
@@ -74,7 +74,7 @@ def test_every_wheel_obeys_the_formulas_under_its_own_load(soil, policy):
 def test_slip_and_torque_rise_with_the_slope(soil):
     slopes = [0.0, 0.03, 0.06, 0.09]
     along = [
-        sweep_path(LSR1, plane(slope, 0.0), POSE, SweepOptions(soil=soil)) for slope in slopes
+        judge_path(LSR1, plane(slope, 0.0), POSE, SweepOptions(soil=soil))[0] for slope in slopes
     ]
     slips = np.array([prediction.slip_ratio[0] for prediction in along])
     torques = np.array([prediction.torque[0] for prediction in along])
@@ -85,10 +85,10 @@ def test_slip_and_torque_rise_with_the_slope(soil):
 
 
 def test_a_slope_that_firm_ground_carries_is_too_steep_on_dry_sand():
-    firm = sweep_path(LSR1, plane(0.3, 0.0), POSE)
-    sand = sweep_path(LSR1, plane(0.3, 0.0), POSE, SweepOptions(soil="dry_sand"))
-    assert judge(LSR1, firm).traversable
-    verdict = judge(LSR1, sand)
+    firm = judge_path(LSR1, plane(0.3, 0.0), POSE)[0]
+    sand = judge_path(LSR1, plane(0.3, 0.0), POSE, SweepOptions(soil="dry_sand"))[0]
+    assert hold_against_limits(LSR1, firm).traversable
+    verdict = hold_against_limits(LSR1, sand)
     assert verdict.code == "friction"
     assert "wheel slips" in verdict.reason
     assert (sand.slip_ratio[0] == 1.0).any()
@@ -97,7 +97,7 @@ def test_a_slope_that_firm_ground_carries_is_too_steep_on_dry_sand():
 def test_energy_is_higher_the_softer_the_ground():
     level = plane(0.0, 0.0)
     spent = [
-        sweep_path(LSR1, level, AHEAD, SweepOptions(soil=soil)).energy[-1]
+        judge_path(LSR1, level, AHEAD, SweepOptions(soil=soil))[0].energy[-1]
         for soil in (None, "lete_sand", "dry_sand")
     ]
     assert spent[0] == pytest.approx(0.0, abs=1e-9)
@@ -106,7 +106,7 @@ def test_energy_is_higher_the_softer_the_ground():
 
 
 def test_energy_on_level_soil_is_resistance_over_way_and_slip():
-    prediction = sweep_path(LSR1, plane(0.0, 0.0), AHEAD, SweepOptions(soil="dry_sand"))
+    prediction = judge_path(LSR1, plane(0.0, 0.0), AHEAD, SweepOptions(soil="dry_sand"))[0]
     shares = prediction.motion_resistance[0] / (1.0 - prediction.slip_ratio[0])
     assert prediction.energy[-1] == pytest.approx(shares.sum() * 1.0, rel=1e-6)
 
@@ -115,9 +115,9 @@ def test_soil_in_some_cells_changes_the_wheels_on_them_alone():
     ground = plane(0.05, 0.0)
     rows = np.arange(ground.elevation.shape[0])[:, None]
     left = np.where(rows > rows.mean(), 0, -1)
-    half = sweep_path(LSR1, with_soil(ground, "dry_sand", index=left), POSE)
+    half = judge_path(LSR1, with_soil(ground, "dry_sand", index=left), POSE)[0]
     firm, sand = (
-        sweep_path(LSR1, ground, POSE, SweepOptions(soil=soil)) for soil in (None, "dry_sand")
+        judge_path(LSR1, ground, POSE, SweepOptions(soil=soil))[0] for soil in (None, "dry_sand")
     )
     for name in ("wheel_loads", "tangential", "lateral", "tip_over_ratio"):
         assert getattr(half, name).tobytes() == getattr(firm, name).tobytes(), name
@@ -131,11 +131,11 @@ def test_soil_in_some_cells_changes_the_wheels_on_them_alone():
 def test_where_the_layer_has_no_soil_the_default_soil_holds():
     ground = plane(0.05, 0.0)
     layer = with_soil(ground, "lete_sand", index=-1)
-    here = sweep_path(LSR1, layer, POSE, SweepOptions(soil="dry_sand"))
-    there = sweep_path(LSR1, ground, POSE, SweepOptions(soil="dry_sand"))
-    elsewhere = sweep_path(
+    here = judge_path(LSR1, layer, POSE, SweepOptions(soil="dry_sand"))[0]
+    there = judge_path(LSR1, ground, POSE, SweepOptions(soil="dry_sand"))[0]
+    elsewhere = judge_path(
         LSR1, with_soil(ground, "lete_sand"), POSE, SweepOptions(soil="dry_sand")
-    )
+    )[0]
     for name in ON_SOIL:
         assert getattr(here, name).tobytes() == getattr(there, name).tobytes(), name
         assert not np.allclose(getattr(elsewhere, name), getattr(there, name)), name
@@ -144,10 +144,10 @@ def test_where_the_layer_has_no_soil_the_default_soil_holds():
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_a_coulomb_soil_is_as_its_friction_without_a_soil(policy):
     ground, poses = smooth(4), random_poses(4, 5, 0.6)
-    soil = sweep_path(
+    soil = judge_path(
         LSR1, ground, poses, SweepOptions(soil="firm_ground", friction=0.3, policy=policy)
-    )
-    plain = sweep_path(LSR1, ground, poses, SweepOptions(friction=0.8, policy=policy))
+    )[0]
+    plain = judge_path(LSR1, ground, poses, SweepOptions(friction=0.8, policy=policy))[0]
     for name in ("wheel_loads", "torque", "friction", "friction_utilisation", "slip_ratio"):
         assert getattr(soil, name) == pytest.approx(getattr(plain, name), abs=1e-3), name
     assert not soil.sinkage.any()
@@ -157,9 +157,9 @@ def test_a_coulomb_soil_is_as_its_friction_without_a_soil(policy):
 
 def test_all_nine_balance_equations_hold_on_soil():
     for policy in ("equal", "optimal"):
-        prediction = sweep_path(
+        prediction = judge_path(
             LSR1, smooth(8), random_poses(8, 4, 0.6), SweepOptions(soil="dry_sand", policy=policy)
-        )
+        )[0]
         for i in range(4):
             assert np.abs(balance_residuals(LSR1, prediction, i)).max() <= 1e-9
 
@@ -168,8 +168,8 @@ def test_all_nine_balance_equations_hold_on_soil():
 @given(st.integers(0, 1000), st.floats(-np.pi, np.pi), st.sampled_from(SOFT))
 def test_optimal_torques_never_use_more_of_the_soil_than_equal_ones(seed, yaw, soil):
     ground, pose = smooth(seed), [[0.1, 0.1, yaw]]
-    equal = sweep_path(LSR1, ground, pose, SweepOptions(soil=soil))
-    optimal = sweep_path(LSR1, ground, pose, SweepOptions(soil=soil, policy="optimal"))
+    equal = judge_path(LSR1, ground, pose, SweepOptions(soil=soil))[0]
+    optimal = judge_path(LSR1, ground, pose, SweepOptions(soil=soil, policy="optimal"))[0]
     most, least = (p.friction_utilisation.max() for p in (equal, optimal))
     assert least <= most * (1.0 + 1e-9)
 
@@ -177,36 +177,40 @@ def test_optimal_torques_never_use_more_of_the_soil_than_equal_ones(seed, yaw, s
 def test_traction_control_climbs_sand_that_equal_torques_do_not():
     ground = plane(0.2, 0.0)
     assert (
-        judge(LSR1, sweep_path(LSR1, ground, POSE, SweepOptions(soil="dry_sand"))).code
+        hold_against_limits(
+            LSR1, judge_path(LSR1, ground, POSE, SweepOptions(soil="dry_sand"))[0]
+        ).code
         == "friction"
     )
-    optimal = sweep_path(LSR1, ground, POSE, SweepOptions(soil="dry_sand", policy="optimal"))
-    assert judge(LSR1, optimal).traversable
+    optimal = judge_path(LSR1, ground, POSE, SweepOptions(soil="dry_sand", policy="optimal"))[0]
+    assert hold_against_limits(LSR1, optimal).traversable
 
 
 def test_motors_that_do_for_firm_ground_may_be_too_weak_for_sand():
     ground, weak = plane(0.1, 0.0), {"max_torque": 0.25}
     for policy in ("equal", "optimal"):
-        firm = sweep_path(LSR1, ground, POSE, SweepOptions(policy=policy, **weak))
-        sand = sweep_path(LSR1, ground, POSE, SweepOptions(policy=policy, soil="dry_sand", **weak))
-        assert judge(LSR1, firm).traversable
-        assert judge(LSR1, sand).code == "torque"
+        firm = judge_path(LSR1, ground, POSE, SweepOptions(policy=policy, **weak))[0]
+        sand = judge_path(
+            LSR1, ground, POSE, SweepOptions(policy=policy, soil="dry_sand", **weak)
+        )[0]
+        assert hold_against_limits(LSR1, firm).traversable
+        assert hold_against_limits(LSR1, sand).code == "torque"
 
 
 def test_optimal_torques_keep_the_limit_with_the_resistance():
     ground = plane(0.1, 0.12)
-    free = sweep_path(LSR1, ground, POSE, SweepOptions(soil="lunar_nominal", policy="optimal"))
+    free = judge_path(LSR1, ground, POSE, SweepOptions(soil="lunar_nominal", policy="optimal"))[0]
     limit = 0.97 * free.torque.max()
-    bound = sweep_path(
+    bound = judge_path(
         LSR1, ground, POSE, SweepOptions(soil="lunar_nominal", policy="optimal", max_torque=limit)
-    )
+    )[0]
     assert bound.torque_saturation.max() <= 1.0 + 1e-3
 
 
 def test_a_wheel_that_sinks_too_deep_for_the_model_is_refused_as_such():
     heavy = replace(LSR1, masses=replace(LSR1.masses, body=Part(60.0, (0.0, 0.0, 0.05))))
-    prediction = sweep_path(heavy, plane(0.0, 0.0), POSE, SweepOptions(soil="mars_simulant"))
-    verdict = judge(heavy, prediction)
+    prediction = judge_path(heavy, plane(0.0, 0.0), POSE, SweepOptions(soil="mars_simulant"))[0]
+    verdict = hold_against_limits(heavy, prediction)
     assert prediction.sinkage.max() > 0.2 / 6.0
     assert verdict.code == "sinkage"
     assert "wheel sinks deeper" in verdict.reason
@@ -214,30 +218,32 @@ def test_a_wheel_that_sinks_too_deep_for_the_model_is_refused_as_such():
 
 
 def test_down_a_slope_soil_brakes():
-    sand = sweep_path(LSR1, plane(0.1, 0.0), [[0.0, 0.0, np.pi]], SweepOptions(soil="dry_sand"))
-    firm = sweep_path(LSR1, plane(0.1, 0.0), [[0.0, 0.0, np.pi]])
+    sand = judge_path(LSR1, plane(0.1, 0.0), [[0.0, 0.0, np.pi]], SweepOptions(soil="dry_sand"))[0]
+    firm = judge_path(LSR1, plane(0.1, 0.0), [[0.0, 0.0, np.pi]])[0]
     assert (firm.torque < 0.0).all()
     assert (sand.torque > firm.torque).all()
 
 
 def test_a_soil_without_a_name_among_the_presets_is_refused():
     with pytest.raises(SoilError, match=r"no soil 'dry_sad'; did you mean dry_sand\?"):
-        sweep_path(LSR1, plane(0.0, 0.0), POSE, SweepOptions(soil="dry_sad"))
+        judge_path(LSR1, plane(0.0, 0.0), POSE, SweepOptions(soil="dry_sad"))[0]
     with pytest.raises(SoilError, match="no soil 'gravy'"):
-        sweep_path(LSR1, with_soil(plane(0.0, 0.0), "gravy"), POSE)
+        judge_path(LSR1, with_soil(plane(0.0, 0.0), "gravy"), POSE)[0]
 
 
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 @pytest.mark.parametrize("soil", [None, "dry_sand"])
 def test_up_a_slope_backwards_is_as_forwards_of_the_rover_turned_round(soil, policy):
     ground, poses = plane(0.1, 0.05), AHEAD[::25]
-    back = sweep_path(
+    back = judge_path(
         LSR1,
         ground,
         poses + np.array([0.0, 0.0, np.pi]),
         SweepOptions(soil=soil, policy=policy, backward=True),
-    )
-    ahead = sweep_path(turned_round(LSR1), ground, poses, SweepOptions(soil=soil, policy=policy))
+    )[0]
+    ahead = judge_path(turned_round(LSR1), ground, poses, SweepOptions(soil=soil, policy=policy))[
+        0
+    ]
     other = [5, 4, 3, 2, 1, 0]
     assert back.torque == pytest.approx(-ahead.torque[:, other], abs=2e-3)
     assert back.slip_ratio == pytest.approx(ahead.slip_ratio[:, other], abs=5e-3)
@@ -247,7 +253,9 @@ def test_up_a_slope_backwards_is_as_forwards_of_the_rover_turned_round(soil, pol
 
 def test_backwards_on_level_soil_the_torques_turn_the_other_way():
     forward, back = (
-        sweep_path(LSR1, plane(0.0, 0.0), POSE, SweepOptions(soil="dry_sand", backward=backward))
+        judge_path(LSR1, plane(0.0, 0.0), POSE, SweepOptions(soil="dry_sand", backward=backward))[
+            0
+        ]
         for backward in (False, True)
     )
     assert (forward.torque > 0.0).all()

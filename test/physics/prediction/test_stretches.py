@@ -3,8 +3,8 @@
 import numpy as np
 
 from rover_physics.prediction.crossing import PIECES, Crossings, limits_of
-from rover_physics.prediction.evaluation import new_results
 from rover_physics.prediction.path_kernels import Wheels, sort_pieces
+from rover_physics.results.record import new_results
 from rover_physics.status import PoseStatus
 
 WHEELS = Wheels(0.1, 0.5, 1.0, 1.0, 0.1, False)

@@ -1,7 +1,7 @@
 """Sweep: bad arguments, waypoints that stand for themselves, time and energy, several callers."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import FrozenInstanceError, fields, replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError, PoseError, RoverError
-from rover_physics.prediction.sweep import sweep_path, sweep_paths
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
+from rover_physics.traversability.judge import judge_path, judge_paths
 from support.rough_grounds import fractal, plane, random_poses, rocky
 
 LSR1 = load_rover("lsr1")
@@ -29,16 +30,10 @@ def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndar
     return np.column_stack([np.linspace(start, end, count), np.zeros(count), np.full(count, yaw)])
 
 
-OF_THE_WHOLE = {"policy", "control_margin"}
-
-
 def columns(prediction):
     """Return the arrays of a prediction that hold a row per waypoint of its own, by name."""
-    return {
-        field.name: getattr(prediction, field.name)
-        for field in fields(prediction)
-        if field.name not in ALONG_THE_PATH | OF_THE_WHOLE
-    }
+    names = ["poses", "status", *(one.name for one in QUANTITIES if not one.of_path)]
+    return {name: np.ascontiguousarray(getattr(prediction, name)) for name in names}
 
 
 def assert_identical(prediction, expected, rows=slice(None)):
@@ -67,7 +62,7 @@ def assert_identical(prediction, expected, rows=slice(None)):
 )
 def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
     with pytest.raises(PoseError, match=words):
-        sweep_path(LSR1, LEVEL, poses)
+        judge_path(LSR1, LEVEL, poses)[0]
 
 
 @pytest.mark.parametrize(
@@ -87,7 +82,7 @@ def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
 )
 def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
     with pytest.raises(ModelError, match=words):
-        sweep_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))
+        judge_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))[0]
 
 
 def test_refusals_have_one_root():
@@ -99,7 +94,7 @@ def test_refusals_have_one_root():
 
 
 def test_a_prediction_has_a_row_per_waypoint():
-    prediction = sweep_path(LSR1, LEVEL, line(-0.2, 0.2, 7))
+    prediction = judge_path(LSR1, LEVEL, line(-0.2, 0.2, 7))[0]
     for name, values in columns(prediction).items():
         assert len(values) == 7, name
     for name in GROWING:
@@ -112,33 +107,34 @@ def test_a_prediction_has_a_row_per_waypoint():
 
 def test_a_prediction_cannot_be_reassigned():
     with pytest.raises(FrozenInstanceError):
-        sweep_path(LSR1, LEVEL, POSE).policy = "optimal"
+        judge_path(LSR1, LEVEL, POSE)[0].policy = "optimal"
 
 
 def test_whole_numbers_and_lists_are_poses_too():
     assert_identical(
-        sweep_path(LSR1, LEVEL, [[0, 0, 1]]), sweep_path(LSR1, LEVEL, np.array([[0.0, 0, 1]]))
+        judge_path(LSR1, LEVEL, [[0, 0, 1]])[0],
+        judge_path(LSR1, LEVEL, np.array([[0.0, 0, 1]]))[0],
     )
 
 
 def test_the_poses_of_the_caller_are_left_alone():
     poses = np.asfortranarray(line(-0.2, 0.2))
     before = poses.copy()
-    prediction = sweep_path(LSR1, LEVEL, poses)
+    prediction = judge_path(LSR1, LEVEL, poses)[0]
     assert np.array_equal(poses, before)
     assert np.array_equal(prediction.poses, before)
 
 
 def test_x_and_y_of_the_body_are_those_asked_for():
     poses = random_poses(3, 50, 2.0)
-    prediction = sweep_path(LSR1, fractal(3), poses)
+    prediction = judge_path(LSR1, fractal(3), poses)[0]
     assert np.array_equal(prediction.position[:, :2], poses[:, :2])
 
 
 def test_a_full_turn_of_the_heading_changes_nothing():
     poses = random_poses(4, 20, 2.0)
-    here = sweep_path(LSR1, fractal(4), poses)
-    there = sweep_path(LSR1, fractal(4), poses + np.array([0.0, 0.0, 2.0 * np.pi]))
+    here = judge_path(LSR1, fractal(4), poses)[0]
+    there = judge_path(LSR1, fractal(4), poses + np.array([0.0, 0.0, 2.0 * np.pi]))[0]
     assert there.wheel_centres == pytest.approx(here.wheel_centres, abs=1e-5)
 
 
@@ -150,8 +146,8 @@ def test_a_full_turn_of_the_heading_changes_nothing():
 def test_any_choice_of_poses_gives_identical_rows(seed, count):
     ground, poses = rocky(1), random_poses(1, 70, 2.6)
     rows = np.random.default_rng(seed).choice(70, count, replace=False)
-    everything = sweep_path(LSR1, ground, poses)
-    chosen = sweep_path(LSR1, ground, poses[rows])
+    everything = judge_path(LSR1, ground, poses)[0]
+    chosen = judge_path(LSR1, ground, poses[rows])[0]
     assert_identical(chosen, everything, rows)
     assert (everything.status == PoseStatus.SETTLED).any()
     assert (everything.status == PoseStatus.OFF_MAP).any()
@@ -161,10 +157,10 @@ def test_any_choice_of_poses_gives_identical_rows(seed, count):
 def test_paths_swept_together_are_as_swept_one_by_one(policy):
     ground = rocky(3)
     paths = [random_poses(1, 1, 1.0), line(-1.0, 1.0, 101), line(1.0, -1.0, 60), line(9.0, 9.1, 4)]
-    together = sweep_paths(LSR1, ground, paths, SweepOptions(policy=policy))
+    together = [one for one, _ in judge_paths(LSR1, ground, paths, SweepOptions(policy=policy))]
     assert sum(len(prediction.between.poses) for prediction in together) > 20
     for poses, prediction in zip(paths, together, strict=True):
-        alone = sweep_path(LSR1, ground, poses, SweepOptions(policy=policy))
+        alone = judge_path(LSR1, ground, poses, SweepOptions(policy=policy))[0]
         for part, expected in ((prediction, alone), (prediction.between, alone.between)):
             assert_identical(part, expected)
             for name in sorted(ALONG_THE_PATH - {"between", "bounds"}):
@@ -172,61 +168,61 @@ def test_paths_swept_together_are_as_swept_one_by_one(policy):
 
 
 def test_no_path_gives_no_prediction():
-    assert sweep_paths(LSR1, LEVEL, []) == []
+    assert [one for one, _ in judge_paths(LSR1, LEVEL, [])] == []
 
 
 def test_two_callers_at_once_get_what_each_gets_alone():
     grounds = [fractal(1), rocky(2)]
     paths = [random_poses(k, 1500, 2.0) for k in range(2)]
-    alone = [sweep_path(LSR1, *pair) for pair in zip(grounds, paths, strict=True)]
+    alone = [judge_path(LSR1, *pair)[0] for pair in zip(grounds, paths, strict=True)]
     with ThreadPoolExecutor(4) as callers:
         together = [
-            callers.submit(sweep_path, LSR1, grounds[k % 2], paths[k % 2]) for k in range(8)
+            callers.submit(judge_path, LSR1, grounds[k % 2], paths[k % 2]) for k in range(8)
         ]
         for k, future in enumerate(together):
-            assert_identical(future.result(), alone[k % 2])
+            assert_identical(future.result()[0], alone[k % 2])
 
 
 def test_the_same_question_gets_the_same_answer():
     ground, poses = rocky(3), random_poses(3, 200, 2.0)
-    assert_identical(sweep_path(LSR1, ground, poses), sweep_path(LSR1, ground, poses))
+    assert_identical(judge_path(LSR1, ground, poses)[0], judge_path(LSR1, ground, poses)[0])
 
 
 # Time, distance, energy
 
 
 def test_time_is_the_way_at_nominal_speed():
-    prediction = sweep_path(LSR1, LEVEL, line(-0.3, 0.3))
+    prediction = judge_path(LSR1, LEVEL, line(-0.3, 0.3))[0]
     assert prediction.time[0] == 0.0
     assert prediction.time[-1] == pytest.approx(0.6 / LSR1.nominal_speed)
     assert prediction.distance[-1] == pytest.approx(0.6)
 
 
 def test_the_way_up_a_slope_takes_longer_than_its_shadow():
-    prediction = sweep_path(LSR1, plane(0.4, 0.0), line(-0.3, 0.3))
+    prediction = judge_path(LSR1, plane(0.4, 0.0), line(-0.3, 0.3))[0]
     way = 0.6 * np.hypot(1.0, 0.4)
     assert prediction.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)
 
 
 def test_wheels_too_slow_for_the_nominal_speed_set_the_time():
     slow = replace(LSR1, wheel=replace(LSR1.wheel, max_speed=0.1))
-    prediction = sweep_path(slow, LEVEL, line(-0.3, 0.3))
+    prediction = judge_path(slow, LEVEL, line(-0.3, 0.3))[0]
     assert prediction.time[-1] == pytest.approx(0.6 / (0.1 * 0.10))
 
 
 def test_level_ground_costs_no_energy():
-    assert sweep_path(LSR1, LEVEL, line(-0.3, 0.3)).energy[-1] == pytest.approx(0.0, abs=1e-9)
+    assert judge_path(LSR1, LEVEL, line(-0.3, 0.3))[0].energy[-1] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_energy_uphill_is_the_weight_lifted():
-    prediction = sweep_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))
+    prediction = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))[0]
     lifted = LSR1.weight * np.ptp(prediction.position[:, 2])
     assert prediction.energy[0] == 0.0
     assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)
 
 
 def test_braking_downhill_gives_nothing_back():
-    prediction = sweep_path(LSR1, plane(-0.3, 0.0), line(-0.3, 0.3))
+    prediction = judge_path(LSR1, plane(-0.3, 0.0), line(-0.3, 0.3))[0]
     assert (prediction.torque < 0.0).all()
     assert prediction.energy[-1] == 0.0
 
@@ -236,7 +232,7 @@ def test_braking_downhill_gives_nothing_back():
 def test_energy_time_and_distance_never_fall(seed, yaw):
     steps = np.linspace(-1.5, 1.5, 60)[:, None]
     poses = np.hstack([steps * [np.cos(yaw), np.sin(yaw)], np.full((60, 1), yaw)])
-    prediction = sweep_path(LSR1, rocky(seed), poses)
+    prediction = judge_path(LSR1, rocky(seed), poses)[0]
     for name in GROWING:
         values = getattr(prediction, name)
         values = values[~np.isnan(values)]

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import arm_angles, body_mass_and_com, link_points
 from rover_physics.rover.model import Part
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane
 
@@ -51,25 +51,19 @@ def test_links_keep_their_lengths(yaw, shoulder, elbow):
     assert lengths == pytest.approx(ARM.link_lengths)
 
 
-def test_a_stowed_arm_leaves_the_body_as_the_file_has_it():
+def test_arm_and_payload_move_the_centre_of_mass_by_the_path_of_their_masses():
     mass, com = body_mass_and_com(LSR1)
     assert mass == LSR1.masses.body.mass
     assert com == pytest.approx(LSR1.masses.body.com, abs=1e-15)
-
-
-def test_a_stretched_arm_moves_the_centre_of_mass_by_the_way_of_its_links():
     _, stretched = body_mass_and_com(LSR1, pose_of())
     _, raised = body_mass_and_com(LSR1, pose_of(shoulder=-np.pi / 2))
     upper, fore = ARM.link_masses[1:]
-    assert stretched[0] - raised[0] == pytest.approx((upper * 0.15 + fore * 0.45) / 5.0)
-    assert raised[2] - stretched[2] == pytest.approx((upper * 0.15 + fore * 0.45) / 5.0)
-
-
-def test_a_payload_hangs_at_the_tip():
+    moved = (upper * 0.15 + fore * 0.45) / 5.0
+    assert stretched - raised == pytest.approx([moved, 0.0, -moved])
     mass, com = body_mass_and_com(LSR1, pose_of(), payload=1.0)
-    _, empty = body_mass_and_com(LSR1, pose_of())
     assert mass == pytest.approx(6.0)
-    assert com == pytest.approx((5.0 * empty + np.array([0.85, 0.0, 0.15])) / 6.0)
+    assert com == pytest.approx((5.0 * stretched + np.array([0.85, 0.0, 0.15])) / 6.0)
+    assert body_mass_and_com(M2020, {"arm_yaw": 1.0})[1] == pytest.approx(M2020.masses.body.com)
 
 
 def test_the_payload_of_the_rover_file_counts_unless_another_is_given():
@@ -83,76 +77,51 @@ def test_joints_not_given_stay_stowed_and_names_of_others_are_passed_over():
     assert arm_angles(ARM, None).tolist() == list(ARM.stowed)
 
 
-def test_a_rover_without_an_arm_has_the_body_of_its_file():
-    mass, com = body_mass_and_com(M2020, {"arm_yaw": 1.0})
-    assert mass == M2020.masses.body.mass
-    assert com == pytest.approx(M2020.masses.body.com)
+@pytest.mark.parametrize(
+    ("rover", "held", "said"),
+    [
+        (LSR1, {"angles": {"arm_elbow": np.nan}}, "arm_elbow"),
+        (LSR1, {"angles": {"arm_elbow": np.inf}}, "arm_elbow"),
+        (LSR1, {"payload": -0.1}, r"payload is .* 0 kg or more"),
+        (LSR1, {"payload": np.nan}, r"payload is .* 0 kg or more"),
+        (LSR1, {"payload": np.inf}, r"payload is .* 0 kg or more"),
+        (M2020, {"payload": 1.0}, "m2020.*no manipulator"),
+    ],
+)
+def test_impossible_angles_and_payloads_are_refused_by_name(rover, held, said):
+    with pytest.raises(ModelError, match=said):
+        body_mass_and_com(rover, held.get("angles"), payload=held.get("payload"))
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_an_angle_that_is_not_finite_is_refused_by_name(value):
-    with pytest.raises(ModelError, match="arm_elbow"):
-        body_mass_and_com(LSR1, {"arm_elbow": value})
-
-
-@pytest.mark.parametrize("payload", [-0.1, float("nan"), float("inf")])
-def test_an_impossible_payload_is_refused(payload):
-    with pytest.raises(ModelError, match=r"payload is .* 0 kg or more"):
-        body_mass_and_com(LSR1, payload=payload)
-
-
-def test_a_payload_without_an_arm_is_refused():
-    with pytest.raises(ModelError, match="m2020.*no manipulator"):
-        body_mass_and_com(M2020, payload=1.0)
-
-
-def test_a_payload_too_heavy_for_the_rover_tips_it_on_flat_ground():
-    prediction = sweep_path(LSR1, LEVEL, POSE, SweepOptions(joint_angles=pose_of(), payload=20.0))
+def test_a_payload_too_heavy_for_the_rover_tips_it_and_a_file_that_has_it_is_refused():
+    prediction = judge_path(LSR1, LEVEL, POSE, SweepOptions(joint_angles=pose_of(), payload=20.0))[
+        0
+    ]
     assert prediction.tip_over_ratio[0] < 0.0
-    assert judge(LSR1, prediction).code == "tip_over"
-
-
-def test_a_rover_that_tips_over_on_flat_ground_by_itself_is_refused():
+    assert hold_against_limits(LSR1, prediction).code == "tip_over"
     heavy = replace(LSR1, manipulator=replace(ARM, stowed=(0.0, 0.0, 0.0), payload=20.0))
     with pytest.raises(ModelError, match="tips over on flat ground"):
-        sweep_path(heavy, LEVEL, POSE)
-
-
-def test_an_arm_stretched_ahead_loads_the_front_wheels():
-    stowed = sweep_path(LSR1, LEVEL, POSE)
-    stretched = sweep_path(LSR1, LEVEL, POSE, SweepOptions(joint_angles=pose_of(), payload=0.5))
-    loads, before = stretched.wheel_loads[0], stowed.wheel_loads[0]
-    assert loads.sum() == pytest.approx(LSR1.weight + 0.5 * 9.81)
-    assert (loads[[2, 5]] > before[[2, 5]] + 0.1).all()
-    assert (loads[[0, 3]] < before[[0, 3]] - 0.1).all()
-    assert loads[:3] == pytest.approx(loads[3:])
+        judge_path(heavy, LEVEL, POSE)[0]
 
 
 def test_an_arm_stretched_aside_loads_that_side_and_takes_from_the_margin():
-    left = sweep_path(
-        LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=np.pi / 2))
-    )
-    right = sweep_path(
-        LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=-np.pi / 2))
+    left, right = (
+        judge_path(LSR1, plane(0.0, -0.4), POSE, SweepOptions(joint_angles=pose_of(yaw=yaw)))[0]
+        for yaw in (np.pi / 2, -np.pi / 2)
     )
     assert left.wheel_loads[0, 3:].sum() > right.wheel_loads[0, 3:].sum() + 1.0
     assert left.tip_over_ratio[0] < right.tip_over_ratio[0] - 0.01  # downhill is left
 
 
 def test_arm_and_payload_are_as_a_body_with_their_mass_and_centre():
-    ground = plane(0.2, 0.1)
-    mass, com = body_mass_and_com(LSR1, pose_of(yaw=0.5, shoulder=-0.3), payload=0.6)
-    body = Part(mass, tuple(com))
-    alike = replace(LSR1, manipulator=None, masses=replace(LSR1.masses, body=body))
-    held = {"joint_angles": pose_of(yaw=0.5, shoulder=-0.3), "payload": 0.6}
-    arm, lump = (
-        sweep_path(LSR1, ground, POSE, SweepOptions(**held)),
-        sweep_path(alike, ground, POSE),
-    )
+    ground, joints = plane(0.2, 0.1), pose_of(yaw=0.5, shoulder=-0.3)
+    mass, com = body_mass_and_com(LSR1, joints, payload=0.6)
+    masses = replace(LSR1.masses, body=Part(mass, tuple(com)))
+    held = SweepOptions(joint_angles=joints, payload=0.6)
+    lump = judge_path(replace(LSR1, manipulator=None, masses=masses), ground, POSE)[0]
+    # The lump's margins are relative to its own on level ground.
+    arm, level = (judge_path(LSR1, where, POSE, held)[0] for where in (ground, LEVEL))
     assert arm.wheel_loads == pytest.approx(lump.wheel_loads, abs=1e-9)
-    level = sweep_path(
-        LSR1, LEVEL, POSE, SweepOptions(**held)
-    )  # the lump's margins are relative to this
     for name in ("tip_over_ratio", "tip_over_force_angle"):
         relative = getattr(arm, name) / getattr(level, name)
         assert relative == pytest.approx(getattr(lump, name), abs=1e-5), name

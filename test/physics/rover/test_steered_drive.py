@@ -25,15 +25,6 @@ def test_the_joints_are_those_of_the_steered_axles_in_wheel_order():
     assert steering_joints(replace(LSR1, steering=None)) == ()
 
 
-def test_left_turns_have_positive_angles_in_front_and_faster_wheels_on_the_right():
-    aims = SteeredDrive(LSR1).aim(0.06, 0.06)
-    assert aims.angles[5] == pytest.approx(np.arctan2(0.4, 1.0 - 0.31))
-    assert aims.angles[3] == -aims.angles[5] and aims.angles[1] == aims.angles[4] == 0.0
-    assert aims.speeds[2] == pytest.approx(0.06 * np.hypot(1.31, 0.4))
-    spot = SteeredDrive(LSR1).aim(0.0, 0.1)
-    assert (spot.speeds[:3] > 0.0).all() and (spot.speeds[3:] < 0.0).all()
-
-
 def test_a_motion_beyond_the_limit_is_refused_by_wheel_and_angle():
     narrow = replace(LSR1, steering=replace(LSR1.steering, limit=0.4))
     aims = SteeredDrive(narrow).aim(0.0, 0.1)
@@ -55,7 +46,10 @@ def test_wheels_turn_at_their_rate_and_the_drive_waits_for_them():
     assert moving[0] == pytest.approx(np.cos(STAND_ERROR), abs=0.01)
 
 
-def test_fixed_wheels_are_never_waited_for():
+def test_aims_are_those_of_the_arc_and_fixed_wheels_are_never_waited_for():
+    aims = SteeredDrive(LSR1).aim(0.06, 0.06)
+    assert aims.angles[5] == pytest.approx(np.arctan2(0.4, 1.0 - 0.31))
+    assert aims.speeds[2] == pytest.approx(0.06 * np.hypot(1.31, 0.4))
     drive = SteeredDrive(replace(LSR1, steering=None))
     aims = drive.aim(0.06, 0.1)
     assert not aims.angles.any() and drive.share(np.zeros(6), aims.angles) == 1.0

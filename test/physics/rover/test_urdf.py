@@ -52,18 +52,13 @@ def written(rover: Rover, folder: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_a_rover_comes_back_from_its_urdf(name, tmp_path):
+def test_a_rover_comes_back_from_its_urdf_and_its_file(name, tmp_path):
     rover = load_rover(name)
     read = rover_from_urdf(*written(rover, tmp_path))
     assert_alike(rover, read.rover, 1e-9)
-    assert read.asymmetry < 1e-9
-
-
-def test_a_written_rover_file_loads_as_the_same_rover(tmp_path):
-    for name in preset_names():
-        rover = load_rover(name)
-        save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
-        assert load_rover(tmp_path / "rover.yaml") == rover
+    assert read.asymmetry < 1e-9 and read.levelling == Levelling()
+    save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
+    assert load_rover(tmp_path / "rover.yaml") == rover
 
 
 def test_links_have_inertias_that_a_body_can_have_and_wheels_collide_as_cylinders(tmp_path):
@@ -78,10 +73,6 @@ def test_links_have_inertias_that_a_body_can_have_and_wheels_collide_as_cylinder
         (cylinder,) = robot.links[wheel].solids
         assert cylinder.size == (rover.wheel.radius, rover.wheel.width)
         assert abs(cylinder.place[1, 2]) == pytest.approx(1.0)
-
-
-PARTS = ("Body", "RockerR", "RockerL", "BogieR", "BogieL")
-"""Links with a mass in `foreign_urdf`, 10, 2, 2, 1 and 1 kg, at their origins."""
 
 
 def foreign_urdf() -> str:
@@ -155,7 +146,7 @@ def read_foreign(folder: Path, text: str = "", **keys: Any) -> Rover:
 
 def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
     rover = read_foreign(tmp_path)
-    suspension = rover.suspension
+    suspension, masses = rover.suspension, rover.masses
     assert suspension.rocker_pivot == pytest.approx((0.0, 0.3, 0.0))
     assert suspension.bogie_pivot == pytest.approx((0.2, 0.3, -0.05))
     assert suspension.rocker_wheel == "rear"
@@ -166,15 +157,12 @@ def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
     assert suspension.bogie_limits == pytest.approx((-0.4, 0.5))
     assert (rover.wheel.radius, rover.wheel.width) == (0.1, 0.06)
     assert (rover.wheel.max_torque, rover.wheel.max_speed) == (3.0, 2.0)
-
-
-def test_masses_add_up_and_keep_their_first_moments(tmp_path):
-    rover = read_foreign(tmp_path)
+    # Masses add up and keep their first moments.
     assert rover.total_mass == pytest.approx(10.0 + 2 * 2.0 + 2 * 1.0 + 6 * 0.5)
-    assert rover.masses.body.mass == pytest.approx(10.0)
-    assert rover.masses.body.com == pytest.approx((-0.1, 0.0, -0.5))
+    assert masses.body.mass == pytest.approx(10.0)
+    assert masses.body.com == pytest.approx((-0.1, 0.0, -0.5))
     # The file has a wheel's mass on its axle, the model in the middle of its tread.
-    assert rover.masses.rocker.com == pytest.approx((0.0, 0.3 - 0.5 * 0.05 / 2.0, 0.0))
+    assert masses.rocker.com == pytest.approx((0.0, 0.3 - 0.5 * 0.05 / 2.0, 0.0))
 
 
 def test_a_heavier_wheel_loads_the_link_that_carries_it(tmp_path):
@@ -227,11 +215,6 @@ def test_wheels_that_are_not_level_are_brought_onto_level_ground(nose_down, turn
     for wheel, place in straight.suspension.wheels.items():
         assert rover.suspension.wheels[wheel] == pytest.approx(place, abs=1e-6)
     assert rover.suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
-
-
-def test_level_wheels_are_not_touched(tmp_path):
-    for name in preset_names():
-        assert rover_from_urdf(*written(load_rover(name), tmp_path)).levelling == Levelling()
 
 
 def test_a_rocker_may_be_fixed_if_the_map_has_its_limits(tmp_path):
@@ -319,8 +302,8 @@ def test_xacro_and_circles_are_refused():
 
 
 def test_a_file_of_many_links_is_refused_at_once():
-    text = "".join(f'<link name="l{k}"/>' for k in range(100_000))
-    with pytest.raises(RoverFileError, match="has 100000 <link>; at most 2000 are read"):
+    text = "".join(f'<link name="l{k}"/>' for k in range(5000))
+    with pytest.raises(RoverFileError, match="has 5000 <link>; at most 2000 are read"):
         parse_robot(f"<robot>{text}</robot>".encode())
 
 

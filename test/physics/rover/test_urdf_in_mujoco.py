@@ -12,10 +12,10 @@ from rover_physics.numerics.quaternions import (
     wxyz_from_rpy,
     xyzw_from_wxyz,
 )
-from rover_physics.prediction.sweep import sweep_poses
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_poses
 
 TIMESTEP = 1e-3
 """[s]"""
@@ -125,7 +125,7 @@ def test_mujoco_loads_the_urdf_and_settles_it_in_the_same_pose(name, ground, apa
     assert simulated.model.body_mass.sum() == pytest.approx(rover.total_mass)
     for place in ((0.0, 0.0, 0.0), (0.2, -0.1, 0.7), (-0.3, 0.2, -2.0)):
         pose, centres = simulated.settle(*place)
-        predicted = sweep_poses(rover, ground, pose[None], np.zeros(1))
+        predicted = judge_poses(rover, ground, pose[None], np.zeros(1))[0]
         assert predicted.settled[0]
         np.testing.assert_allclose(predicted.wheel_centres[0], centres, rtol=0.0, atol=apart)
 

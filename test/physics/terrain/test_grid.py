@@ -1,11 +1,10 @@
 """The terrain: what is refused, the bilinear look-up, filled gaps and files."""
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_physics.errors import TerrainError
@@ -31,7 +30,6 @@ coefficients = st.floats(-2.0, 2.0)
     st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)),
     st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), min_size=1, max_size=20),
 )
-@settings(deadline=None)
 def test_look_up_reproduces_planes(a, b, c, resolution, origin, places):
     terrain = plane(5, 7, resolution, origin, a, b, c)
     xmin, xmax, ymin, ymax = terrain.bounds
@@ -41,24 +39,12 @@ def test_look_up_reproduces_planes(a, b, c, resolution, origin, places):
     assert np.allclose(terrain.elevation_at(x, y), a + b * x + c * y, rtol=0.0, atol=1e-10)
 
 
-@given(st.integers(0, 5), st.integers(0, 7))
-def test_look_up_at_a_cell_centre_gives_its_height(row, column):
+def test_rows_go_along_y_columns_along_x_and_cells_have_their_heights():
     heights = np.random.default_rng(1).normal(size=(6, 8))
     terrain = Terrain(heights, 0.5, (-1.0, 2.0))
-    z = terrain.elevation_at(-1.0 + 0.5 * column, 2.0 + 0.5 * row)
-    assert z == pytest.approx(heights[row, column], abs=1e-12)
-
-
-def test_rows_go_along_y_and_columns_along_x():
-    heights = np.array([[0.0, 1.0], [2.0, 3.0]])
-    terrain = Terrain(heights, 1.0, (10.0, 20.0))
-    assert terrain.elevation_at([10.0, 11.0, 10.0, 11.0], [20.0, 20.0, 21.0, 21.0]).tolist() == [
-        0.0,
-        1.0,
-        2.0,
-        3.0,
-    ]
-    assert terrain.bounds == (10.0, 11.0, 20.0, 21.0)
+    x, y = np.meshgrid(-1.0 + 0.5 * np.arange(8), 2.0 + 0.5 * np.arange(6))
+    np.testing.assert_allclose(terrain.elevation_at(x, y), heights, atol=1e-12)
+    assert terrain.bounds == (-1.0, 2.5, 2.0, 4.5)
 
 
 def test_look_up_is_unknown_off_the_map():
@@ -74,20 +60,11 @@ def test_look_up_is_unknown_where_a_corner_is_unknown():
     heights = plane().elevation.copy()
     heights[2, 3] = np.nan
     terrain = Terrain(heights, 0.5, (-1.0, 2.0))
-    x, y = -1.0 + 0.5 * 3, 2.0 + 0.5 * 2
-    around = terrain.elevation_at(
-        [x - 0.2, x + 0.2, x - 0.2, x + 0.2], [y - 0.2, y - 0.2, y + 0.2, y + 0.2]
-    )
-    assert np.isnan(around).all()
+    x, y, near = -1.0 + 0.5 * 3, 2.0 + 0.5 * 2, np.array([-0.2, 0.2])
+    around = terrain.elevation_at(x + near[:, None], y + near)
+    assert around.shape == (2, 2) and np.isnan(around).all()
     assert np.isfinite(terrain.elevation_at(x - 0.6, y))
-    assert terrain.contains(x, y)
-
-
-def test_look_up_keeps_the_shape_of_its_points():
-    terrain = plane()
-    assert terrain.elevation_at(0.0, 3.0).shape == ()
-    assert terrain.elevation_at(np.zeros((2, 3)), 3.0).shape == (2, 3)
-    assert terrain.contains(np.zeros((2, 1)), np.full(3, 3.0)).shape == (2, 3)
+    assert terrain.contains(x, y) and terrain.elevation_at(0.0, 3.0).shape == ()
 
 
 def test_elevation_becomes_contiguous_float64():
@@ -100,62 +77,62 @@ def test_elevation_becomes_contiguous_float64():
 
 
 FLAT = np.zeros((4, 5))
-
-
-@pytest.mark.parametrize(
-    ("elevation", "text"),
-    [
-        (np.zeros(5), r"elevation has shape \(5,\)"),
-        (np.zeros((2, 3, 4)), r"elevation has shape \(2, 3, 4\)"),
-        (np.zeros((1, 5)), "at least 2 rows and 2 columns"),
-        (np.zeros((0, 0)), "at least 2 rows and 2 columns"),
-        (np.full((3, 4), np.nan), "all 3 x 4 are NaN"),
-        (np.array([[0.0, 1.0], [np.inf, 0.0]]), r"elevation\[1, 0\] is inf"),
-        (np.array([["a", "b"], ["c", "d"]]), "an array of numbers"),
-        (np.zeros((3, 3), dtype=bool), "an array of numbers"),
-        (np.zeros((3, 3), dtype=complex), "an array of numbers"),
-    ],
-)
-def test_a_wrong_elevation_is_refused(elevation, text):
-    with pytest.raises(TerrainError, match=text):
-        Terrain(elevation, 0.1)
-
-
-@pytest.mark.parametrize("resolution", [0.0, -0.1, np.nan, np.inf, "0.1", True, [0.1, 0.1], None])
-def test_a_wrong_resolution_is_refused(resolution):
-    with pytest.raises(TerrainError, match="resolution is .*; it must be one number above 0 in m"):
-        Terrain(FLAT, resolution)
-
-
-@pytest.mark.parametrize("origin", [(0.0,), (0.0, 1.0, 2.0), (0.0, np.nan), "ab", None, 1.0])
-def test_a_wrong_origin_is_refused(origin):
-    with pytest.raises(TerrainError, match="origin is .*; it must be two numbers in m"):
-        Terrain(FLAT, 0.1, origin)
-
-
-@pytest.mark.parametrize(
-    ("friction", "text"),
-    [
-        (np.ones((5, 4)), r"friction has shape \(5, 4\); it must be that of elevation, \(4, 5\)"),
-        (np.zeros((4, 5)), r"friction\[0, 0\] is 0.0; it must be above 0"),
-        (np.full((4, 5), -1.0), r"friction\[0, 0\] is -1.0"),
-        (np.full((4, 5), np.inf), r"friction\[0, 0\] is inf"),
-        (np.full((4, 5), "x"), "friction has type"),
-    ],
-)
-def test_a_wrong_friction_layer_is_refused(friction, text):
-    with pytest.raises(TerrainError, match=text):
-        Terrain(FLAT, 0.1, friction=friction)
-
-
-def test_unknown_friction_is_allowed():
-    friction = np.full((4, 5), np.nan)
-    friction[0, 0] = 0.4
-    assert Terrain(FLAT, 0.1, friction=friction).friction is not None
-
-
 SOIL = np.full((4, 5), -1)
 NAMES = ("dry_sand", "slab")
+
+
+def same(value: float) -> np.ndarray:
+    return np.full((4, 5), value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        *[("resolution", v, "resolution is .*; it must be one number above 0 in m")
+          for v in (0.0, -0.1, np.nan, np.inf, "0.1", True, [0.1, 0.1], None)],
+        *[("origin", v, "origin is .*; it must be two numbers in m")
+          for v in ((0.0,), (0.0, 1.0, 2.0), (0.0, np.nan), "ab", None, 1.0)],
+        ("elevation", np.zeros(5), r"elevation has shape \(5,\)"),
+        ("elevation", np.zeros((2, 3, 4)), r"elevation has shape \(2, 3, 4\)"),
+        ("elevation", np.zeros((1, 5)), "at least 2 rows and 2 columns"),
+        ("elevation", np.zeros((0, 0)), "at least 2 rows and 2 columns"),
+        ("elevation", np.full((3, 4), np.nan), "all 3 x 4 are NaN"),
+        ("elevation", np.array([[0.0, 1.0], [np.inf, 0.0]]), r"elevation\[1, 0\] is inf"),
+        ("elevation", np.array([["a", "b"], ["c", "d"]]), "an array of numbers"),
+        ("elevation", np.zeros((3, 3), dtype=bool), "an array of numbers"),
+        ("elevation", np.zeros((3, 3), dtype=complex), "an array of numbers"),
+        ("friction", np.ones((5, 4)), r"shape \(5, 4\); it must be that of elevation, \(4, 5\)"),
+        ("friction", same(0.0), r"friction\[0, 0\] is 0.0; it must be above 0"),
+        ("friction", same(-1.0), r"friction\[0, 0\] is -1.0"),
+        ("friction", same(np.inf), r"friction\[0, 0\] is inf"),
+        ("friction", same("x"), "friction has type"),
+        ("elevation_std", np.zeros((5, 4)), r"elevation_std has shape \(5, 4\)"),
+        ("elevation_std", same(-0.01), r"elevation_std\[0, 0\] is -0.01; it must be at least 0"),
+        ("elevation_std", same(np.inf), r"elevation_std\[0, 0\] is inf; .*finite"),
+        ("elevation_std", same(np.nan), r"\[0, 0\] is nan; .* where the height is known"),
+        ("elevation_std", same("x"), "elevation_std has type"),
+        ("soil", np.full((5, 4), -1), r"soil has shape \(5, 4\); it must be that of elevation"),
+        ("soil", SOIL + 3, r"soil\[0, 0\] is 2; it must be -1 for the default, or 0 to 1"),
+        ("soil", SOIL - 1, r"soil\[0, 0\] is -2"),
+        ("soil", np.full((4, 5), 2**32), r"soil\[0, 0\] is 4294967296"),
+        ("soil", np.full((4, 5), 255, np.uint8), r"soil\[0, 0\] is 255"),
+        ("soil", FLAT, "soil has type float64; it must be an array of whole numbers"),
+        ("soil", np.zeros((4, 5), bool), "soil has type bool"),
+        ("soil", None, "soil_names are dry_sand, slab without a soil layer"),
+        ("soil_names", (), r"soil\[0, 0\] is 0; .* as there are no soil_names"),
+        ("soil_names", "dry_sand", "soil_names is dry_sand; it must be a list of different names"),
+        ("soil_names", ("a", ""), r"soil_names is \['a', ''\]"),
+        ("soil_names", ("a", 3), r"soil_names is \['a', 3\]"),
+        ("soil_names", ("a", "b", "a"), "soil_names has 'a' twice"),
+        ("soil_names", np.array([["a"]]), "soil_names is"),
+    ],
+)  # fmt: skip
+def test_a_wrong_value_is_refused_by_its_name(name, value, text):
+    right = {"elevation": FLAT, "resolution": 0.1, "origin": (0.0, 0.0)}
+    if name.startswith("soil"):
+        right |= {"soil": SOIL + 1, "soil_names": NAMES}
+    with pytest.raises(TerrainError, match=text):
+        Terrain(**right | {name: value})
 
 
 def test_soils_are_indices_into_names():
@@ -165,45 +142,6 @@ def test_soils_are_indices_into_names():
     assert terrain.soil is not None and terrain.soil.dtype == np.int32
     assert terrain.soil_names == NAMES
     assert Terrain(FLAT, 0.1, soil=SOIL).soil_names == ()
-
-
-@pytest.mark.parametrize(
-    ("soil", "names", "text"),
-    [
-        (np.full((5, 4), -1), NAMES, r"soil has shape \(5, 4\); it must be that of elevation"),
-        (SOIL + 3, NAMES, r"soil\[0, 0\] is 2; it must be -1 for the default, or 0 to 1"),
-        (np.full((4, 5), -2), NAMES, r"soil\[0, 0\] is -2"),
-        (np.full((4, 5), 2**32), NAMES, r"soil\[0, 0\] is 4294967296"),
-        (np.full((4, 5), 255, np.uint8), NAMES, r"soil\[0, 0\] is 255"),
-        (np.zeros((4, 5), int), (), r"soil\[0, 0\] is 0; .* as there are no soil_names"),
-        (np.zeros((4, 5)), NAMES, "soil has type float64; it must be an array of whole numbers"),
-        (np.zeros((4, 5), bool), NAMES, "soil has type bool"),
-        (SOIL, "dry_sand", "soil_names is dry_sand; it must be a list of different names"),
-        (SOIL, ("a", ""), r"soil_names is \['a', ''\]"),
-        (SOIL, ("a", 3), r"soil_names is \['a', 3\]"),
-        (SOIL, ("a", "b", "a"), "soil_names has 'a' twice"),
-        (SOIL, np.array([["a"]]), "soil_names is"),
-        (None, NAMES, "soil_names are dry_sand, slab without a soil layer"),
-    ],
-)
-def test_a_wrong_soil_layer_is_refused(soil, names, text):
-    with pytest.raises(TerrainError, match=text):
-        Terrain(FLAT, 0.1, soil=soil, soil_names=names)
-
-
-@pytest.mark.parametrize(
-    ("std", "text"),
-    [
-        (np.zeros((5, 4)), r"elevation_std has shape \(5, 4\)"),
-        (np.full((4, 5), -0.01), r"elevation_std\[0, 0\] is -0.01; it must be at least 0"),
-        (np.full((4, 5), np.inf), r"elevation_std\[0, 0\] is inf"),
-        (np.full((4, 5), np.nan), r"elevation_std\[0, 0\] is nan; .* where the height is known"),
-        (np.full((4, 5), "x"), "elevation_std has type"),
-    ],
-)
-def test_a_wrong_uncertainty_is_refused(std, text):
-    with pytest.raises(TerrainError, match=text):
-        Terrain(FLAT, 0.1, elevation_std=std)
 
 
 def test_the_uncertainty_may_be_unknown_where_the_height_is():
@@ -234,16 +172,11 @@ def with_gap(ny=20, nx=24, rows=slice(8, 11), columns=slice(9, 14)):
     return terrain, Terrain(heights, 0.1)
 
 
-def test_a_small_gap_in_a_plane_is_filled_exactly():
+def test_a_gap_in_a_plane_is_filled_exactly_if_its_shorter_side_is_no_wider():
     whole, gapped = with_gap()
+    for width in (0.2, 0.29):
+        assert np.isnan(gapped.fill_gaps(width).elevation).sum() == 15
     assert np.allclose(gapped.fill_gaps(0.3).elevation, whole.elevation, rtol=0.0, atol=1e-12)
-
-
-def test_a_gap_is_as_wide_as_its_shorter_side():
-    _, gapped = with_gap()
-    assert np.isnan(gapped.fill_gaps(0.2).elevation).sum() == 15
-    assert np.isnan(gapped.fill_gaps(0.29).elevation).sum() == 15
-    assert not np.isnan(gapped.fill_gaps(0.3).elevation).any()
 
 
 def test_a_large_gap_stays_while_a_small_one_is_filled():
@@ -269,21 +202,15 @@ def test_a_gap_at_the_edge_of_the_map_stays(rows, columns):
     assert np.isnan(gapped.fill_gaps(5.0).elevation).sum() == 2
 
 
-def test_filling_makes_no_new_extremes():
+def test_filling_makes_no_new_extremes_and_leaves_known_cells_and_the_terrain_alone():
     heights = np.random.default_rng(3).normal(size=(30, 30))
     unknown = np.zeros((30, 30), dtype=bool)
     unknown[10:14, 12:20] = True
-    filled = Terrain(np.where(unknown, np.nan, heights), 0.1).fill_gaps(0.5).elevation[unknown]
-    rim = heights[9:15, 11:21]
-    assert rim.min() <= filled.min() <= filled.max() <= rim.max()
-
-
-def test_filling_leaves_known_cells_and_the_terrain_itself_alone():
-    _, gapped = with_gap()
-    before = gapped.elevation.copy()
-    known = ~np.isnan(before)
-    filled = gapped.fill_gaps(1.0)
-    assert np.array_equal(filled.elevation[known], before[known])
+    before = np.where(unknown, np.nan, heights)
+    gapped = Terrain(before, 0.1)
+    filled, rim = gapped.fill_gaps(0.5).elevation, heights[9:15, 11:21]
+    assert rim.min() <= filled[unknown].min() <= filled[unknown].max() <= rim.max()
+    assert np.array_equal(filled[~unknown], before[~unknown])
     assert np.array_equal(gapped.elevation, before, equal_nan=True)
     whole = plane()
     assert whole.fill_gaps(1.0) is whole
@@ -296,99 +223,63 @@ def test_a_wrong_gap_width_is_refused(max_gap):
 
 
 def test_a_saved_terrain_is_loaded_as_it_was(tmp_path):
-    heights = np.random.default_rng(2).normal(size=(4, 5))
+    rng = np.random.default_rng(2)
+    heights = rng.normal(size=(4, 5))
     heights[1, 2] = np.nan
-    friction = np.where(np.isnan(heights), np.nan, 0.7)
-    terrain = Terrain(heights, 0.25, (3.0, -4.0), friction)
-    save_terrain(tmp_path / "a.npz", terrain, source="made up")
-    loaded = load_terrain(tmp_path / "a.npz")
-    assert np.array_equal(loaded.elevation, heights, equal_nan=True)
-    assert loaded.friction is not None
-    assert np.array_equal(loaded.friction, friction, equal_nan=True)
-    assert (loaded.resolution, loaded.origin) == (0.25, (3.0, -4.0))
-    assert (loaded.soil, loaded.soil_names, loaded.elevation_std) == (None, (), None)
+    layers = {
+        "friction": np.where(np.isnan(heights), np.nan, 0.7),
+        "soil": rng.integers(-1, 2, (4, 5)),
+        "elevation_std": rng.uniform(0.0, 0.1, (4, 5)),
+    }
+    for some in ({}, layers):
+        terrain = Terrain(heights, 0.25, (3.0, -4.0), soil_names=NAMES if some else (), **some)
+        save_terrain(tmp_path / "a.npz", terrain, source="made up")
+        loaded = load_terrain(tmp_path / "a.npz")
+        assert np.array_equal(loaded.elevation, heights, equal_nan=True)
+        assert (loaded.resolution, loaded.origin) == (0.25, (3.0, -4.0))
+        assert loaded.soil_names == terrain.soil_names
+        for name, layer in layers.items():
+            found = getattr(loaded, name)
+            assert found is None if not some else np.array_equal(found, layer, equal_nan=True)
 
 
-def test_saved_soils_and_uncertainty_are_loaded_as_they_were(tmp_path):
-    soil = np.random.default_rng(4).integers(-1, 2, (4, 5))
-    std = np.random.default_rng(5).uniform(0.0, 0.1, (4, 5))
-    terrain = Terrain(FLAT, 0.25, soil=soil, soil_names=NAMES, elevation_std=std)
-    save_terrain(tmp_path / "a.npz", terrain)
-    loaded = load_terrain(tmp_path / "a.npz")
-    assert loaded.soil_names == NAMES
-    assert np.array_equal(loaded.soil, soil)
-    assert np.array_equal(loaded.elevation_std, std)
-
-
-def test_a_file_with_a_wrong_soil_is_named(tmp_path):
-    entries = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0], "soil": SOIL + 1}
-    np.savez(tmp_path / "map.npz", **entries, soil_names="dry_sand")
-    with pytest.raises(TerrainError, match=r"map\.npz: soil_names is dry_sand; it must be a list"):
-        load_terrain(tmp_path / "map.npz")
-    np.savez(tmp_path / "map.npz", **entries)
-    with pytest.raises(TerrainError, match=r"map\.npz: soil\[0, 0\] is 0; it must be -1"):
-        load_terrain(tmp_path / "map.npz")
+ENTRIES = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
 
 
 def test_a_file_with_float32_and_further_entries_is_loaded(tmp_path):
-    path = tmp_path / "map.npz"
+    more = {"resolution_xy": [0.5, 0.5], "source": "a survey", "licence": "MIT"}
+    heights = FLAT.astype(np.float32)
     np.savez(
-        path,
-        elevation=FLAT.astype(np.float32),
-        resolution=np.float32(0.5),
-        resolution_xy=[0.5, 0.5],
-        origin=[1, 2],
-        source="a survey",
-        licence="MIT",
+        tmp_path / "map.npz", elevation=heights, resolution=np.float32(0.5), origin=[1, 2], **more
     )
-    terrain = load_terrain(str(path))
+    terrain = load_terrain(str(tmp_path / "map.npz"))
     assert terrain.elevation.dtype == np.float64
     assert terrain.origin == (1.0, 2.0)
 
 
-@pytest.mark.parametrize("name", ["elevation", "resolution", "origin"])
-def test_a_file_without_an_entry_is_refused(tmp_path, name):
-    entries = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
-    del entries[name]
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        *[({name: None}, f"no entry {name};") for name in ENTRIES],
+        ({"resolution": -1.0}, r"resolution is -1\.0"),
+        ({"elevation": np.empty((2, 2), object)}, "entry elevation holds Python objects"),
+        ({"soil": SOIL + 1}, r"soil\[0, 0\] is 0; it must be -1"),
+        ({"soil": SOIL + 1, "soil_names": "dry_sand"}, "soil_names is dry_sand; it must be a"),
+    ],
+)
+def test_a_file_with_a_wrong_entry_is_refused_by_its_name(tmp_path, changes, text):
+    entries = {k: v for k, v in (ENTRIES | changes).items() if v is not None}
     np.savez(tmp_path / "map.npz", **entries)
-    with pytest.raises(TerrainError, match=rf"map\.npz: no entry {name};"):
-        load_terrain(tmp_path / "map.npz")
-
-
-def test_a_file_with_an_impossible_entry_is_named(tmp_path):
-    np.savez(tmp_path / "map.npz", elevation=FLAT, resolution=-1.0, origin=[0.0, 0.0])
-    with pytest.raises(TerrainError, match=r"map\.npz: resolution is -1\.0"):
-        load_terrain(tmp_path / "map.npz")
-
-
-def test_nothing_is_unpickled(tmp_path):
-    heights = np.empty((2, 2), dtype=object)
-    np.savez(tmp_path / "map.npz", elevation=heights, resolution=0.1, origin=[0.0, 0.0])
-    with pytest.raises(TerrainError, match="entry elevation holds Python objects"):
+    with pytest.raises(TerrainError, match=rf"map\.npz: {text}"):
         load_terrain(tmp_path / "map.npz")
 
 
 def test_a_file_that_is_no_npz_is_refused(tmp_path):
-    (tmp_path / "text.npz").write_text("elevation", encoding="utf-8")
-    (tmp_path / "empty.npz").write_bytes(b"")
     (tmp_path / "cut.npz").write_bytes(b"PK\x03\x04 and no more")
     np.save(tmp_path / "single.npy", FLAT)
-    for name in ("text.npz", "empty.npz", "cut.npz", "single.npy"):
+    for name in ("cut.npz", "single.npy"):
         with pytest.raises(TerrainError, match=rf"{name}: .*\.npz"):
             load_terrain(tmp_path / name)
-
-
-def test_a_damaged_entry_is_named(tmp_path):
-    save_terrain(tmp_path / "good.npz", plane())
-    with (
-        zipfile.ZipFile(tmp_path / "good.npz") as good,
-        zipfile.ZipFile(tmp_path / "bad.npz", "w") as bad,
-    ):
-        for name in good.namelist():
-            content = good.read(name)
-            bad.writestr(name, content[:-20] if name.startswith("elevation") else content)
-    with pytest.raises(TerrainError, match=r"bad\.npz: entry elevation is damaged"):
-        load_terrain(tmp_path / "bad.npz")
 
 
 def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
@@ -403,23 +294,18 @@ def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
         save_terrain(tmp_path / "none" / "map.npz", plane())
 
 
-def test_a_preset_is_found_by_its_name_from_any_folder(tmp_path, monkeypatch):
+def test_a_preset_is_found_by_its_name_from_any_folder_and_keeps_its_licence(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     terrain = load_terrain("spirit")
     assert terrain.elevation.shape == (400, 434)
     assert terrain.resolution == pytest.approx(0.03)
     assert np.isnan(terrain.elevation).mean() == pytest.approx(0.55, abs=0.01)
-
-
-def test_a_preset_keeps_its_source_and_licence():
     for name, path in terrain_presets().items():
         with np.load(path, allow_pickle=False) as entries:
             assert "NASA/JPL" in str(entries["licence"]), name
             assert str(entries["source"])
-
-
-def test_a_name_that_is_neither_preset_nor_file_is_refused_with_the_presets(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
     with pytest.raises(TerrainError, match="no terrain 'opportunity': .* presets are spirit"):
         load_terrain("opportunity")
     with pytest.raises(TerrainError, match="no terrain 'spirit'"):

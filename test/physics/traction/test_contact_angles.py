@@ -27,6 +27,9 @@ LSR1 = load_rover("lsr1")
 def follow(rover, motions, duration):
     estimator = MotionContactEstimator(rover)
     estimates = [estimator.update(motion, duration) for motion in motions]
+    covariances = np.array([estimate.covariance for estimate in estimates])
+    assert np.allclose(covariances, covariances.swapaxes(1, 2), atol=1e-12)
+    assert np.linalg.eigvalsh(covariances).min() > 0.0
     angles = np.array([estimate.angles for estimate in estimates])
     deviations = np.sqrt([np.diag(estimate.covariance) for estimate in estimates])
     return angles, deviations
@@ -38,18 +41,14 @@ def rms(errors):
 
 @pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])
 @pytest.mark.parametrize("rover", [LSR1, load_rover("m2020")], ids=lambda rover: rover.name)
-def test_on_an_even_slope_the_angles_are_known_before_the_rover_has_moved(rover, slope):
-    prediction, motions, _ = drive_states(rover, plane(*slope, half=4.0))
+def test_on_an_even_slope_the_angles_are_known_at_rest_and_in_motion(rover, slope):
+    prediction, motions, duration = drive_states(rover, plane(*slope, half=4.0))
     still = replace(motions[0], wheel_rates=np.zeros(6), body_rates=np.zeros(3))
     estimate = MotionContactEstimator(rover).update(still, 0.02)
     assert estimate.angles == pytest.approx(prediction.contact_angle[0], abs=0.01)
-
-
-@pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])
-def test_on_an_even_slope_the_angles_are_found_to_a_hundredth(slope):
-    prediction, motions, duration = drive_states(LSR1, plane(*slope, half=2.5))
-    angles, _ = follow(LSR1, motions, duration)
-    assert np.abs(angles - prediction.contact_angle)[400:].max() < 0.01
+    if rover is LSR1:
+        angles, _ = follow(rover, motions, duration)
+        assert np.abs(angles - prediction.contact_angle)[400:].max() < 0.01
 
 
 @pytest.mark.parametrize(
@@ -96,32 +95,10 @@ def test_at_rest_nothing_is_learnt_or_forgotten():
     assert np.array_equal(rested.covariance, moved.covariance)
 
 
-def test_covariances_stay_symmetric_and_positive():
-    _, motions, duration = drive_states(LSR1, rocky(2))
-    estimator = MotionContactEstimator(LSR1)
-    for motion in motions:
-        covariance = estimator.update(motion, duration).covariance
-        assert np.allclose(covariance, covariance.T, atol=1e-12)
-        assert np.linalg.eigvalsh(covariance).min() > 0.0
-
-
 def test_without_a_source_the_angles_are_zero_and_as_uncertain_as_ground_is():
     estimate = level_estimate()
     assert estimate.source == "zero" and not estimate.angles.any()
     assert np.diag(estimate.covariance) == pytest.approx(np.full(6, SLOPE_DEVIATION**2))
-
-
-@pytest.mark.parametrize("drift", [0.0, 0.05, -0.05])
-def test_the_map_tells_the_angles_whatever_height_odometry_says(drift):
-    ground = fractal(1)
-    prediction, _, _ = drive_states(LSR1, ground)
-    finder, errors = MapContactFinder(LSR1, ground), []
-    for i in range(0, 1201, 20):
-        x, y, z = prediction.position[i]
-        found = finder.find(state_of(LSR1, prediction, i), np.array([x, y, z + drift, 0.0]), 0.0)
-        assert found.source == "map"
-        errors.append(found.angles - prediction.contact_angle[i])
-    assert np.median(np.abs(errors)) < 0.03
 
 
 def test_at_the_foot_of_a_face_it_is_the_face_that_counts():

@@ -7,7 +7,6 @@ import pytest
 
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -51,7 +50,7 @@ def test_a_slope_is_classified_by_what_it_needs(slope, friction, traversability_
 
 def test_a_passable_waypoint_names_its_tightest_constraint():
     found = classify_path(LSR1, plane(0.2, 0.0), POSE)[0]
-    equal = sweep_path(LSR1, plane(0.2, 0.0), POSE)
+    equal = judge_path(LSR1, plane(0.2, 0.0), POSE)[0]
     used = equal.friction_utilisation[0]
     assert found.constraint == "friction"
     assert found.wheel == WHEELS[int(np.argmax(used))]
@@ -61,7 +60,7 @@ def test_a_passable_waypoint_names_its_tightest_constraint():
 
 def test_with_speed_servos_the_margin_is_that_of_the_whole_rover():
     found = classify_path(LSR1, plane(0.45, 0.0), POSE)[0]
-    servo = sweep_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(policy="servo"))
+    servo = judge_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(policy="servo"))[0]
     shear = np.hypot(servo.tangential[0], servo.lateral[0]).sum()
     assert (found.policy, found.constraint) == ("servo", "friction")
     assert found.margin == pytest.approx(1.0 - shear / (0.8 * servo.wheel_loads[0].sum()))
@@ -75,7 +74,7 @@ def test_a_climb_that_stalls_servos_needs_traction_control_and_its_margin_is_tha
     assert [waypoint.traversability_class for waypoint in found] == [
         PASSABLE, PASSABLE, WITH_TRACTION_CONTROL, PASSABLE, PASSABLE,
     ]  # fmt: skip
-    optimal = sweep_path(rover, bump, ONTO_A_BUMP, replace(WEAK, policy="optimal")).between
+    optimal = judge_path(rover, bump, ONTO_A_BUMP, replace(WEAK, policy="optimal"))[0].between
     assert found[2].policy == "optimal"
     assert found[2].margin == pytest.approx(1.0 - optimal.torque_saturation.max())
     assert "motors stall" in found[2].reason
@@ -107,10 +106,10 @@ def test_classes_agree_with_the_verdicts_of_all_policies():
     ground, poses = rocky(3), random_poses(3, 60, 1.8)
     classes = classify_path(LSR1, ground, poses, SweepOptions(friction=0.22))
     paths = [
-        sweep_path(LSR1, ground, poses, SweepOptions(friction=0.22, policy=policy))
+        judge_path(LSR1, ground, poses, SweepOptions(friction=0.22, policy=policy))[0]
         for policy in ("equal", "servo", "optimal")
     ]
-    equal, servo, optimal = (judge(LSR1, path) for path in paths)
+    equal, servo, optimal = (hold_against_limits(LSR1, path) for path in paths)
     falls = np.any([path.falling.any(axis=1) for path in paths], axis=0)
     seen = set()
     codes = zip(equal.codes, servo.codes, optimal.codes, falls, strict=True)
@@ -139,7 +138,9 @@ def test_what_breaks_on_the_way_counts_at_the_waypoint_that_follows():
     step = replace(ground, elevation=np.where(ground.elevation + xs(ground) > 0.6, 0.12, 0.0))
     poses = np.column_stack([x[15:60], np.zeros(45), np.zeros(45)])
     classes = classify_path(LSR1, step, poses)
-    optimal = judge(LSR1, sweep_path(LSR1, step, poses, SweepOptions(policy="optimal")))
+    optimal = hold_against_limits(
+        LSR1, judge_path(LSR1, step, poses, SweepOptions(policy="optimal"))[0]
+    )
     for waypoint, reason in zip(classes, optimal.reasons, strict=True):
         if waypoint.traversability_class == IMPASSABLE:
             assert waypoint.reason == reason

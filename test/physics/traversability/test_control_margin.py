@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rover_physics.errors import ModelError
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.classification import (
@@ -52,7 +51,7 @@ def test_what_speed_servos_pass_is_classed_so_whatever_the_margin(margin, passes
 def test_the_margin_is_kept_in_torque_too():
     options = replace(OPTIMAL, max_torque=0.7)
     assert judge_path(LSR1, STEEP, POSE, options)[1].traversable
-    used = sweep_path(LSR1, STEEP, POSE, options).torque_saturation.max()
+    used = judge_path(LSR1, STEEP, POSE, options)[0].torque_saturation.max()
     short = replace(options, control_margin=1.0 - 0.7 * used)
     verdict = judge_path(LSR1, STEEP, POSE, short)[1]
     assert verdict.code in ("torque", "friction") and "control margin" in verdict.reason
@@ -61,8 +60,8 @@ def test_the_margin_is_kept_in_torque_too():
 def test_torques_keep_the_margin_where_they_can():
     step = drive_ground("step", 0.08)
     options = replace(OPTIMAL, friction=1.0, max_torque=0.85)
-    free = sweep_path(LSR1, step, drive_path(), options)
-    kept = sweep_path(LSR1, step, drive_path(), replace(options, control_margin=0.2))
+    free = judge_path(LSR1, step, drive_path(), options)[0]
+    kept = judge_path(LSR1, step, drive_path(), replace(options, control_margin=0.2))[0]
     assert free.between is not None and kept.between is not None
     assert free.between.torque_saturation.max() > 0.8
     assert kept.between.torque_saturation.max() <= 0.8 + 1e-9

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
@@ -182,12 +181,12 @@ def test_backwards_into_a_crater_is_as_much_a_trap():
 
 def test_on_coulomb_ground_without_drops_nothing_more_is_swept(monkeypatch):
     asked = []
-    for name in ("sweep_until_failure", "predict_way_back"):
+    for name in ("sweep_paths", "predict_way_back"):
         sweep = getattr(trap, name)
         monkeypatch.setattr(
             trap,
             name,
-            lambda *asked_for, sweep=sweep: asked.append(asked_for) or sweep(*asked_for),
+            lambda *given, sweep=sweep, **more: asked.append(given) or sweep(*given, **more),
         )
     assert verdict_in(CRATER, -5.0, 5.0).traversable
     assert verdict_in(edge(0.0), -2.0, 2.0, soil="dry_sand").traversable
@@ -200,7 +199,7 @@ def test_forces_at_rest_are_the_same_both_ways_on_coulomb_ground():
     x = np.arange(-5.0, 5.0, 0.1)
     poses = np.column_stack([x, 0.0 * x, 0.0 * x])
     there, back = (
-        sweep_path(LSR1, CRATER, path, SweepOptions(backward=backward))
+        judge_path(LSR1, CRATER, path, SweepOptions(backward=backward))[0]
         for path, backward in ((poses, False), (poses[::-1], True))
     )
     np.testing.assert_allclose(back.wheel_loads[::-1], there.wheel_loads, atol=1e-9)
@@ -241,7 +240,7 @@ def test_ways_of_speed_servos_are_judged_by_their_own_tractions():
 def test_the_way_back_of_speed_servos_is_checked_where_they_pull_hard(slope, checked):
     ground = Terrain(slope * X, RESOLUTION, (-3.0, -3.0))
     options = SweepOptions(policy="servo", friction=0.6)
-    prediction = sweep_path(LSR1, ground, way(-0.3, 0.3), options)
+    prediction = judge_path(LSR1, ground, way(-0.3, 0.3), options)[0]
     assert trap.find_one_way(LSR1, prediction, options).any() == checked
 
 

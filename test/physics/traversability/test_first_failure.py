@@ -7,17 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics.prediction import crossing
+from rover_physics.prediction import crossing, sweep
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_kernels import Wheels
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import QUANTITIES, new_results
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability import first_failure
-from rover_physics.traversability.first_failure import sweep_until_failure
 from rover_physics.traversability.judge import judge_path, judge_paths
-from rover_physics.traversability.verdict import Verdict, judge
+from rover_physics.traversability.verdict import Verdict, hold_against_limits
 from support.rough_grounds import bouldered, fractal, rocky
 
 ROVER = load_rover("lsr1")
@@ -57,18 +56,19 @@ def first_refusal(verdict: Verdict) -> tuple:
 
 
 def assert_same(one: PathPrediction, other: PathPrediction) -> None:
-    for name, value in vars(one).items():
-        if isinstance(value, np.ndarray):
-            np.testing.assert_array_equal(value, getattr(other, name), err_msg=name)
+    for name in ("poses", "waypoint", "status", *(each.name for each in QUANTITIES)):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 @settings(max_examples=60, deadline=None)
 @given(courses(), st.sampled_from(sorted(OPTIONS)))
 def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(course, option):
     ground, poses = course
-    whole = sweep_path(ROVER, ground, poses, OPTIONS[option])
-    verdict = judge(ROVER, whole)
-    ((swept, stopped),) = sweep_until_failure(ROVER, ground, [poses], OPTIONS[option])
+    whole = judge_path(ROVER, ground, poses, OPTIONS[option])[0]
+    verdict = hold_against_limits(ROVER, whole)
+    model = pack_model(ROVER, ground, OPTIONS[option])
+    swept = sweep.sweep_paths(ground, model, [poses], stop_at_failure=True)[0]
+    stopped = hold_against_limits(ROVER, swept.prediction)
     assert first_refusal(stopped) == first_refusal(verdict)
     count = len(poses) if verdict.traversable else verdict.first_failure + 1
     assert len(swept.prediction.poses) == count
@@ -93,9 +93,8 @@ def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monk
     _, whole = judge_path(ROVER, ground, poses)
     assert whole.traversable and whole.max_wheel_drop > 0.0
     for block in (1, 2, 3, 5, 7, 11):
-        monkeypatch.setattr(first_failure, "FIRST_BLOCK", block)
-        ((_, stopped),) = sweep_until_failure(ROVER, ground, [poses])
-        assert stopped.traversable
+        monkeypatch.setattr(sweep, "FIRST_BLOCK", block)
+        assert judge_path(ROVER, ground, poses, stop_at_failure=True)[1].traversable
 
 
 def test_several_paths_stop_each_at_its_own_failure():
@@ -115,7 +114,7 @@ def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monk
     unknown = np.where(np.arange(ground.elevation.shape[1]) < 60, np.nan, ground.elevation)
     poses = straight(0.0, -3.0, 9.0, 0.0, 0.02)
     evaluated = []
-    evaluate = first_failure.evaluator
+    evaluate = sweep.evaluator
 
     def counting(model):
         def call(at, *held, **motions):
@@ -124,10 +123,10 @@ def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monk
 
         return call
 
-    monkeypatch.setattr(first_failure, "evaluator", counting)
+    monkeypatch.setattr(sweep, "evaluator", counting)
     _, verdict = judge_path(ROVER, replace(ground, elevation=unknown), poses, stop_at_failure=True)
     assert verdict.first_failure == 0
-    assert sum(evaluated) == first_failure.FIRST_BLOCK
+    assert sum(evaluated) == sweep.FIRST_BLOCK
 
 
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
@@ -149,9 +148,9 @@ def test_crossings_end_where_a_stretch_ends():
         bouldered(3),
         Wheels(0.1, 0.5, 1.0, 1.0, 0.1, False),
         np.zeros((1, 3)),
-        crossing.new_results(1),
+        new_results(1),
         lambda at: None,
     )
     tied = replace(rest, place=np.ones(2), waypoint=rows, climbing=np.ones(2, bool),
-                   poses=np.zeros((2, 3)), results=crossing.new_results(2))  # fmt: skip
+                   poses=np.zeros((2, 3)), results=new_results(2))  # fmt: skip
     assert tied.in_order().waypoint.tolist() == [1, 2]

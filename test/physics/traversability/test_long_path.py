@@ -7,12 +7,13 @@ import pytest
 
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction import parts
-from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.long_path import judge_long_path
+from rover_physics.traversability.partwise import PartwiseJudge
 from support.rough_grounds import bouldered
 
 ROVER = load_rover("lsr1")
@@ -60,16 +61,15 @@ CASES = {
 
 def judge_in_parts(terrain, poses, options, **more):
     """Return the predictions of all parts, and the verdict."""
-    taken: list[PathPrediction] = []
-    verdict = judge_long_path(ROVER, terrain, poses, options, take=taken.append, **more)
-    return taken, verdict
+    judge = PartwiseJudge(ROVER, terrain, poses, options, **more)
+    taken = list(judge.parts())
+    return taken, judge.verdict()
 
 
 def assert_same(whole: PathPrediction, taken: list[PathPrediction]) -> None:
-    for name, value in vars(whole).items():
-        if isinstance(value, np.ndarray) and name != "waypoint":
-            found = np.concatenate([getattr(part, name) for part in taken])
-            np.testing.assert_array_equal(found, value, err_msg=name)
+    for name in ("poses", "status", *(one.name for one in QUANTITIES)):
+        found = np.concatenate([getattr(part, name) for part in taken])
+        np.testing.assert_array_equal(found, getattr(whole, name), err_msg=name)
 
 
 @pytest.mark.parametrize("size", [7, 100])

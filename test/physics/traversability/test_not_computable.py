@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError, RoverError
 from rover_physics.names import EQUAL, OPTIMAL
-from rover_physics.prediction.evaluation import AHEAD, evaluate, new_works
-from rover_physics.prediction.map_sweep import NUMBERS as NUMBERS_OF_SCORE
-from rover_physics.prediction.map_sweep import PoseScores, score_all, score_poses
+from rover_physics.prediction.evaluation import evaluate
+from rover_physics.prediction.map_sweep import score, score_poses
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.sweep import sweep_path
+from rover_physics.prediction.sweep import predict_poses
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover, rover_from_dict
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.bounded_verdict import judge_bounds
+from rover_physics.traversability.bounded_verdict import judge_worst_case
 from rover_physics.traversability.classification import classify_path
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.reach import judge_reach
@@ -98,7 +98,7 @@ def test_no_rover_of_extreme_numbers_passes_without_numbers(places, number, sign
         return
     assert_computed(prediction, verdict)
     scores = score_poses(rover, LEVEL, POSES, SweepOptions(policy=policy))
-    assert not (scores.within_limits(rover) & ~np.isfinite(scores.least_load)).any()
+    assert not (scores.passable & ~np.isfinite(scores.least_load)).any()
 
 
 @pytest.mark.parametrize(
@@ -130,20 +130,24 @@ def model_of_infinite_weight():
 
 
 def test_a_pose_without_numbers_says_so_and_has_none():
-    results = evaluate(model_of_infinite_weight().records, POSES)
+    model = model_of_infinite_weight()
+    results = evaluate(
+        model.records, model.limits.records, model.limits.records, model.limits.records, POSES
+    )
     assert (results["status"] == PoseStatus.NOT_COMPUTABLE).all()
-    for name in set(results.dtype.names) - {"status", "motion", "steering_angle", "wheel_speed"}:
-        assert np.isnan(results[name]).all(), name
+    for one in QUANTITIES:
+        if not (one.of_motion or one.of_path):
+            assert np.isnan(results[one.name]).all(), one.name
+    assert np.isnan(results["time"]).all() and np.isnan(results["energy"]).all()
 
 
 def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
     model = model_of_infinite_weight()
-    status, numbers = np.empty(5, np.int8), np.zeros((NUMBERS_OF_SCORE, 5), np.float32)
-    score_all(model.records, (POSES, AHEAD), new_works(1, 5), (status, numbers), (0, 1))
-    assert not PoseScores(status, *numbers).within_limits(LSR1).any()
-    fine = sweep_path(LSR1, LEVEL, POSES)
-    unsettled = replace(fine, status=status, settled=status == PoseStatus.SETTLED)
-    verdict = judge(LSR1, unsettled)
+    assert not score(model, POSES, (5,)).passable.any()
+    results = evaluate(
+        model.records, model.limits.records, model.limits.records, model.limits.records, POSES
+    )
+    verdict = hold_against_limits(LSR1, predict_poses(model, POSES, results))
     assert verdict.code == "not_computable" and "not a finite number" in verdict.reason
 
 
@@ -155,10 +159,10 @@ def test_an_impossible_payload_is_refused_with_what_would_be_right(payload):
 
 @pytest.mark.parametrize("name", DECISIVE)
 def test_a_nan_breaks_each_limit_and_names_the_quantity(name):
-    prediction = sweep_path(LSR1, LEVEL, POSES)
+    prediction = judge_path(LSR1, LEVEL, POSES)[0]
     values = getattr(prediction, name).copy()
     values.reshape(len(POSES), -1)[3, -1] = math.nan
-    verdict = judge(LSR1, replace(prediction, **{name: values}))
+    verdict = hold_against_limits(LSR1, prediction.change(**{name: values}))
     assert not verdict.traversable and verdict.first_failure == 3
     assert verdict.code == "not_computable" and "cannot be computed" in verdict.reason
 
@@ -170,7 +174,7 @@ def test_a_bound_that_is_no_number_is_a_refusal():
     loads = prediction.bounds.wheel_loads.copy()
     loads[2, 4, 0] = math.nan
     bounds = replace(prediction.bounds, wheel_loads=loads)
-    worst = judge_bounds(LSR1, prediction, bounds, verdict)
+    worst = judge_worst_case(LSR1, prediction, bounds, verdict)
     assert (worst.first_failure, worst.code) == (2, "not_computable")
     assert "wheel_loads" in worst.reason and "3 sigma" in worst.reason
 
@@ -190,8 +194,8 @@ def test_only_the_clearance_over_unknown_ground_may_be_unknown():
 
 def test_a_path_of_unknown_energy_costs_more_than_any_other():
     prediction, verdict = judge_path(LSR1, LEVEL, POSES)
-    unknown = replace(prediction, energy=np.full(len(POSES), math.nan))
-    assert path_cost(LSR1, unknown, verdict) == (math.inf, math.inf)
+    unknown = prediction.change(energy=np.full(len(POSES), math.nan))
+    assert path_cost(unknown, verdict) == (math.inf, math.inf)
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ import pytest
 
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.exposure import SAFE, find_exposure
 from rover_physics.traversability.judge import judge_paths
 from rover_physics.traversability.pieces import judge_pieces
-from rover_physics.traversability.risk import SAFE, find_exposure, used_share
 from support.rough_grounds import fractal, rocky
 
 LSR1 = load_rover("lsr1")
@@ -46,7 +46,9 @@ def random_pieces(count, seed, half=2.0):
 def test_a_piece_passes_where_its_path_does_and_costs_the_same(ground, options):
     pieces = random_pieces(60, 1)
     found = judge_pieces(LSR1, ground, pieces, options)
-    judged = judge_paths(LSR1, ground, pieces, options, stop_at_failure=True, ask_ways_out=False)
+    judged = judge_paths(
+        LSR1, ground, pieces, options, stop_at_failure=True, check_entrapment=False
+    )
     passed = [verdict.traversable for _, verdict in judged]
     assert [not piece.code for piece in found] == passed
     assert 5 < sum(passed) < 60
@@ -62,7 +64,7 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
     ground = fractal(1, roughness=1e-6)
     way = np.column_stack([np.linspace(0.0, 1.0, 51), np.zeros((51, 2))])
     prediction, verdict = judge_paths(LSR1, ground, [way])[0]
-    assert used_share(LSR1, verdict) < SAFE
+    assert verdict.risk < SAFE
     assert find_exposure(LSR1, prediction) == 0.0
     tight = LSR1.limits.__class__(**{**LSR1.limits.__dict__, "tip_over_ratio": 0.999})
     at_limit = type(LSR1)(**{**LSR1.__dict__, "limits": tight})

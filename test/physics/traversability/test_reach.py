@@ -8,7 +8,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError, PoseError
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import (
     arm_angles,
@@ -18,6 +17,7 @@ from rover_physics.rover.manipulator import (
 )
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.reach import judge_reach
 from support.rough_grounds import plane, smooth
 from support.rover_geometry import attitude_of
@@ -96,7 +96,7 @@ def test_solutions_keep_the_joint_limits(x, y, z):
 def test_an_angle_beyond_its_joint_limits_is_refused_by_name():
     assert arm_angles(LIMITED, {"arm_shoulder": 1.0})[1] == 1.0
     with pytest.raises(ModelError, match=r"arm_shoulder.* 1\.1; it must be within -1 to 1 rad"):
-        sweep_path(limited(), LEVEL, [POSE], SweepOptions(joint_angles={"arm_shoulder": 1.1}))
+        judge_path(limited(), LEVEL, [POSE], SweepOptions(joint_angles={"arm_shoulder": 1.1}))[0]
 
 
 # The query
@@ -106,7 +106,7 @@ def test_an_angle_beyond_its_joint_limits_is_refused_by_name():
 @given(st.integers(0, 1000), st.floats(-3.0, 3.0), st.floats(0.1, 0.5), st.floats(-1.0, 1.0))
 def test_the_tip_is_at_the_target_in_the_map_frame(seed, yaw, away, side):
     ground = smooth(seed)
-    standing = sweep_path(LSR1, ground, [[0.1, 0.0, yaw]])
+    standing = judge_path(LSR1, ground, [[0.1, 0.0, yaw]])[0]
     R, origin = attitude_of(standing, 0), standing.position[0]
     target = origin + R @ [0.3 + away * np.cos(side), away * np.sin(side), 0.2]
     answer = judge_reach(LSR1, ground, [0.1, 0.0, yaw], target)
@@ -138,7 +138,7 @@ def test_of_two_ways_the_safer_one_is_chosen():
     margins = []
     for angles in inverse_kinematics(ARM, answer.target):
         joints = dict(zip(ARM.joints, angles, strict=True))
-        held = sweep_path(LSR1, LEVEL, [POSE], SweepOptions(joint_angles=joints, payload=0.5))
+        held = judge_path(LSR1, LEVEL, [POSE], SweepOptions(joint_angles=joints, payload=0.5))[0]
         margins.append(held.tip_over_ratio[0])
     assert margins[0] != margins[1]
     assert answer.prediction.tip_over_ratio[0] == pytest.approx(max(margins))

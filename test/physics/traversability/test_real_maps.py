@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import quarter_turn
 
@@ -35,7 +35,9 @@ def straight(start, end, spacing=0.02) -> np.ndarray:
 
 
 def verdict_of(ground, start, end, rover=LSR1, **arguments):
-    return judge(rover, sweep_path(rover, ground, straight(start, end), SweepOptions(**arguments)))
+    return hold_against_limits(
+        rover, judge_path(rover, ground, straight(start, end), SweepOptions(**arguments))[0]
+    )
 
 
 # The Mars Yard
@@ -108,13 +110,13 @@ def test_nearly_every_pose_of_the_mars_yard_settles(mars_yard):
     xmin, xmax, ymin, ymax = mars_yard.bounds
     places = rng.uniform([xmin + 1, ymin + 1], [xmax - 1, ymax - 1], (3000, 2))
     poses = np.column_stack([places, rng.uniform(-np.pi, np.pi, 3000)])
-    assert sweep_path(LSR1, mars_yard, poses).settled.mean() >= 0.999
+    assert judge_path(LSR1, mars_yard, poses)[0].settled.mean() >= 0.999
 
 
 def test_a_quarter_turn_of_the_mars_yard_changes_no_verdict(mars_yard):
     for start, end in [((12, 4), (12, 14)), ((0, 3), (4, 3)), ((18, 2), (25, 2))]:
         ground, poses = quarter_turn(mars_yard, straight(start, end))
-        turned = judge(LSR1, sweep_path(LSR1, ground, poses))
+        turned = hold_against_limits(LSR1, judge_path(LSR1, ground, poses)[0])
         assert turned.code == verdict_of(mars_yard, start, end).code
 
 

@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import (
     PASSED,
@@ -33,8 +33,8 @@ def curves() -> list:
     judged = []
     for curve in read_curves():
         rover, ground = curve_rover(curve), curve_ground(curve.kind, curve.size)
-        prediction = sweep_path(rover, ground, curve_path(curve), curve_options(curve))
-        judged.append((curve, judge(rover, prediction)))
+        prediction = judge_path(rover, ground, curve_path(curve), curve_options(curve))[0]
+        judged.append((curve, hold_against_limits(rover, prediction)))
     return judged
 
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_cases import reference_ground
@@ -67,7 +67,7 @@ def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: 
 def test_ranges_lie_between_those_of_linear_programs(ground, poses, friction, max_torque, shared):
     options = SweepOptions(friction=friction, max_torque=max_torque)
     ranges = find_torque_ranges(LSR1, ground, poses, options)
-    optimal = sweep_path(LSR1, ground, poses, replace(options, policy="optimal"))
+    optimal = judge_path(LSR1, ground, poses, replace(options, policy="optimal"))[0]
     compared, slack = 0, 1e-5 * max_torque
     for i in np.flatnonzero(ranges.feasible):
         if has_equal_shares(optimal, i) != shared:
@@ -91,7 +91,7 @@ def has_equal_shares(prediction, i) -> bool:
 def test_a_general_solver_finds_no_torque_beyond_the_range():
     ground, pose = plane(0.3, 0.15), [[0.0, 0.0, 0.4]]
     ranges = find_torque_ranges(LSR1, ground, pose)
-    optimal = sweep_path(LSR1, ground, pose, SweepOptions(policy="optimal"))
+    optimal = judge_path(LSR1, ground, pose, SweepOptions(policy="optimal"))[0]
     A, b, along = balance_matrix(LSR1, optimal, 0)
     start = np.concatenate([optimal.wheel_loads[0], optimal.tangential[0]]) / LSR1.weight
     slope, middle = np.polyfit(along, optimal.lateral[0] / LSR1.weight, 1)
@@ -125,8 +125,8 @@ def test_torques_that_a_policy_uses_are_within_the_ranges(seed, yaw):
     ground, pose = smooth(seed), [[0.1, 0.2, yaw]]
     ranges = find_torque_ranges(LSR1, ground, pose)
     for policy in ("equal", "optimal"):
-        prediction = sweep_path(LSR1, ground, pose, SweepOptions(policy=policy))
-        if judge(LSR1, prediction).code not in ("", "belly", "tilt"):
+        prediction = judge_path(LSR1, ground, pose, SweepOptions(policy=policy))[0]
+        if hold_against_limits(LSR1, prediction).code not in ("", "belly", "tilt"):
             continue
         assert ranges.feasible[0]
         assert (prediction.torque >= ranges.lowest - 1e-4).all()
@@ -170,7 +170,7 @@ def test_mirrored_ground_swaps_the_ranges_of_right_and_left():
 def test_at_the_foot_of_a_step_ranges_hold_what_optimal_torques_use():
     case = reference_ground("settled_a/step")
     ranges = find_torque_ranges(LSR1, case.terrain, case.poses)
-    optimal = sweep_path(LSR1, case.terrain, case.poses, SweepOptions(policy="optimal"))
+    optimal = judge_path(LSR1, case.terrain, case.poses, SweepOptions(policy="optimal"))[0]
     for i in range(len(case.poses)):
         within = optimal.friction_utilisation[i].max() < 1.0
         within &= optimal.torque_saturation[i].max() < 1.0
@@ -184,7 +184,9 @@ def test_on_sand_the_ranges_are_narrower_and_hold_the_torques_used():
     ground, pose = plane(0.1, 0.0), [[0.0, 0.0, 0.0]]
     firm = find_torque_ranges(LSR1, ground, pose)
     sand = find_torque_ranges(LSR1, ground, pose, SweepOptions(soil="dry_sand"))
-    used = sweep_path(LSR1, ground, pose, SweepOptions(soil="dry_sand", policy="optimal")).torque
+    used = judge_path(LSR1, ground, pose, SweepOptions(soil="dry_sand", policy="optimal"))[
+        0
+    ].torque
     assert (sand.highest - sand.lowest < firm.highest - firm.lowest).all()
     assert (sand.lowest <= used).all()
     assert (used <= sand.highest).all()

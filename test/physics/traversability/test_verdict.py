@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from rover_physics.numerics.interruption import interruptible
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import tilt_of
+from rover_physics.results.record import numbers_of
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.limit_checks import tilt_of
-from rover_physics.traversability.verdict import CODES, judge
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import codes_of_verdicts, hold_against_limits
 from support.rough_grounds import plane
 
 LSR1 = load_rover("lsr1")
@@ -22,33 +23,26 @@ POSES = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
 @pytest.fixture(scope="module")
 def fine():
     """Return the prediction of a path over level ground, on which nothing is broken."""
-    return sweep_path(LSR1, plane(0.0, 0.0), POSES)
+    return judge_path(LSR1, plane(0.0, 0.0), POSES)[0]
 
 
 def with_value(prediction, name, row, value, column=()):
     """Return the prediction with one number changed."""
     values = getattr(prediction, name).copy()
     values[(row, *column)] = value
-    return replace(prediction, **{name: values})
+    return prediction.change(**{name: values})
 
 
 def with_status(prediction, row, status):
     """Return the prediction as if one waypoint had not settled."""
-    changes = {}
-    for name, values in vars(prediction).items():
-        if isinstance(values, np.ndarray) and values.dtype == float and name not in (
-            "poses", "distance"
-        ):  # fmt: skip
-            changes[name] = values.copy()
-            changes[name][row] = np.nan
-    changes["status"] = prediction.status.copy()
-    changes["status"][row] = status
-    changes["settled"] = changes["status"] == 0
-    return replace(prediction, **changes)
+    results = prediction.results.copy()
+    numbers_of(results)[row] = np.nan
+    results["status"][row] = status
+    return replace(prediction, results=results)
 
 
 def test_a_path_over_level_ground_is_traversable(fine):
-    verdict = judge(LSR1, fine)
+    verdict = hold_against_limits(LSR1, fine)
     assert verdict.traversable
     assert verdict.first_failure == -1
     assert (verdict.code, verdict.reason) == ("", "")
@@ -74,7 +68,7 @@ def test_a_path_over_level_ground_is_traversable(fine):
     ],
 )
 def test_a_broken_limit_is_told_at_its_waypoint(fine, code, name, column, value, words):
-    verdict = judge(LSR1, with_value(fine, name, 3, value, column))
+    verdict = hold_against_limits(LSR1, with_value(fine, name, 3, value, column))
     assert not verdict.traversable
     assert verdict.first_failure == 3
     assert verdict.codes == ("", "", "", code, "")
@@ -98,13 +92,13 @@ def test_a_broken_limit_is_told_at_its_waypoint(fine, code, name, column, value,
     ],
 )
 def test_a_value_at_its_limit_is_allowed(fine, name, column, value):
-    assert judge(LSR1, with_value(fine, name, 2, value, column)).traversable
+    assert hold_against_limits(LSR1, with_value(fine, name, 2, value, column)).traversable
 
 
 def test_the_limits_are_those_of_the_rover(fine):
     shy = replace(LSR1, limits=replace(LSR1.limits, belly_clearance=0.25))
-    assert judge(LSR1, fine).traversable
-    assert judge(shy, fine).code == "belly"
+    assert hold_against_limits(LSR1, fine).traversable
+    assert hold_against_limits(shy, fine).code == "belly"
 
 
 @pytest.mark.parametrize(
@@ -117,7 +111,7 @@ def test_the_limits_are_those_of_the_rover(fine):
     ],
 )
 def test_a_waypoint_without_a_pose_is_told_by_its_cause(fine, status, code, word):
-    verdict = judge(LSR1, with_status(fine, 1, status))
+    verdict = hold_against_limits(LSR1, with_status(fine, 1, status))
     assert not verdict.traversable
     assert (verdict.first_failure, verdict.code) == (1, code)
     assert word in verdict.reason
@@ -126,7 +120,7 @@ def test_a_waypoint_without_a_pose_is_told_by_its_cause(fine, status, code, word
 def test_the_first_failure_along_the_path_is_the_reason(fine):
     broken = with_value(fine, "belly_clearance", 1, 0.0)
     broken = with_value(broken, "tip_over_ratio", 4, 0.0)
-    verdict = judge(LSR1, broken)
+    verdict = hold_against_limits(LSR1, broken)
     assert (verdict.first_failure, verdict.code) == (1, "belly")
     assert verdict.codes == ("", "belly", "", "", "tip_over")
 
@@ -135,14 +129,18 @@ def test_of_several_limits_at_one_waypoint_the_first_of_the_codes_is_told(fine):
     broken = with_value(fine, "belly_clearance", 2, 0.0)
     broken = with_value(broken, "friction_utilisation", 2, 3.0, (0,))
     broken = with_value(broken, "tip_over_ratio", 2, 0.1)
-    assert judge(LSR1, broken).code == "tip_over"
-    assert CODES.index("tip_over") < CODES.index("friction") < CODES.index("belly")
+    assert hold_against_limits(LSR1, broken).code == "tip_over"
+    assert (
+        codes_of_verdicts().index("tip_over")
+        < codes_of_verdicts().index("friction")
+        < codes_of_verdicts().index("belly")
+    )
 
 
 def test_a_wheel_that_lifts_is_told_as_lifting_not_as_slipping(fine):
     lifted = with_value(fine, "wheel_loads", 0, -1.0, (0,))
     lifted = with_value(lifted, "friction_utilisation", 0, np.inf, (0,))
-    assert judge(LSR1, lifted).code == "wheel_lift"
+    assert hold_against_limits(LSR1, lifted).code == "wheel_lift"
 
 
 def test_margins_are_the_worst_along_the_settled_part(fine):
@@ -151,7 +149,7 @@ def test_margins_are_the_worst_along_the_settled_part(fine):
     changed = with_value(changed, "torque_saturation", 2, 0.6, (1,))
     changed = with_value(changed, "belly_clearance", 0, 0.05)
     changed = with_value(changed, "pitch", 4, -0.2)
-    verdict = judge(LSR1, changed)
+    verdict = hold_against_limits(LSR1, changed)
     assert verdict.min_tip_over_ratio == 0.7
     assert verdict.max_friction_utilisation == 0.4
     assert verdict.max_torque_saturation == 0.6
@@ -160,22 +158,21 @@ def test_margins_are_the_worst_along_the_settled_part(fine):
 
 
 def test_margins_of_a_path_that_settles_nowhere_are_nan():
-    nowhere = sweep_path(LSR1, plane(0.0, 0.0), POSES + np.array([50.0, 0.0, 0.0]))
-    verdict = judge(LSR1, nowhere)
+    nowhere = judge_path(LSR1, plane(0.0, 0.0), POSES + np.array([50.0, 0.0, 0.0]))[0]
+    verdict = hold_against_limits(LSR1, nowhere)
     assert (verdict.code, verdict.first_failure) == ("off_map", 0)
     assert np.isnan(verdict.min_tip_over_ratio)
     assert np.isnan(verdict.min_belly_clearance)
 
 
 def test_tilt_joins_roll_and_pitch(fine):
-    tilted = with_value(with_value(fine, "roll", 0, 0.3), "pitch", 0, 0.4)
-    assert tilt_of(tilted)[0] == pytest.approx(np.arccos(np.cos(0.3) * np.cos(0.4)))
-    assert tilt_of(tilted)[1] == pytest.approx(0.0, abs=1e-6)
+    assert tilt_of(0.3, 0.4) == pytest.approx(np.arccos(np.cos(0.3) * np.cos(0.4)))
+    assert fine.tilt == pytest.approx(tilt_of(fine.roll, fine.pitch), abs=1e-6)
 
 
 def test_a_verdict_is_json_with_none_for_what_is_not_finite(fine):
     broken = with_value(fine, "friction_utilisation", 2, np.inf, (3,))
-    report = judge(LSR1, broken).to_dict()
+    report = hold_against_limits(LSR1, broken).to_dict()
     back = json.loads(json.dumps(report, allow_nan=False))
     assert back == report
     assert back["code"] == "friction"
@@ -196,8 +193,10 @@ def test_a_verdict_is_json_with_none_for_what_is_not_finite(fine):
     ],
 )
 def test_slopes_are_refused_for_the_physical_reason(slope, yaw, arguments, code):
-    prediction = sweep_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], SweepOptions(**arguments))
-    assert judge(LSR1, prediction).code == code
+    prediction = judge_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], SweepOptions(**arguments))[
+        0
+    ]
+    assert hold_against_limits(LSR1, prediction).code == code
 
 
 def test_a_stone_higher_than_the_belly_is_refused():
@@ -205,13 +204,13 @@ def test_a_stone_higher_than_the_belly_is_refused():
     heights = level.elevation.copy()
     heights[30, 30] = 0.235
     ground = replace(level, elevation=heights)
-    prediction = sweep_path(LSR1, ground, [[0.0, 0.0, 0.0]])
-    assert judge(LSR1, prediction).code == "belly"
+    prediction = judge_path(LSR1, ground, [[0.0, 0.0, 0.0]])[0]
+    assert hold_against_limits(LSR1, prediction).code == "belly"
 
 
 def test_the_reasons_of_many_waypoints_can_be_interrupted(fine):
-    broken = replace(fine, rocker_angle=np.full_like(fine.rocker_angle, 3.0))
+    broken = fine.change(rocker_angle=np.full_like(fine.rocker_angle, 3.0))
     checks = []
     with interruptible(lambda: checks.append(1)):
-        judge(LSR1, broken)
+        hold_against_limits(LSR1, broken)
     assert len(checks) >= len(POSES)

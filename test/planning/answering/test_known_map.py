@@ -43,10 +43,10 @@ def test_old_maps_and_maps_from_the_future_are_told_apart():
 
 
 def test_a_stale_map_is_refused_and_the_same_map_again_is_not():
-    settings = load_service_settings(TraverseServerParameters(max_map_age=0.5))
+    settings = load_service_settings(TraverseServerParameters(max_map_age=0.2))
     service = TraverseService(settings)
     assert service.take_terrain(make_terrain(waves))
-    time.sleep(0.7)
+    time.sleep(0.3)
     assert service.answer((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).code == "stale_map"
 
     def is_answered_after_it_came_again() -> bool:

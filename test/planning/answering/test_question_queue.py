@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rover_physics.numerics.interruption import check_interruption
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.answering.budget import (
     BUSY,
     CANCELLED,
@@ -114,7 +114,7 @@ def test_work_beyond_the_budget_is_too_long(desk):
 def test_a_sweep_stops_at_the_deadline_of_its_question(desk):
     rover, ground = load_rover("lsr1"), make_terrain(waves)
     poses = np.zeros((2_000_000, 3))
-    desk.work("sweep", lambda _: sweep_path(rover, ground, poses), seconds=0.3)
+    desk.work("sweep", lambda _: judge_path(rover, ground, poses)[0], seconds=0.3)
     assert desk.wait(1) == [("sweep", TOO_LONG)]
 
 

@@ -1,19 +1,14 @@
 """The service knows a map, a path and joint angles, and answers from them without ROS."""
 
 import math
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import rover_planner.planning.answering.traverse_service as traverse_service_module
-from rover_physics.errors import RoverFileError
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.grid import load_terrain
 from rover_planner.errors import PlanningError
-from rover_planner.parameters.table import ParameterError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.service_settings import load_service_settings
@@ -31,37 +26,6 @@ def make_service(terrain=None, **parameters):
     if terrain is not None:
         service.take_terrain(terrain)
     return service
-
-
-def test_the_module_imports_no_ros():
-    assert "rclpy" not in Path(traverse_service_module.__file__).read_text()
-
-
-def test_zero_takes_the_rovers_own_friction_and_torque():
-    query = load().query
-    assert query.friction is None and query.max_torque is None
-    query = load(friction=0.4, max_torque=1.5).query
-    assert query.friction == 0.4 and query.max_torque == 1.5
-
-
-def test_a_rover_that_cannot_be_loaded_is_an_error():
-    with pytest.raises(RoverFileError):
-        load(rover="lsr9")
-
-
-@pytest.mark.parametrize("payload", [-0.5, -2.0])
-def test_a_payload_below_0_is_refused(payload):
-    with pytest.raises(ParameterError, match="payload is -"):
-        load(payload=payload)
-
-
-def test_settings_change_the_answer():
-    service = make_service(make_terrain(waves))
-    start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
-    assert service.answer(start, goal).traversable
-    service.settings = load(friction=0.01)
-    refused = service.answer(start, goal)
-    assert not refused.traversable and refused.code == "friction"
 
 
 def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
@@ -96,12 +60,6 @@ def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     assert np.isnan(service.terrain.elevation[80, 80])
 
 
-def test_the_exact_goal_is_preferred_to_its_neighbours():
-    service = make_service(make_terrain(waves))
-    search = service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=1.0).search
-    assert search.goal_offset == 0.0 and search.alternatives_tried == 0
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.05, 0.3, 0.9])
 def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
@@ -112,29 +70,6 @@ def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
         end = judgement.candidate.poses[-1]
         assert np.hypot(*(end - goal)[:2]) <= tolerance and end[2] == 0.0
     assert judgement.traversable == (tolerance == 0.9)
-
-
-@pytest.mark.slow
-def test_the_nearest_ring_that_can_be_reached_is_taken():
-    wall = make_terrain(wall_at(2.0))
-    offset = (
-        make_service(wall)
-        .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=0.6)
-        .search.goal_offset
-    )
-    wide = (
-        make_service(wall)
-        .answer((-2.0, 0.0, 0.0), (1.9, 0.0, 0.0), tolerance=3.0)
-        .search.goal_offset
-    )
-    assert 0.3 < offset <= 0.6 and offset <= wide <= 1.0
-
-
-def test_where_the_start_fails_no_other_goal_is_tried():
-    service = make_service(make_terrain(waves))
-    report = service.answer((-9.0, 0.0, 0.0), (2.0, 0.0, 0.0), tolerance=0.5).report
-    assert report.code == "off_map" and report.search.alternative_goals_tried == 0
-    assert report.first_failure == 0
 
 
 @pytest.mark.parametrize("tolerance", [-0.1, math.nan, math.inf])
@@ -151,13 +86,6 @@ def test_a_refused_path_is_forgotten():
     judgement = service.check_last_path()
     assert judgement.code == "no_path"
     assert judgement.reason == "the last path was refused: bad quaternion"
-
-
-def test_a_pose_alone_is_a_path():
-    service = make_service(make_terrain(waves))
-    service.take_path(np.array([[0.5, 0.2, 1.0]]))
-    report = service.check_last_path().report
-    assert report.traversable and report.path.waypoints == 1 and report.path.length == 0.0
 
 
 def test_the_measured_suspension_is_compared_with_the_predicted_one():
@@ -205,58 +133,6 @@ def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     assert moved[:, [2, 5]].sum() > stowed[:, [2, 5]].sum()
 
 
-def test_a_rover_without_an_arm_wants_no_arm_joints():
-    assert make_service(rover="m2020").joint_names == SUSPENSION_JOINTS
-
-
-def test_terrain_and_request_turned_together_give_the_same_answer():
-    terrain = make_terrain(rocky)
-    turned = Terrain(np.ascontiguousarray(terrain.elevation.T[:, ::-1]), 0.05, terrain.origin)
-    start, goal = np.array([-2.0, 0.1, 0.1]), np.array([2.0, 0.0, -0.1])
-
-    def turn(pose):
-        return np.array([-pose[1], pose[0], pose[2] + math.pi / 2])
-
-    straight = make_service(terrain).answer(start, goal)
-    sideways = make_service(turned).answer(turn(start), turn(goal))
-    found, expected = sideways.report.to_dict(), straight.report.to_dict()
-    assert found["chosen_candidate"] == expected["chosen_candidate"]
-    for name in ("energy", "min_tip_over_ratio", "max_friction_utilisation"):
-        assert found[name] == pytest.approx(expected[name], abs=1e-6)
-    np.testing.assert_allclose(
-        sideways.candidate.prediction.wheel_loads,
-        straight.candidate.prediction.wheel_loads,
-        atol=1e-5,
-    )
-
-
-@pytest.mark.parametrize(("ground", "opening"), [(rocky, "chose"), (wall_at(0.5), "number")])
-def test_candidates_are_counted_from_one_in_words_and_numbers(ground, opening):
-    service = make_service(make_terrain(ground))
-    search = service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)).report.search
-    assert 1 <= search.chosen_candidate <= search.candidates
-    found = re.search(rf"\b{opening} (\d+)", search.explanation)
-    assert found is not None, search.explanation
-    assert int(found[1]) == search.chosen_candidate
-
-
-def test_mirrored_terrain_and_request_swap_right_and_left():
-    terrain = make_terrain(rocky)
-    mirrored = Terrain(np.ascontiguousarray(terrain.elevation[::-1]), 0.05, terrain.origin)
-    poses = np.array([[-2.0, 0.1, 0.1], [2.0, 0.3, 0.1]])
-
-    def loads(ground, path):
-        service = make_service(ground)
-        service.take_path(path)
-        return service.check_last_path().candidate.prediction.wheel_loads
-
-    np.testing.assert_allclose(
-        loads(mirrored, poses * [1, -1, -1])[:, [3, 4, 5, 0, 1, 2]],
-        loads(terrain, poses),
-        atol=1e-5,
-    )
-
-
 def test_densify_keeps_the_given_poses_and_the_spacing():
     poses = np.array([[0.0, 0.0, 3.0], [0.1, 0.0, -3.0], [0.1, 0.0, 0.0], [0.1, 0.05, 0.0]])
     dense = densify(poses, 0.02)
@@ -271,43 +147,6 @@ def test_densify_keeps_the_given_poses_and_the_spacing():
 def test_densify_refuses_an_endless_path():
     with pytest.raises(PlanningError, match="more than 100000 waypoints"):
         densify(np.array([[0.0, 0.0, 0.0], [1e300, 0.0, 0.0]]), 0.02)
-
-
-PHYSICAL = {
-    "tilt",
-    "tip_over",
-    "wheel_lift",
-    "friction",
-    "torque",
-    "belly",
-    "suspension",
-    "wheel_drop",
-    "not_settled",
-    "no_equilibrium",
-}
-
-
-@pytest.mark.parametrize(
-    ("start", "goal", "codes"),
-    [
-        ((-4.0, 0.0, 0.0), (6.0, 1.0, 0.0), {""}),
-        ((-4.0, 8.0, 0.0), (2.0, 8.0, 0.0), {""}),
-        ((-3.5, -7.0, 0.0), (3.0, -7.0, 0.0), PHYSICAL),
-        ((4.0, 4.0, 0.8), (15.0, 12.0, 0.8), PHYSICAL),
-        ((18.0, 0.0, 0.0), (24.0, 0.0, 0.0), {"off_map"}),
-    ],
-    ids=["plain", "another plain", "crater rim", "hill", "off the map"],
-)
-def test_the_real_yard_is_passed_on_its_plain_and_refused_for_what_is_there(
-    real_map,
-    start,
-    goal,
-    codes,
-):
-    service = make_service(real_map("erc_marsyard2021_9cm"), planner="fan")
-    judgement = service.answer(start, goal)
-    assert judgement.code in codes, judgement.reason
-    assert judgement.traversable == (not judgement.reason) == (codes == {""})
 
 
 def test_the_real_martian_ground_is_passed_where_it_is_known():

@@ -62,12 +62,6 @@ def test_all_keys_are_there_once_where_all_can_be_said(identified):
     assert list(identified.to_dict()) == KEYS
 
 
-def test_numbers_of_questions_rise_and_a_restart_shows():
-    register = Register()
-    numbers = [register.next_number() for _ in range(5)]
-    assert numbers == sorted(set(numbers)) and register.server != Register().server
-
-
 def test_verdict_code_and_reason_come_first_and_the_long_lists_last(full):
     told = list(json.loads(json.dumps(full.report.to_dict())))
     assert told[:3] == ["traversable", "code", "reason"]

@@ -7,8 +7,7 @@ from scipy.sparse.csgraph import dijkstra
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.planning.lattice.difficulty import Difficulty
 from rover_planner.planning.lattice.edges import FAILS, PASSES, Edges, JudgedEdges
-from rover_planner.planning.lattice.graph import Seeds, ToGoal, edge_cost, measure_to_goal
-from rover_planner.planning.lattice.graph import _bound_to_goal as bound_to_goal
+from rover_planner.planning.lattice.graph import Seeds, edge_cost
 from rover_planner.planning.lattice.nodes import nodes_within
 from rover_planner.planning.lattice.primitives import make_primitives
 from rover_planner.planning.lattice.shortest import ShortestPaths
@@ -83,20 +82,6 @@ def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
             np.testing.assert_array_equal(ends[:-1], firsts[1:])
             assert firsts[0] == starts.nodes[route.start] and ends[-1] == goals.nodes[route.goal]
     assert found > 10
-
-
-def test_bounds_to_the_goal_are_never_above_the_costs():
-    known, *estimates = random_knowledge(3)
-    free = np.flatnonzero(known.standing == 0)
-    starts, goals = Seeds(free[[5]], np.zeros(1)), Seeds(free[[-7]], np.zeros(1))
-    graph = ShortestPaths(known, *estimates, starts).graph(1.0)
-    focus, reach = EDGES.nodes.surround(starts.nodes)
-    to_goal = ToGoal(np.empty(EDGES.nodes.count), focus, reach, EDGES.nodes.cell)
-    limit, _ = measure_to_goal(graph, goals, starts, 1.1, to_goal)
-    costs = dijkstra(explicit_costs(known, graph).T.tocsr(), indices=goals.nodes)[0]
-    for node in free:
-        bound = bound_to_goal(to_goal, limit, EDGES.nodes.shape[1], node)
-        assert bound <= costs[node] + 1e-5
 
 
 def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():

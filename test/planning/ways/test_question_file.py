@@ -20,7 +20,7 @@ SETTINGS = LatticeSettings(budget=3.5, cell=0.25)
 
 @pytest.fixture
 def written(tmp_path):
-    options = PathQueryOptions(policy="servo", friction=0.6, payload=0.5)
+    options = PathQueryOptions().change(policy="servo", friction=0.6, payload=0.5)
     question = WayQuestion(
         load_rover("lsr1"), make_terrain(waves), (-1.0, 0.5, 0.2), (1.0, 0.0, 3.0), options
     )

@@ -16,7 +16,6 @@ from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.browser import Visitor, needs_browser, wait_until
-from support.viewer.visits import open_browser
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -41,9 +40,10 @@ def page(ros):
 
 
 @pytest.fixture
-def visitor(page):
-    with open_browser() as chromium:
-        yield Visitor(chromium, page.url)
+def visitor(page, browser):
+    opened = Visitor(browser, page.url)
+    yield opened
+    opened.tab.close()
 
 
 def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, visitor, tmp_path):

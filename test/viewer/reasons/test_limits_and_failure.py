@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from rover_physics.names import OPTIMAL, SERVO, WHEELS
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
@@ -19,17 +17,11 @@ from rover_planner.viewer.state.reasons.before_after import (
 )
 from rover_planner.viewer.state.reasons.candidate_rows import list_candidates, place_numbers
 from rover_planner.viewer.state.reasons.explanation import explain
-from rover_planner.viewer.state.reasons.failure import Failure, find_failure, place_wheels
-from rover_planner.viewer.state.reasons.path_limits import (
-    PathLimits,
-    Use,
-    along_rows,
-    find_path_limits,
-)
+from rover_planner.viewer.state.reasons.path_limits import Use
 from rover_planner.viewer.state.reasons.worst import find_worst
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, ramp, session_on, straight
+from support.viewer.sessions import LSR1, ramp, session_on
 
 
 def stepped(x, y):
@@ -37,30 +29,21 @@ def stepped(x, y):
     return waves(x, y) + 0.05 * (x > 0.3)
 
 
-def judged_on(height, rover=LSR1, poses=None, **options):
-    """Return the prediction and the verdict on a straight path over a ground."""
-    terrain = make_terrain(height)
-    poses = straight() if poses is None else poses
-    return judge_path(rover, terrain, poses, SweepOptions(**options))
-
-
-def limits_on(height, **options) -> PathLimits:
-    return find_path_limits(LSR1, *judged_on(height, **options))
-
-
-def failure_on(height, poses=None, **options) -> Failure | None:
-    prediction, verdict = judged_on(height, poses=poses, **options)
-    limits = find_path_limits(LSR1, prediction, verdict)
-    return find_failure(LSR1, make_terrain(height), prediction, verdict, limits)
+def why_on(height, **options):
+    """Return prediction, verdict and explanation of a straight path of 2 m over a ground."""
+    options = PathQueryOptions(count=1, **options)
+    ends = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+    session = ViewSession(LSR1, make_terrain(height), *ends, options)
+    shown = session.shown
+    return shown.candidate.prediction, shown.verdict, explain(session.finished)
 
 
 # Limits along a path.
 
 
 def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
-    prediction, verdict = judged_on(waves)
-    limits = find_path_limits(LSR1, prediction, verdict)
-    at = ~limits.rows.is_between
+    prediction, _, why = why_on(waves)
+    limits, at = why.limits, ~why.limits.rows.is_between
     np.testing.assert_array_equal(
         limits.lane("friction").values[at], prediction.friction_utilisation.max(axis=1)
     )
@@ -70,45 +53,44 @@ def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
 
 
 def test_rows_are_in_the_order_of_the_path_with_the_poses_between_in_their_places():
-    prediction, verdict = judged_on(stepped)
-    rows = find_path_limits(LSR1, prediction, verdict).rows
+    _, _, why = why_on(stepped)
+    rows = why.limits.rows
     assert rows.is_between.any()
     assert (np.diff(rows.distance) >= 0.0).all() and (np.diff(rows.time) >= 0.0).all()
-    between = prediction.between
-    for k in np.flatnonzero(rows.is_between):
-        start = prediction.poses[0, :2]
-        driven = np.linalg.norm(between.poses[rows.row[k], :2] - start)
-        assert rows.distance[k] == pytest.approx(driven, abs=1e-3)
 
 
 @pytest.mark.parametrize("policy", ["equal", OPTIMAL, SERVO])
 @pytest.mark.parametrize("height", [waves, ramp, stepped, wall_at(0.5), gap])
 def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(height, policy):
-    prediction, verdict = judged_on(height, policy=policy, friction=0.5)
-    limits = find_path_limits(LSR1, prediction, verdict)
+    _, verdict, why = why_on(height, policy=policy, friction=0.5)
+    limits, failure = why.limits, why.failure
     broken = np.any([lane.use == Use.BROKEN for lane in limits.lanes], axis=0)
     refused = set(np.unique(limits.rows.waypoint[broken]).tolist())
     first = verdict.first_failure
     assert refused == ({first} if first >= 0 else set())
+    assert (failure is None) == verdict.traversable
+    if failure is not None:
+        assert failure.code == verdict.code and failure.headline
+        assert np.isfinite(failure.state.position).all()
+        assert failure.is_settled == (failure.code != "unknown_ground")
 
 
 def test_a_limit_is_used_by_its_share_and_fully_where_it_is_broken():
-    limits = limits_on(wall_at(0.5))
-    for lane in limits.lanes:
+    _, _, why = why_on(wall_at(0.5))
+    for lane in why.limits.lanes:
         used = lane.used[(lane.use == Use.KEPT) & ~np.isnan(lane.used)]
         assert (used <= 1.0 + 1e-6).all(), lane.limit.title
-    friction = limits.lane("friction")
+    friction = why.limits.lane("friction")
     known = ~np.isnan(friction.values)
     np.testing.assert_allclose(friction.used[known], friction.values[known] / friction.limit.bound)
 
 
 def test_the_worst_so_far_grows_and_ends_with_the_extremes_of_the_verdict():
-    prediction, verdict = judged_on(waves)
-    limits = find_path_limits(LSR1, prediction, verdict)
+    prediction, verdict, why = why_on(waves)
     times = np.linspace(0.0, prediction.time[-1], 7)
-    used = np.array([[one.used for one in find_worst(limits, time)] for time in times])
+    used = np.array([[one.used for one in find_worst(why.limits, time)] for time in times])
     assert (np.diff(used, axis=0) >= 0.0).all()
-    last = {one.title: one for one in find_worst(limits, prediction.time[-1])}
+    last = {one.title: one for one in find_worst(why.limits, prediction.time[-1])}
     assert last["friction"].value == f"{verdict.max_friction_utilisation:.2f}"
     assert last["margin"].value == f"{verdict.min_tip_over_ratio:.2f}"
     assert last["tilt"].value == f"{np.degrees(verdict.max_tilt):.1f}"
@@ -117,43 +99,41 @@ def test_the_worst_so_far_grows_and_ends_with_the_extremes_of_the_verdict():
 # The failure.
 
 
-def test_a_path_that_can_be_driven_has_no_failure():
-    assert failure_on(waves) is None
-
-
 def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
-    failure = failure_on(ramp, friction=0.3)
-    prediction, verdict = judged_on(ramp, friction=0.3)
+    prediction, verdict, why = why_on(ramp, friction=0.3)
+    failure = why.failure
     assert failure is not None and failure.code == verdict.code == "friction"
     assert failure.link in WHEELS and failure.link in verdict.reason
     assert f"{failure.value:.2f}, limit 1.00" in verdict.reason
     assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
     row = verdict.first_failure
     assert failure.distance == pytest.approx(prediction.distance[row], abs=0.021)
+    assert why.failure_at == failure.distance <= why.limits.path_length
+    assert why.limits.end >= failure.distance
 
 
 def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():
-    prediction, verdict = judged_on(wall_at(0.5))
-    failure = failure_on(wall_at(0.5))
-    assert failure is not None
-    assert verdict.reason.startswith("on the way here") == failure.is_between
-    if failure.is_between:
-        first = verdict.first_failure
-        before, after = prediction.distance[first - 1 : first + 1]
-        assert before < failure.distance < after
-        rows = prediction.between.waypoint == first
-        assert any(
-            np.allclose(failure.state.position, place)
-            for place in prediction.between.position[rows]
-        )
+    prediction, verdict, why = why_on(stepped, friction=0.4)
+    failure = why.failure
+    assert failure is not None and failure.is_between
+    assert verdict.reason.startswith("on the way here")
+    first = verdict.first_failure
+    before, after = prediction.distance[first - 1 : first + 1]
+    assert before < failure.distance < after
+    places = prediction.between.position[prediction.between.waypoint == first]
+    assert np.isclose(places, failure.state.position).all(axis=1).any()
 
 
 def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
-    failure = failure_on(gap)
+    failure = why_on(gap)[2].failure
     assert failure is not None and failure.code == "unknown_ground"
     assert not failure.is_settled and failure.link.startswith("front")
     assert failure.headline.startswith("unknown ground, front")
     np.testing.assert_allclose(failure.state.attitude[:2], 0.0)
+    wheels = failure.state.wheel_centres - failure.state.position
+    prediction, _, _ = why_on(lambda x, y: 0.0 * x)
+    right = prediction.wheel_centres[0] - prediction.position[0]
+    np.testing.assert_allclose(np.abs(wheels), np.abs(right), atol=0.01)
 
 
 @pytest.mark.parametrize("start", [-1.0, 0.4])
@@ -167,25 +147,6 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     count = len(session.candidates)
     for row in list_candidates(session.candidates, 0, [False] * count):
         assert np.isfinite(row.energy)
-
-
-def test_wheels_on_flat_ground_are_where_the_prediction_has_them():
-    prediction, _ = judged_on(lambda x, y: 0.0 * x)
-    offsets = prediction.wheel_centres[0] - prediction.position[0]
-    np.testing.assert_allclose(place_wheels(LSR1), offsets, atol=1e-6)
-
-
-@pytest.mark.parametrize("policy", ["equal", OPTIMAL, SERVO])
-def test_every_refused_path_has_a_failure_with_words(policy):
-    for height in (ramp, wall_at(0.5), gap, lambda x, y: 0.9 * x, lambda x, y: 0.6 * y):
-        prediction, verdict = judged_on(height, policy=policy, friction=0.4)
-        failure = failure_on(height, policy=policy, friction=0.4)
-        assert (failure is None) == verdict.traversable
-        if failure is not None:
-            assert failure.headline and np.isfinite(failure.state.position).all()
-            assert failure.is_settled == (
-                prediction.status[verdict.first_failure] == PoseStatus.SETTLED
-            )
 
 
 # Candidates.
@@ -212,7 +173,7 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
     def slope_beyond(x, y):
         return gap(x, y) + 0.5 * np.maximum(x - 1.0, 0.0)
 
-    prediction, verdict = judged_on(slope_beyond, poses=poses)
+    prediction, verdict = judge_path(LSR1, make_terrain(slope_beyond), poses)
     assert verdict.max_tilt > 0.4
     session = ViewSession(
         LSR1, make_terrain(slope_beyond), session.start, session.goal, PathQueryOptions(count=1)
@@ -222,7 +183,7 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
     [candidate] = session.candidates
     assert candidate.verdict.code == "unknown_ground"
     before = prediction.cut(verdict.first_failure + 1)
-    assert candidate.verdict.max_tilt == judge(LSR1, before).max_tilt < 0.2
+    assert candidate.verdict.max_tilt == hold_against_limits(LSR1, before).max_tilt < 0.2
 
 
 def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():
@@ -327,26 +288,3 @@ def test_changed_numbers_and_differences_of_the_drive_are_those_of_the_rovers():
     assert friction.before == before.verdict.max_friction_utilisation
     assert friction.after == session.shown.verdict.max_friction_utilisation
     assert found["driven"].change < 0.0
-
-
-def test_the_explanation_of_a_judgement_has_limits_and_failure_of_its_shown_path():
-    session = session_on(ramp)
-    assert explain(session.finished).failure is None
-    changed(session, 0.4)
-    why = explain(session.finished)
-    assert why.failure is not None and why.failure.code == session.shown.verdict.code
-    assert why.failure_at == why.failure.distance <= why.limits.path_length
-    assert why.limits.end >= why.failure.distance
-
-
-def test_values_along_the_rows_have_the_peak_between_waypoints_for_which_a_path_is_refused():
-    prediction, verdict = judged_on(wall_at(0.5))
-    rows = find_path_limits(LSR1, prediction, verdict).rows
-    values = along_rows(rows, prediction, "friction_utilisation")
-    at, between = ~rows.is_between, rows.is_between
-    np.testing.assert_array_equal(
-        values[at], prediction.friction_utilisation[: verdict.first_failure + 1]
-    )
-    np.testing.assert_array_equal(
-        values[between], prediction.between.friction_utilisation[rows.row[between]]
-    )

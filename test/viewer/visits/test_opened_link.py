@@ -10,9 +10,8 @@ from rover_planner.viewer.browser.link import Link
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
-from support.viewer.browser import wait_until
-from support.viewer.sessions import LSR1
-from support.viewer.visits import wait_for_rest
+from support.viewer.sessions import LSR1, PATIENCE, ask, wait_for_rest
+from support.waiting import wait_until
 
 
 @pytest.fixture
@@ -24,23 +23,10 @@ def page() -> Iterator[Page]:
     served.close()
 
 
-def ask(page: Page, action) -> None:
-    """Let the page's own thread act, and wait until it has."""
-    done: list[bool] = []
-
-    def act() -> None:
-        try:
-            action()
-        finally:
-            done.append(True)
-
-    page.requests.add(act)
-    wait_until(lambda: done and not page._fulfils, "the action")
-
-
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
+        ({"ground": "00000000"}, "the link is about another map"),
         ({"policy": "magic"}, "no torque policy 'magic'; policies are equal, servo, optimal"),
         ({"soil": "mud"}, "no soil 'mud'; soils are "),
         ({"joints": {"wing": 1.0}}, "the link turns the joint 'wing', which lsr1 lacks"),
@@ -71,5 +57,5 @@ def test_path_and_time_of_a_link_to_fewer_paths_do_not_come_with_a_later_goal(pa
 def test_path_and_time_of_a_link_come_with_its_paths(page):
     link = replace(page.sharing.make_link(), goal=(1.0, 0.5, 0.1), path=4, time=20.0)
     ask(page, lambda: page.open_link(link))
-    wait_until(lambda: page.session.shown.index == 3, "the path")
-    wait_until(lambda: page.playback.time == 20.0, "the time")
+    wait_until(lambda: page.session.shown.index == 3, "the path", PATIENCE)
+    wait_until(lambda: page.playback.time == 20.0, "the time", PATIENCE)

@@ -79,18 +79,13 @@ def test_a_long_path_off_the_map_takes_no_time():
     assert 5.6 < path[share.first, 0] + 0.3 < 6.2 + 0.6
 
 
-def test_ground_beside_the_belly_does_not_count():
-    kinds = np.full((81, 161), SEEN, np.uint8)
-    kinds[46:] = UNSEEN  # y of 0.3 m and more; the belly ends at 0.2 m
-    assert SeenGround(ground(), kinds).share(LSR1, PATH).blind_share == 0.0
-    kinds[44:] = UNSEEN
-    assert SeenGround(ground(), kinds).share(LSR1, PATH).blind_share > 0.0
-
-
 def test_a_long_path_counts_each_cell_once():
     kinds = np.full((81, 161), SEEN, np.uint8)
     kinds[:, 60] = UNSEEN
     seen = SeenGround(ground(), kinds)
+    beside = np.full((81, 161), SEEN, np.uint8)
+    beside[46:] = UNSEEN  # y of 0.3 m and more; the belly ends at 0.2 m
+    assert SeenGround(ground(), beside).share(LSR1, PATH).blind_share == 0.0
     often = np.vstack([PATH] * 30)
     whole, once = seen.share(LSR1, often), seen.share(LSR1, PATH)
     assert whole.blind_share == once.blind_share > 0.0 and whole.first == once.first

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.prediction.sweep import sweep_path
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_path
 from rover_planner.worlds.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.worlds.maps.living_map import LivingMap
 from rover_planner.worlds.maps.sources import CONTACT, FOOTPRINT, LOADED
@@ -20,7 +20,7 @@ SLOPE = make_terrain(lambda x, y: 0.2 * x - 0.15 * y + 3.0)
 
 def standing_at(rover, terrain, pose):
     """Return what a rover that stands at a pose measures, from the model."""
-    there = sweep_path(rover, terrain, np.array([pose]))
+    there = judge_path(rover, terrain, np.array([pose]))[0]
     assert there.settled[0]
     angles = (*there.rocker_angle[0], *there.bogie_angle[0])
     return Standing(
@@ -70,7 +70,7 @@ def test_a_rover_on_ground_it_never_saw_settles_where_it_stands():
     ground = make_terrain(rocky)
     standing, true = standing_at(ROVERS["lsr1"], ground, (0.0, 0.0, 0.3))
     terrain = filled(ground).snapshot().terrain
-    there = sweep_path(ROVERS["lsr1"], terrain, np.array([(0.0, 0.0, 0.3)]))
+    there = judge_path(ROVERS["lsr1"], terrain, np.array([(0.0, 0.0, 0.3)]))[0]
     assert there.settled[0]
     np.testing.assert_allclose(there.position[0], true.position[0], atol=0.01)
     for name in ("roll", "pitch", "rocker_angle", "bogie_angle"):

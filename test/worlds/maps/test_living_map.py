@@ -38,6 +38,11 @@ def test_a_loaded_map_alone_is_the_terrain_itself():
     now = living.snapshot()
     assert now.terrain is PRIOR
     assert (now.sources.source == LOADED).all() and (now.sources.time == 5.0).all()
+    only = local_map((0.0, 0.0), 0.1)
+    living.replace(only, TOPIC, 1.0)
+    now = living.snapshot()
+    assert now.terrain is only and not living.has_loaded
+    assert UNKNOWN not in now.sources.source
 
 
 def test_a_loaded_map_survives_100_local_updates_to_the_bit():
@@ -55,16 +60,6 @@ def test_a_loaded_map_survives_100_local_updates_to_the_bit():
     assert merged.origin == PRIOR.origin and merged.resolution == PRIOR.resolution
     np.testing.assert_array_equal(merged.elevation, np.where(seen, 1.0, PRIOR.elevation))
     assert merged.elevation_std is None
-
-
-def test_each_cell_knows_its_source_and_time():
-    living = LivingMap()
-    living.load(PRIOR, 7.0)
-    living.merge(local_map((0.0, 0.0), 0.3), "elevation_map", 20.5)
-    assert cell(living, 0.5, 0.5) == (0.3, "elevation_map", 20.5)
-    assert cell(living, -0.5, -0.5)[1:] == ("loaded", 7.0)
-    counts = living.snapshot().sources.count()
-    assert counts["elevation_map"] == 400 and counts["loaded"] == PRIOR.elevation.size - 400
 
 
 def test_what_a_newer_map_does_not_see_stays():
@@ -105,20 +100,19 @@ def test_the_surer_height_wins_until_it_has_aged():
     np.testing.assert_array_equal(living.snapshot().terrain.elevation_std, 0.002)
 
 
-def test_a_loaded_map_without_deviations_gets_those_of_the_rules():
-    living = LivingMap(MergeRules(SUREST, loaded_std=0.5))
-    living.load(PRIOR, 0.0)
-    living.merge(local_map((0.0, 0.0), 0.3, std=0.02), TOPIC, 1.0)
-    std = living.snapshot().terrain.elevation_std
-    assert cell(living, 0.5, 0.5)[0] == 0.3
-    assert set(np.unique(std)) == {0.02, 0.5}
-
-
-def test_exact_heights_stay_exact_beside_uncertain_ones():
-    living = LivingMap()
-    living.load(PRIOR, 0.0)
-    living.merge(local_map((0.0, 0.0), 0.3, std=0.02), TOPIC, 1.0)
-    assert set(np.unique(living.snapshot().terrain.elevation_std)) == {0.0, 0.02}
+@pytest.mark.parametrize(
+    ("rules", "std"), [(MergeRules(SUREST, loaded_std=0.5), 0.5), (MergeRules(), 0.0)]
+)
+def test_a_loaded_map_without_deviations_gets_those_of_the_rules_or_stays_exact(rules, std):
+    living = LivingMap(rules)
+    living.load(PRIOR, 7.0)
+    living.merge(local_map((0.0, 0.0), 0.3, std=0.02), TOPIC, 20.5)
+    now = living.snapshot()
+    assert cell(living, 0.5, 0.5) == (0.3, TOPIC, 20.5)
+    assert cell(living, -0.5, -0.5)[1:] == ("loaded", 7.0)
+    counts = now.sources.count()
+    assert counts[TOPIC] == 400 and counts["loaded"] == PRIOR.elevation.size - 400
+    assert set(np.unique(now.terrain.elevation_std)) == {0.02, std}
 
 
 def test_earlier_snapshots_do_not_change():
@@ -173,14 +167,6 @@ def test_a_loaded_map_stays_whole_until_the_first_local_map():
     assert cell(living, -4.2, 0.5)[:2] == (0.1, "footprint")
 
 
-def test_a_window_that_is_too_large_is_refused_and_the_map_stays():
-    living = LivingMap(MergeRules(max_cells=10_000))
-    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 0.0)
-    with pytest.raises(PlanningError, match="set map_window"):
-        living.merge(local_map((100.0, 100.0), 0.2), TOPIC, 1.0)
-    assert cell(living, 0.5, 0.5)[0] == 0.1
-
-
 def test_cells_between_those_of_the_loaded_map_are_interpolated():
     plane = make_terrain(lambda x, y: 0.3 * x - 0.2 * y)
     living = LivingMap()
@@ -224,16 +210,6 @@ def test_soil_and_friction_of_the_loaded_map_stay():
     terrain = living.snapshot().terrain
     assert terrain.soil_names == prior.soil_names and (terrain.soil == 1).all()
     np.testing.assert_array_equal(terrain.friction, 0.4)
-
-
-def test_replacing_keeps_nothing_and_the_terrain_itself():
-    living = LivingMap()
-    living.load(PRIOR, 0.0)
-    only = local_map((0.0, 0.0), 0.1)
-    living.replace(only, TOPIC, 1.0)
-    now = living.snapshot()
-    assert now.terrain is only and not living.has_loaded
-    assert UNKNOWN not in now.sources.source
 
 
 def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():

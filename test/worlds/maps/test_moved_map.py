@@ -36,20 +36,15 @@ def rough_map(shape=(31, 40), origin=(3.0, -2.0)) -> Terrain:
 def test_a_shift_by_whole_cells_keeps_the_cells_of_the_grid_to_the_bit():
     local = rough_map()
     grid = CellGrid((-7.0, 4.0), CELL)
+    higher = move_map(local, move_of(0.0, 0.0, 0.37))
+    assert higher.elevation.tobytes() == (local.elevation + 0.37).tobytes()
+    assert higher.elevation_std.tobytes() == local.elevation_std.tobytes()
     moved = move_map(local, move_of(17 * CELL, -123 * CELL), grid)
     before, after = lay_onto(local, grid), lay_onto(moved, grid)
     assert (after.box.row, after.box.column) == (before.box.row - 123, before.box.column + 17)
     assert before.layers.keys() == {"elevation", "elevation_std", "friction"}
     for name, layer in before.layers.items():
         assert after.layers[name].tobytes() == layer.tobytes()
-
-
-def test_a_shift_in_height_is_added_to_the_heights_alone():
-    local = rough_map()
-    moved = move_map(local, move_of(0.0, 0.0, 0.37))
-    assert moved.elevation.tobytes() == (local.elevation + 0.37).tobytes()
-    assert moved.elevation_std.tobytes() == local.elevation_std.tobytes()
-    assert moved.friction.tobytes() == local.friction.tobytes()
 
 
 @pytest.mark.parametrize("quarters", [1, 2, 3])
@@ -104,22 +99,13 @@ def test_a_cell_is_known_only_if_the_four_around_it_are():
     np.testing.assert_array_equal(np.isnan(moved.elevation_std), np.isnan(moved.elevation))
 
 
-def test_a_small_lean_tilts_the_ground_and_a_larger_one_is_refused_with_its_size():
-    local = make_terrain(lambda x, y: 0.0 * x)
-    here = Rigid.from_rpy(2.0, 1.0, 0.5, 0.003, -0.002, 0.0)
-    moved = move_map(local, MapMove(*here.matrix))
-    corner = here.rotation.apply((*local.origin, 0.0)) + here.translation
-    assert moved.elevation[0, 0] == pytest.approx(corner[2], abs=1e-12)
-    np.testing.assert_allclose(moved.origin, corner[:2], atol=1e-4)
-    with pytest.raises(PlanningError, match=r"leans by 0\.05 rad \(roll and pitch\); it must be"):
-        move_map(local, move_of(roll=0.03, pitch=0.04, yaw=1.0))
-    assert move_map(local, move_of(pitch=0.99 * MAX_LEAN)).elevation.shape == (161, 161)
-
-
 def test_a_turned_map_that_is_too_large_or_has_no_known_cell_is_refused():
     local = rough_map()
     with pytest.raises(PlanningError, match=r"would have \d+ x \d+ cells; at most 1000 are taken"):
         move_map(local, move_of(yaw=0.7), max_cells=1000)
+    with pytest.raises(PlanningError, match=r"leans by 0\.05 rad \(roll and pitch\); it must be"):
+        move_map(local, move_of(roll=0.03, pitch=0.04, yaw=1.0))
+    assert move_map(local, move_of(pitch=0.99 * MAX_LEAN)).elevation.size
     checks = np.where(np.indices((20, 20)).sum(axis=0) % 2 == 0, 0.0, np.nan)
     with pytest.raises(PlanningError, match="none of them has four known ones around"):
         move_map(Terrain(checks, CELL), move_of(0.01, 0.02, yaw=0.3))

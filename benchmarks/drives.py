@@ -1,0 +1,233 @@
+"""Drives of the LSR-1 in MuJoCo, closed loop, over obstacles; they need the extra `bench`."""
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from rich.progress import track
+
+from benchmarks.measure import console
+from rover_physics import Rover, Terrain, load_rover
+from rover_physics.names import EQUAL, OPTIMAL
+from rover_physics.rover.steered_drive import SteeredDrive, WheelAims
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.simulator.mujoco_rover import TIMESTEP, MujocoRover
+from rover_planner.simulator.path_follower import PathFollower
+from rover_planner.simulator.second_try import SecondTry
+from rover_planner.traction.settings import load_traction_settings
+from rover_planner.traction.traction_service import TractionService
+from support.reference_drives import drive_ground
+from support.rough_grounds import bouldered, fractal
+
+PERIOD = 0.02
+"""Period of the controllers [s]."""
+SPEED = 0.06
+"""Speed of the drives [m/s]: twice the rover's nominal speed, to halve the run time."""
+START, END = -1.2, 1.2
+"""x of the body's origin at the start and at the end of a drive [m]."""
+LOOK_AHEAD = 0.5
+"""Look-ahead distance of the path follower that steers [m]."""
+MAX_TILT = 1.2
+"""Tilt from which a rover counts as tipped over [rad]."""
+MAX_OFFSET = 1.0
+"""Distance from the x axis from which a rover counts as lost [m]."""
+MIN_LOAD = 0.02
+"""Load above which the utilisation of a wheel counts, in sixths of the weight."""
+SERVO, DROOP, EQUAL_TORQUES = "servo", "servo with droop", "equal"
+BY_MOTION, BY_MAP = "optimal", "optimal, map"
+CONTROLLERS = (SERVO, DROOP, EQUAL_TORQUES, BY_MOTION, BY_MAP)
+"""Speed servos with an integral part or with droop, equal torques, and the QP with contact angles
+from motion or from the map."""
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A ground to drive over along +x."""
+
+    kind: str
+    """step, bump_one_side, ditch, slope, cross_slope, rocks or relief."""
+    size: float
+    """Height or width [m], angle [deg], largest height of rocks or RMS height of relief [m]."""
+    friction: float
+    """Friction coefficient."""
+    seed: int = 0
+    """Seed of rocks and relief."""
+    max_torque: float | None = None
+    """Largest torque of a wheel [N m]; None: that of the rover."""
+
+    @property
+    def label(self) -> str:
+        """Kind, size, seed, friction and torque."""
+        seed = f", seed {self.seed}" if self.seed else ""
+        torque = "" if self.max_torque is None else f", {self.max_torque:.2f} N m"
+        return f"{self.kind} {self.size:.3g}{seed}, mu {self.friction:.2g}{torque}"
+
+    @property
+    def ground(self) -> Terrain:
+        """The ground."""
+        if self.kind == "rocks":
+            return bouldered(self.seed, highest=self.size)
+        if self.kind == "relief":
+            return fractal(self.seed, roughness=self.size)
+        return drive_ground(self.kind, self.size)
+
+    @property
+    def rover(self) -> Rover:
+        """The rover lsr1 at SPEED, with the torque limit."""
+        rover = replace(load_rover("lsr1"), nominal_speed=SPEED)
+        if self.max_torque is None:
+            return rover
+        return replace(rover, wheel=replace(rover.wheel, max_torque=self.max_torque))
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Result of a drive; means are over time and wheels, up to the end or where it got stuck."""
+
+    passed: bool
+    """Whether the rover reached the end."""
+    end: float
+    """x of the body's origin at the end [m]."""
+    duration: float
+    """Duration [s]."""
+    mean_utilisation: float
+    """Mean over time of the largest friction utilisation of the six wheels."""
+    peak_utilisation: float
+    """95th percentile over time of the largest friction utilisation."""
+    slip: float
+    """Distance that a tread slid over the ground [m], mean of the six wheels."""
+    torque: float
+    """Mean absolute wheel torque [N m]."""
+    energy: float
+    """Mechanical work of the motors [J]; negative power counts as zero."""
+
+
+OBSTACLES = tuple(
+    Obstacle(kind, size, friction, seed)
+    for kind, rows in {
+        "step": ((0.08, 0.6), (0.10, 0.8), (0.13, 0.8), (0.16, 1.0)),
+        "bump_one_side": ((0.06, 0.4), (0.10, 0.6), (0.14, 0.8)),
+        "ditch": ((0.12, 0.6), (0.30, 0.8), (0.60, 1.0)),
+        "slope": ((15.0, 0.4), (20.0, 0.6), (25.0, 0.8)),
+        "rocks": ((0.08, 0.4, 1), (0.08, 0.6, 2), (0.08, 0.8, 3), (0.08, 1.0, 4)),
+        "relief": ((0.09, 0.4, 1), (0.09, 0.6, 2), (0.09, 0.8, 3)),
+    }.items()
+    for size, friction, seed in ((*row, 0)[:3] for row in rows)
+)
+"""Obstacles of the benchmarks: frictions from 0.4 to 1.0."""
+
+
+class Steering:
+    """Follows the x axis: what a path follower commands, and what this asks of the wheels."""
+
+    def __init__(self, plant: MujocoRover, tries: int):
+        """Prepare for a rover at the start of its path, with a number of attempts at a place."""
+        path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
+        self.follower = SecondTry(PathFollower(path, LOOK_AHEAD), tries)
+        self._drive, self._plant = SteeredDrive(plant.rover), plant
+
+    def steer(self) -> tuple[float, float]:
+        """Steer; return the speed [m/s] and the yaw rate [rad/s] that are commanded."""
+        return self._aim()[0]
+
+    def steer_and_roll(self) -> np.ndarray:
+        """Steer; return the rates (6,) of the wheels [rad/s] in the commanded motion."""
+        aims = self._aim()[1]
+        share = self._drive.share(self._plant.steering_angles, aims.angles)
+        return share * aims.speeds / self._plant.rover.wheel.radius
+
+    def _aim(self) -> tuple[tuple[float, float], WheelAims]:
+        plant = self._plant
+        command = self.follower.steer(plant.pose[[0, 1, 3]], SPEED, plant.time)
+        aims = self._drive.aim(*command)
+        plant.steer(aims.angles)
+        return command, aims
+
+
+def make_controller(
+    name: str, plant: MujocoRover, obstacle: Obstacle, steering: Steering
+) -> Callable[[], np.ndarray]:
+    """Return a function that advances the plant by PERIOD and returns its torques (6,) [N m]."""
+    if name == SERVO:
+        return lambda: plant.servo(steering.steer_and_roll(), PERIOD)
+    if name == DROOP:
+        droop = plant.rover.wheel.servo_droop
+        return lambda: plant.servo_with_droop(steering.steer_and_roll(), droop, PERIOD)
+    values: dict[str, Any] = {"policy": EQUAL if name == EQUAL_TORQUES else OPTIMAL}
+    if obstacle.max_torque is not None:
+        values["max_torque"] = obstacle.max_torque
+    parameters = TractionControllerParameters(friction=obstacle.friction, **values)
+    service = TractionService(load_traction_settings(parameters))
+    if name == BY_MAP:
+        service.take_terrain(obstacle.ground)
+
+    def control() -> np.ndarray:
+        now = plant.time
+        service.take_joints(plant.joint_positions, plant.joint_velocities, now)
+        service.take_attitude(*plant.attitude, plant.body_rates, now)
+        service.take_command(*steering.steer(), now)
+        service.take_odometry(plant.pose, 0.0, now)
+        torques = service.update(now).torques
+        plant.step(torques, PERIOD)
+        return torques
+
+    return control
+
+
+def drive(
+    obstacle: Obstacle,
+    name: str,
+    tries: int = 1,
+    most_time: float = 2.0,
+    timestep: float = TIMESTEP,
+) -> Drive:
+    """Drive the rover lsr1 over an obstacle.
+
+    Args:
+        obstacle: The obstacle.
+        name: One of CONTROLLERS.
+        tries: Attempts at one place; a rover that stands still backs off before another one.
+        most_time: Time after which a rover counts as stuck, as a multiple of the time at SPEED.
+        timestep: Time step of MuJoCo [s].
+    """
+    rover = obstacle.rover
+    plant = MujocoRover(rover, obstacle.ground, (START, 0.0, 0.0), obstacle.friction, timestep)
+    steering = Steering(plant, tries)
+    control = make_controller(name, plant, obstacle, steering)
+    slip = torque = energy = 0.0
+    peaks: list[float] = []
+    while plant.time < most_time * (END - START) / SPEED and plant.pose[0] < END:
+        torques = control()
+        if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET or steering.follower.given_up:
+            break
+        contacts = plant.measure_contacts()
+        slip += contacts.slip_speeds.mean() * PERIOD
+        torque += np.abs(torques).mean() * PERIOD
+        energy += np.clip(torques * plant.wheel_rates, 0.0, None).sum() * PERIOD
+        held = contacts.loads > MIN_LOAD * rover.weight / 6.0
+        used = contacts.shears[held] / (obstacle.friction * contacts.loads[held])
+        peaks.append(float(used.max(initial=0.0)))
+    if not peaks:
+        raise ValueError(f"the rover cannot stand at the start of {obstacle.label}")
+    return Drive(
+        passed=bool(plant.pose[0] >= END),
+        end=float(plant.pose[0]),
+        duration=plant.time,
+        mean_utilisation=float(np.mean(peaks)),
+        peak_utilisation=float(np.percentile(peaks, 95)),
+        slip=float(slip),
+        torque=float(torque / plant.time),
+        energy=float(energy),
+    )
+
+
+def run_in_processes(function: Callable, jobs: Sequence[tuple], workers: int | None) -> Iterator:
+    """Yield function(*job) for each job in order, from processes (default: one per core)."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        futures = [pool.submit(function, *job) for job in jobs]
+        for future in track(futures, function.__name__, console=console(stderr=True)):
+            yield future.result()

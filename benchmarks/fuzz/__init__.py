@@ -1,1 +1,0 @@
-"""Throws malformed and hostile inputs at adapters, services and running nodes: `make fuzz`."""

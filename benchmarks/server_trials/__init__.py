@@ -1,1 +1,0 @@
-"""Trials of a traverse server in a process of its own, over DDS."""

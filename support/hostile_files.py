@@ -1,0 +1,40 @@
+"""Hostile files for tests: things that are no regular files, archives and arrays of odd bytes."""
+
+import io
+import os
+import socket
+import struct
+import zipfile
+from pathlib import Path
+
+
+def make_oddities(folder: Path) -> list[str]:
+    """Make things that are no regular files in a folder; return their names, and worse names."""
+    os.mkfifo(folder / "pipe")
+    (folder / "folder").mkdir()
+    (folder / "loop").symlink_to(folder / "loop")
+    (folder / "dangling").symlink_to(folder / "nowhere")
+    (folder / "to_zero").symlink_to("/dev/zero")
+    with socket.socket(socket.AF_UNIX) as here:
+        here.bind(str(folder / "socket"))
+    made = ["pipe", "folder", "loop", "dangling", "to_zero", "socket"]
+    return [
+        *(str(folder / name) for name in made), "/dev/zero", "/dev/full", "/dev/stdin", "/proc",
+        "/proc/self/mem", "/proc/kmsg", "x" * 300, "x/" * 3000, "", ".", "..", "\n\x1b[2J", "é",
+        "\udcff", "a\0b", str(folder / "folder" / ".." / "nowhere"),
+    ]  # fmt: skip
+
+
+def archive_of(content: bytes, name="a.npy", method=zipfile.ZIP_DEFLATED) -> bytes:
+    """Return an archive of one member."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", method) as archive:
+        archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+def npy(header: str, data: bytes = b"", version=1, length=None) -> bytes:
+    """Return an .npy file with a header of one's own."""
+    text = header.encode("latin1")
+    size = struct.pack("<H" if version == 1 else "<I", len(text) if length is None else length)
+    return b"\x93NUMPY" + bytes([version, 0]) + size + text + data

@@ -1,0 +1,162 @@
+"""Nodes as processes of their own: they start, answer, and end cleanly when they are told to."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.srv import GetPlan
+from rclpy.node import Node
+
+from msg_adapters.paths import stamped_pose
+from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.nodes.traverse_server import main
+from support.grounds import make_terrain, waves
+from support.project.without_disk import fill_disk
+from support.ros_fixtures import domain_id
+from support.waiting import wait_until
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def start_process():
+    """Return a function that starts a node with parameters; what is left at the end is killed."""
+    processes = []
+
+    def start(name, *parameters, **options):
+        arguments = [word for text in parameters for word in ("-p", text)]
+        process = subprocess.Popen(
+            [sys.executable, "-m", f"rover_planner.nodes.{name}", "--ros-args", *arguments],
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "PYTHONUNBUFFERED": "1"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            **options,
+        )
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def read_until(process, text):
+    """Return the output up to a line with a text in it."""
+    lines = []
+    for line in process.stdout:
+        lines.append(line)
+        if text in line:
+            return "".join(lines)
+    raise AssertionError(f"ended without {text!r}: {''.join(lines)}")
+
+
+def end(process, how, count=1):
+    """Send a signal; return what the process says until it ends, which must be cleanly."""
+    for _ in range(count):
+        process.send_signal(how)
+        time.sleep(0.01)
+    rest, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 0 and "Traceback" not in rest, rest
+    return rest
+
+
+def test_a_server_says_what_it_does_answers_another_process_and_ends_cleanly(
+    start_process, client, tmp_path
+):
+    file = tmp_path / "flat.npz"
+    save_terrain(file, Terrain(np.zeros((101, 101)), 0.05, (-2.5, -2.5)))
+    process = start_process(
+        "traverse_server", f"terrain_file:={file}", "time_budget:=60.0", "terain_file:=spirit"
+    )
+    told = read_until(process, "ready for rover lsr1, map ")
+    assert "compiling kernels" in told and "101 x 101 cells of 0.05 m, 100 % known" in told
+    assert told.count("terain_file does not exist and is ignored; the nearest is terrain_f") == 1
+    plan, results = client.next_results(
+        lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    )
+    assert len(plan.poses) == 21 and len(results["plan"].poses) == 21
+    end(process, signal.SIGINT, count=3)  # launch and the terminal both send one
+
+
+def test_a_signal_ends_a_server_in_the_middle_of_a_question_which_is_refused(
+    start_process, ros, tmp_path
+):
+    save_terrain(tmp_path / "waves.npz", make_terrain(waves))
+    asker, open_counts = ros.spin(Node("asker", context=ros.context)), []
+
+    def note(message):
+        values = {entry.key: entry.value for entry in message.status[0].values}
+        open_counts.append(values["open questions"])
+
+    asker.create_subscription(DiagnosticArray, "diagnostics", note, 10)
+    process = start_process(
+        "traverse_server",
+        f"terrain_file:={tmp_path / 'waves.npz'}",
+        "time_budget:=600.0",
+        "waypoint_spacing:=0.001",
+        "candidate_count:=99",
+        "candidate_spacing:=0.01",
+    )
+    read_until(process, "ready for rover lsr1")
+    service = asker.create_client(GetPlan, "/traverse_server/can_traverse")
+    assert service.wait_for_service(20.0)
+    start, goal = (stamped_pose((x, 0.0, 0.0), "map") for x in (-3.0, 3.0))
+    future = service.call_async(GetPlan.Request(start=start, goal=goal))
+    wait_until(lambda: open_counts and open_counts[-1] == "1", "the question in work")
+    assert not future.done()
+    end(process, signal.SIGTERM)
+    wait_until(future.done, "the refusal")
+    assert future.result().plan.poses == []
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [("traverse_server", signal.SIGTERM), ("traction_controller", signal.SIGINT)],
+)
+def test_a_signal_ends_a_node_while_kernels_compile(
+    start_process, tmp_path, monkeypatch, name, how
+):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    process = start_process(name)
+    read_until(process, "compiling kernels 1 of ")
+    time.sleep(0.5)
+    assert "ready" not in end(process, how)
+
+
+def test_a_simulator_that_is_told_to_end_while_it_publishes_ends_cleanly(start_process):
+    process = start_process(
+        "rover_simulator", "terrain_file:=spirit", "start_x:=-46.0", "start_y:=-19.5",
+        "rate:=500.0", "map_rate:=20.0",
+    )  # fmt: skip
+    read_until(process, "ready")
+    time.sleep(0.3)
+    end(process, signal.SIGTERM, count=3)
+
+
+def test_a_server_starts_on_a_full_disk_without_a_log_file_and_says_so(start_process):
+    process = start_process("traverse_server", preexec_fn=fill_disk)
+    told = read_until(process, "ready for rover lsr1")
+    assert told.count("no log file is written: File too large") == 1
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        ("friction:=.nan", "friction is nan"),
+        ("rover:=lsr9", "lsr9"),
+        ("candidate_count:=9.5", "candidate_count"),
+        ("terrain_file:=/no/such/file.npz", "/no/such/file.npz"),
+    ],
+)
+def test_a_wrong_parameter_ends_a_server_with_one_line(parameter, text, monkeypatch, capfd):
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id()))
+    assert main(["--ros-args", "-p", parameter]) == 2
+    output = capfd.readouterr().err
+    assert "Traceback" not in output and text in output.strip().splitlines()[-1]

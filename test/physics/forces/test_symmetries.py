@@ -1,0 +1,164 @@
+"""Symmetries: mirrored, turned, moved, heavier or the other way round, the answer is the same."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_poses
+from support.rough_grounds import (
+    fractal,
+    mirrored,
+    plane,
+    quarter_turn,
+    random_poses,
+    rocky,
+    scaled_for,
+    smooth,
+)
+from support.rover_geometry import turned_round
+
+LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
+FIXED = replace(LSR1, steering=None)
+GAP = 3e-5
+"""What a settled pose may leave open [m]."""
+ANGLE = 4.0 * GAP / 0.4
+"""What that may turn [rad]."""
+SWAP = [3, 4, 5, 0, 1, 2]
+ROUND = [5, 4, 3, 2, 1, 0]
+AHEAD = np.zeros(4)
+ARM = {"arm_yaw": 0.0, "arm_shoulder": 0.0, "arm_elbow": 0.0}
+EQUAL, SERVO = SweepOptions(), SweepOptions(policy="servo")
+seeds = st.integers(0, 10_000)
+few = settings(max_examples=25)
+
+
+def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torques=2e-3) -> int:
+    """Compare answers on mirrored grounds; return how many poses settle and drive.
+
+    Args:
+        rover: The rover.
+        ground: The ground.
+        poses: (n, 3).
+        curvature: That of each motion [1/m].
+        options: A tool load is mirrored too.
+        loads: Tolerance of forces [weights].
+        torques: Tolerance of torques [N m].
+    """
+    bends = np.full(len(poses), curvature)
+    other = options
+    if options.tool_force is not None:
+        other = replace(
+            options,
+            tool_force=np.array(options.tool_force) * [1.0, -1.0, 1.0],
+            tool_moment=np.array(options.tool_moment) * [-1.0, 1.0, -1.0],
+        )
+    here = judge_poses(rover, ground, poses, bends, options)[0]
+    there = judge_poses(rover, *mirrored(ground, poses), -bends, other)[0]
+    assert there.status.tolist() == here.status.tolist()
+    rows = here.settled
+    if options.policy == "servo":
+        rows = rows & (here.speed_share > 0.0) & (there.speed_share > 0.0)
+    flipped = np.array([1.0, -1.0, 1.0])
+    for name, expected, tolerance in (
+        ("position", here.position * flipped, 2.0 * GAP),
+        ("roll", -here.roll, ANGLE),
+        ("pitch", here.pitch, ANGLE),
+        ("rocker_angle", here.rocker_angle[:, ::-1], ANGLE),
+        ("bogie_angle", here.bogie_angle[:, ::-1], ANGLE),
+        ("wheel_centres", here.wheel_centres[:, SWAP] * flipped, ANGLE),
+        ("wheel_loads", here.wheel_loads[:, SWAP], loads * rover.weight),
+        ("lateral", -here.lateral[:, SWAP], loads * rover.weight),
+        ("torque", here.torque[:, SWAP], torques),
+        ("tip_over_ratio", here.tip_over_ratio, 1e-4),
+        ("tip_over_force_angle", here.tip_over_force_angle, 1e-4),
+    ):
+        if options.policy == "servo" and name == "lateral":
+            continue  # a creep decides how wheels that hardly slide share it
+        found = getattr(there, name)[rows]
+        np.testing.assert_allclose(found, expected[rows], 0.0, tolerance, err_msg=name)
+    return int(rows.sum())
+
+
+@few
+@given(seeds, st.sampled_from([0.0, 0.7, np.inf]), st.booleans(), st.data())
+def test_mirrored_ground_swaps_right_and_left(seed, curvature, loaded, data):
+    ground, options, loads = smooth(seed), EQUAL, 1e-3
+    if loaded:
+        force, moment = (data.draw(st.tuples(*[st.floats(-8.0, 8.0)] * 3)) for _ in range(2))
+        options = SweepOptions(joint_angles=ARM, tool_force=force, tool_moment=moment)
+        ground, loads = plane(0.1, data.draw(st.floats(-0.2, 0.2)), half=2.0), 1e-5
+    poses = random_poses(seed, 4, 0.6)
+    assert assert_mirrored(LSR1, ground, poses, curvature, options, loads) == 4
+
+
+@pytest.mark.parametrize("curvature", [0.0, 0.5, np.inf])
+@pytest.mark.parametrize(
+    ("rover", "ground", "half", "options", "least"),
+    [
+        (FIXED, rocky(5), 2.0, SERVO, 15),
+        (LSR1, smooth(5), 0.6, replace(SERVO, soil="lete_sand", max_torque=20.0), 8),
+    ],
+    ids=["skidding", "soil"],
+)
+def test_mirrored_ground_swaps_right_and_left_of_speed_servos(
+    rover, ground, half, options, least, curvature
+):
+    poses = random_poses(5, 25, half)
+    assert assert_mirrored(rover, ground, poses, curvature, options, torques=2e-2) >= least
+
+
+@few
+@given(seeds, st.integers(0, 3), st.tuples(*[st.floats(-50.0, 50.0)] * 3))
+def test_turned_by_quarters_and_moved_with_its_path_the_ground_changes_nothing(
+    seed, quarters, shift
+):
+    ground, poses = smooth(seed), random_poses(seed, 4, 0.6)
+    turned, path = ground, poses
+    for _ in range(quarters):
+        turned, path = quarter_turn(turned, path)
+    (x, y), (dx, dy, dz) = turned.origin, shift
+    turned = Terrain(turned.elevation + dz, turned.resolution, (x + dx, y + dy))
+    here = judge_poses(LSR1, ground, poses, AHEAD)[0]
+    there = judge_poses(LSR1, turned, path + np.array([dx, dy, 0.0]), AHEAD)[0]
+    assert here.settled.all() and there.settled.all()
+    for name in ("roll", "pitch", "rocker_angle", "bogie_angle"):
+        assert getattr(there, name) == pytest.approx(getattr(here, name), abs=ANGLE), name
+    assert there.position[:, 2] == pytest.approx(here.position[:, 2] + dz, abs=2.0 * GAP)
+    assert there.wheel_loads == pytest.approx(here.wheel_loads, abs=1e-3 * LSR1.weight)
+
+
+@few
+@given(seeds, st.floats(0.1, 10.0))
+def test_forces_grow_with_gravity_in_proportion(seed, factor):
+    ground, poses = fractal(seed % 20), random_poses(seed, 4, 1.5)
+    heavy = replace(LSR1, gravity=factor * LSR1.gravity)
+    here, there = (judge_poses(rover, ground, poses, AHEAD)[0] for rover in (LSR1, heavy))
+    for name in ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation"):
+        grows = 1.0 if name == "friction_utilisation" else factor
+        expected = pytest.approx(grows * getattr(here, name), rel=1e-9, nan_ok=True)
+        assert getattr(there, name) == expected, name
+
+
+@few
+@given(seeds, st.sampled_from([replace(LSR1, manipulator=None), M2020]))
+def test_a_bogie_behind_is_a_bogie_ahead_driven_backwards(seed, rover):
+    ground, poses = scaled_for(rover, smooth(seed), random_poses(seed, 4, 0.5))
+    here = judge_poses(rover, ground, poses, AHEAD)[0]
+    there = judge_poses(turned_round(rover), ground, poses + np.array([0.0, 0.0, np.pi]), AHEAD)[0]
+    assert here.settled.all() and there.settled.all()
+    size, loose = rover.wheel.radius, 1e-3 * rover.weight
+    for name, expected, tolerance in (
+        ("position", here.position, 1e-4 * size),
+        ("wheel_centres", here.wheel_centres[:, ROUND], 1e-3 * size),
+        ("wheel_loads", here.wheel_loads[:, ROUND], loose),
+        ("tangential", -here.tangential[:, ROUND], loose),
+        ("lateral", -here.lateral[:, ROUND], loose),
+        ("tip_over_ratio", here.tip_over_ratio, 1e-3),
+    ):
+        assert getattr(there, name) == pytest.approx(expected, abs=tolerance), name
