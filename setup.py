@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Installs rover_planner, by pip or as an ament_python package by colcon."""
 
 import re

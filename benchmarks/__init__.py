@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Benchmarks: run time and memory of the product, and comparisons with MuJoCo."""

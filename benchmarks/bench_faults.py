@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times how soon the traction controller ends the push after a fault, and how soon it shows it.
 
 The controller runs in a process of its own, with real-time priority where it is granted. Times are

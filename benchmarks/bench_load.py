@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loads a traverse server: many questions at once, minutes of them, requests meanwhile, its death.
 
 Servers run in processes of their own and are asked over DDS.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times paths against their poses: judged, written to a file, stopped at a failure, and in memory.
 
 Ground is mild or rocky; paths are straight with 2 cm between waypoints, on one thread. Paths that

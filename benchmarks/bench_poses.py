@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times single poses on one core, JPL's ENav fan of 1,694 paths, and a map of a million cells."""
 
 import resource

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times poses on rough ground, and checks their gaps by a dense look at whole wheels."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times `~/can_traverse` over DDS between two processes: 10 m, 2 cm between waypoints.
 
 Three answers are timed in turns: the server's, that of a node that returns the same plan without

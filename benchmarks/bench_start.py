@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times the start of the server up to its first answer, without and with cached kernels.
 
 The time includes DDS discovery. The cold start compiles into a separate folder, so that the

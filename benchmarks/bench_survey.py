@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measures surveys as the command makes them: cost of a pose, workers, memory, what is reachable.
 
 A large and a small map are surveyed, and the difference counts: start and compilation do not.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times updates of the traction controller: alone, and for a minute beside a busy server.
 
 Alone, the node gets the measurements of a drive over rocks; CPU time is measured. Then simulator,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The best paths of a lattice, by a search that shares no code with the planner's.
 
 Nodes, primitives and connections are the planner's; the search is Dijkstra's of scipy, from both

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives in MuJoCo over ground that the planner calls passable with traction control.
 
 Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S] [--least M]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives of the LSR-1 in MuJoCo, closed loop, over obstacles; they need the extra `bench`."""
 
 import multiprocessing

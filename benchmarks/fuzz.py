@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Throws hostile messages, requests and damaged bytes over DDS at running nodes: `make fuzz`.
 
 Run from the repository: python -m benchmarks.fuzz [--seed N] [--count N]

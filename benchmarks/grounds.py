@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grounds and poses that benchmarks run on."""
 
 import os

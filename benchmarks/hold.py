@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a rover on a slope does when it stops to be driven, by rest policy, in MuJoCo.
 
 Run from the repository: python -m benchmarks.hold [--slope DEG] [--seconds S]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verdicts of random rough paths with more friction or torque, in pieces, shifted, refined."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measurement and reports of benchmarks: medians of repeats, tables, JSON files.
 
 Functions that are compared run in turns, so that other load on the machine affects all of them.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nodes in processes of their own, and clients in this one, on a ROS domain of their own.
 
 `python -m benchmarks.processes PLAN` is a node that answers GetPlan with a stored plan (a file

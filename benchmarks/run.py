@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs benchmarks, prints one table and writes it as JSON: `make bench`.
 
 Run from the repository: python -m benchmarks.run [TOPIC ...] [--against CHECKOUT] [--rounds N]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Closed-loop drives in MuJoCo with speed servos, equal torques and the quadratic program.
 
 Run from the repository: python -m benchmarks.traction [--quick] [--out FOLDER]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compares the model with MuJoCo in tables: settled cases, drives, curves (docs/validation.md).
 
 Run from the repository: python -m benchmarks.validate [--energy]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Searches ways between random poses on real and made maps: the tables of docs/performance.md.
 
 Run from the repository, on one core: taskset -c 0 python -m benchmarks.ways --count 100

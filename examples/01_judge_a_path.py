@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Can the rover drive this path, and if not, why and where?
 
 One call judges a path of poses x, y, yaw on an elevation map: here two metres on Mars, as Spirit's

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How much do better torques buy? The tallest step that the rover climbs under three policies.
 
 `equal`: all wheels pull alike. `servo`: each wheel has a speed servo, so torque goes where there

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Your own rover: from the URDF that a robot already has to a rover file, and over a step.
 
 A URDF has the joints, links and masses. A joint map names the joints and adds what a URDF does not

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A map from a sensor's points: cells, gaps, noise, and what is not known.
 
 A sensor gives scattered points, dense nearby and thin far away, with noise, and nothing from

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A path around obstacles: where the straight line is refused, `rover_planner plan` searches.
 
 The search judges each edge by the same physics as every path, so what it finds is traversable, and

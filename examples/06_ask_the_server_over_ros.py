@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ask the running service over ROS 2, as a mission planner does, with standard messages only.
 
 Starts `traverse_server` on the map of Spirit's surroundings and asks GetPlan for four goals: is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where on this map can the rover go at all? Every cell, many headings, and what is reachable.
 
 `rover_planner survey` judges the rover all over a map, on the cores of this machine or a cluster,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What traction control saves: the same drive over rocks in MuJoCo, with and without it.
 
 MuJoCo simulates bodies, contacts and slip, and shares only the rover's numbers with the model of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The nodes of a rover: traverse server and traction controller.
 
 ros2 launch rover_planner rover.launch.py namespace:=lsr1 traverse_server_parameters:=my.yaml

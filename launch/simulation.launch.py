@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The whole system on one machine: simulator, traverse server and traction controller.
 
 ros2 launch rover_planner simulation.launch.py terrain_file:=mars.npz

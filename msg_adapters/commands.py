@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Converts command messages: reads the commanded speed, writes joint efforts and wheel values."""
 
 import array

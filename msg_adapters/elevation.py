@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Converts elevation maps: PointCloud2 to Terrain and back, Terrain to OccupancyGrid.
 
 Points are read from the message without a copy. If they form a regular grid row by row, their

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks the frame of messages, and reads transforms between frames."""
 
 from dataclasses import dataclass

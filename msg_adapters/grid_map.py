@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Converts GridMap messages (grid_map_msgs) to Terrain; needs none of their packages.
 
 Any object with the fields of grid_map_msgs/GridMap will do. In such a map rows run along -x and

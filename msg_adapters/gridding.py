@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Square cells for the points of a cloud, from a detected regular grid or a given resolution.
 
 Points in row order, as in most maps, are recognised without a copy. Points in any other order are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hashes of questions and paths: by them a client tells which question an answer is about.
 
 A hash is the first 16 hexadecimal digits of SHA-256 over these bytes, in this order:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads IMU messages: the attitude and angular velocity of the body."""
 
 import math

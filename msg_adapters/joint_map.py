@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names, signs and offsets of a robot's joints in messages against those of the model."""
 
 import math

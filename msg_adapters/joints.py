@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads joint state messages: measured joint angles and rates by name; the steering's sign."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads odometry messages: the rover's pose on the map and its standard deviation."""
 
 import math

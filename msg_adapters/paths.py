@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Converts PoseStamped and Path messages to arrays of x, y, yaw and back."""
 
 import math

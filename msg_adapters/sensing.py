@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes the messages of a rover's sensors: joint states, odometry and IMU."""
 
 import array

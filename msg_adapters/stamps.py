@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Converts stamps of messages to nanoseconds and back."""
 
 from builtin_interfaces.msg import Time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads messages about the arm's tool: the target of its tip, and the wrench on it."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quasi-static model of a rocker-bogie rover on uneven ground: NumPy in, dataclasses out.
 
 The names below are the API. Each is imported on first use, so a program that only reads a rover

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiles kernels in processes of their own and loads what they have saved on disk.
 
 A compilation holds Python's interpreter lock for seconds and takes some 400 MB. In another

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The process that compiles kernels: `-m rover_physics.compile_worker NICENESS FUNCTION...`.
 
 It calls functions, each named MODULE:NAME, writes the index of each when it begins, and ends when

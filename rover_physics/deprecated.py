@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of version 0.1 that work for one more version, with a warning."""
 
 import warnings

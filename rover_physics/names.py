@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of wheels, sides and joints, in the order of all arrays, and names of torque policies."""
 
 WHEELS = (

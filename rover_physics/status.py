@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Status codes of contacts, poses and bounds, and torque policies, for kernels and results."""
 
 from enum import IntEnum

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The kernels of predictions, verdicts and bounds: compiled, or loaded from disk.
 
 `python -m rover_physics.warm_up` compiles all of them.

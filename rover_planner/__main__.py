@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the command line of `rover_planner` by `python -m rover_planner`."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner`: its subcommands and its exit code."""
 
 from collections.abc import Sequence
@@ -32,7 +33,6 @@ app = typer.Typer(
 )
 NEGATIVE_ARGUMENTS = {"ignore_unknown_options": True}
 """Makes typer accept negative numbers as arguments; options accept them anyway."""
-
 
 
 def _print_version(asked: bool) -> None:

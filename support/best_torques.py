@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether any torques do with a friction utilisation, by independent linear programs."""
 
 import numpy as np

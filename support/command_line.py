@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command-line helpers for tests: input files of `rover_planner`, and a check of refusals."""
 
 import os

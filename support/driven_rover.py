@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node that sends what a creeping rover measures, and hears what its controller commands."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grounds for tests: heights as functions of x and y [m], and terrains made of them."""
 
 import numpy as np

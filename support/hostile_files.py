@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hostile files for tests: things that are no regular files, archives and arrays of odd bytes."""
 
 import io

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A client of the traverse server for tests: publishes, calls, and keeps the results."""
 
 from functools import partial

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The settled cases of test/data, computed with MuJoCo: see test/data/README.md."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The drives and curves of test/data, computed with MuJoCo, and the model's answers to them."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """ROS for tests: separate contexts and domains, executors that spin in the background."""
 
 import contextlib

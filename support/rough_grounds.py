@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grounds for tests: rough grounds from a seed, planes, and rotated or mirrored grounds."""
 
 from dataclasses import replace

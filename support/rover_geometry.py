@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An independent model of the rover for tests: geometry and balance of forces in plain numpy.
 
 It shares no code with the kernels. It follows the conventions (docs/conventions.md) and the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small maps and surveys for tests of surveys."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measured states of settled rovers and motions between them, computed from predictions."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Maps with random errors, and how often predictions on them leave their bounds."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Waits of tests: for a condition, and for the end of a process."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What all tests share: the real maps, and a ROS that stays on this machine."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes the places that a search for a way could reach as an occupancy grid."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes traversability classes of cells as occupancy grids."""
 
 from typing import Any

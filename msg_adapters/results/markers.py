@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes markers for RViz: the path coloured by class, its first failure, wheel contacts."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes values of cells as an occupancy grid."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Converts predictions into messages: arrays per waypoint and a joint trajectory."""
 
 import array

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes the health of a traverse server and the progress of its searches as diagnostics."""
 
 from collections.abc import Mapping

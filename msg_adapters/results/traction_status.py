@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes the state of a traction controller as a diagnostic status."""
 
 from collections.abc import Mapping, Sequence

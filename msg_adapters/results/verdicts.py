@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes verdicts as messages: a diagnostic status for operators, JSON text for programs."""
 
 import json

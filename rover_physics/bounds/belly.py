@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on the belly clearance above ground whose heights are known within bounds."""
 
 import numpy as np

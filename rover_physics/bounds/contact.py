@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on the wheel contacts on ground whose heights are known within bounds.
 
 A point of the rim can touch only if its gap, minus the error of the height difference, is smaller

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on forces and tip-over angles over all possible configurations and contacts of a rover.
 
 The forces depend on 18 inputs: the height of each wheel, and angle and place of each contact. Each

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on the prediction at a pose on uncertain ground, and their parallel sweep over poses."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on the prediction along a path over an uncertain map.
 
 If a terrain has a layer `elevation_std`, each height may be wrong by a given number of standard

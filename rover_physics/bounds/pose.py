@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on the configuration of a rover on ground whose heights are known within bounds.
 
 The height of a wheel at a given place increases with the height of all ground below it, so the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Peaks of the intrusion of the ground inside twisted cells; lengths are in cells."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Search for the highest ground under the whole width of a wheel.
 
 Along the edge of a cell the ground is straight, so the largest intrusion has a closed form. Within

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Search for the point of a wheel circle that is nearest to the ground, between the samples."""
 
 import numpy as np

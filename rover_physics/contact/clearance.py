@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Belly clearance: the smallest height of the body's underside above the ground."""
 
 from typing import NamedTuple

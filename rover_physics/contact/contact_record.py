@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Record of the wheel contacts, and the scopes of the contact search."""
 
 from enum import IntEnum

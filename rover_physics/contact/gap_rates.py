@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Derivatives of the gaps between wheels and ground by the rover's configuration."""
 
 from enum import IntEnum

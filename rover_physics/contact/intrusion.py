@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How far the ground intrudes into a wheel: the record of a search, and its elements.
 
 Lengths are in cells here. A point of the ground is at s along the wheel's heading and t to the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settling wheel by wheel, where Newton's method fails: at edges, faces and in narrow hollows.
 
 A lift of a wheel is a change of the configuration that raises this wheel by one metre and leaves

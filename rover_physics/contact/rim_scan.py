@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scan of a wheel's rim: the vertical gaps of its samples to the ground, and the nearest ones."""
 
 import numpy as np

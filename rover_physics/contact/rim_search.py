@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Search of a wheel's rims, beginning where edges of cells cross them; lengths are in cells."""
 
 import numpy as np

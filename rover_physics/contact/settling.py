@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inverse kinematics: the pose in which all six wheels just touch the terrain (paper 3.1).
 
 The six unknowns are q = (z, roll, pitch, right rocker angle, right and left bogie angle). The six

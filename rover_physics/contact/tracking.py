@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts that are followed while the rover moves: on a circle of the wheel, or on the ground.
 
 On a rim the nearest point moves with the wheel, so its circle is searched again. Between the rims

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact of a rigid cylindrical wheel with the terrain: vertical gap, contact point and normal.
 
 The lower half of the cylinder is sampled in the wheel's own, cambered plane: on circles across its

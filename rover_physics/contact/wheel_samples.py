@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sample points of a wheel's cylinder: angles along circles across its width."""
 
 from typing import Any

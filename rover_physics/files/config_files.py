@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Location of the package's own configuration files, in a source checkout or an installed tree."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads and writes .npz files; of those that may be hostile, sizes are known before unpacking."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes .npz files of long arrays, which come part by part."""
 
 from collections.abc import Mapping

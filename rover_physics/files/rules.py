@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rules for the values of configuration files, written in type annotations.
 
 A field such as ``radius: Annotated[float, number("m", above=0.0)]`` defines a key completely:

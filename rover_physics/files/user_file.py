@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads and writes files that a user names: never waits, and reads regular files only."""
 
 import os

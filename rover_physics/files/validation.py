@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Validation of the contents of a configuration file; each error names the dotted key."""
 
 import difflib

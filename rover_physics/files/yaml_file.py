@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Strict reading of YAML files: duplicate keys, large files and nested references are errors."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Static equilibrium of a settled rover: wheel loads for given torques (paper 3.2 in 3-D).
 
 In the contact frame of a wheel, n points from the ground to the wheel's centre, a is the axis of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Policy "servo": every wheel on a speed servo at the rate of the commanded motion.
 
 The unknowns are the six wheel loads and the rover's motion (forward, left, turning) on its

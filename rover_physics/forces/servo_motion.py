@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motions that the contacts allow, and the equilibrium as a function of the wheel forces.
 
 A rover whose six wheels stay on the ground moves in three ways. The motions follow from the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Policy "servo" at one pose: inputs from model and work space, results in SI units."""
 
 import numpy as np

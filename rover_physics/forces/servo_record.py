@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Work space of policy "servo": wheels on speed servos, and the rover's motion that follows."""
 
 from enum import IntEnum

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One wheel on a speed servo on yielding soil: its forces from the velocity of its contact.
 
 The soil's shear stress opposes the sliding velocity of the tread, as in soil (Janosi and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One wheel on a speed servo: its friction force from the velocity of its contact.
 
 The wheel touches the ground along a line, its width, or at a point of it. The line is taken as two

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shares of the wheels in the common traction and in the two common lateral terms.
 
 The wheels roll along some planar motion of the body, (vx, vy, yaw rate): straight ahead if they

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wheel-soil models: slip, sinkage and torque of a wheel for given forces on a soil.
 
 There are two models: Coulomb friction, and for a rigid wheel Bekker's pressure-sinkage relation

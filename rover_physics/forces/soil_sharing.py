@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wheel forces on soil, where friction and resistance depend on the wheel loads."""
 
 from rover_physics.forces.soil import SoilWheel, effective_friction, solve_wheel

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tip-over measures: the paper's ratio of angles, and the force-angle measure.
 
 The support polygon of a rocker-bogie rover has four corners. A bogie turns freely, so the net

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Policy "optimal": the torques that need the least friction among those in equilibrium.
 
 Three minimisations run in turn, the first two only until their constraint holds: keep all wheels

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The limits of a rover: one row each, from which verdicts, surveys, searches and lanes follow.
 
 A new limit is one row of LIMITS. If its bound is a number of the rover file, the row names its

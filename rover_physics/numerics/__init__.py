@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numerical tools: kernels, records, threads, linear systems, quaternions, read-only arrays."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Long sweeps in slices: between two slices the caller may look at a clock and stop the work."""
 
 import time

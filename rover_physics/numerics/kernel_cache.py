@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keeps compiled kernels on disk; a disk that cannot be read or written ends no program."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiles a kernel together with all kernels that it calls, in one go.
 
 Numba alone optimises each kernel with all that it calls and makes machine code of it: a function

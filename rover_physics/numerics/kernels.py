@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decorators that compile kernels with Numba and keep them on disk."""
 
 from rover_physics.numerics.kernel_cache import drop_stale_kernels

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Solver for small dense linear systems inside kernels."""
 
 from rover_physics.numerics.kernels import kernel

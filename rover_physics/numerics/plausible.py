@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds of plausible quantities: wide enough for any rover, narrow enough to compute with.
 
 A number beyond them is an error of units or a damaged message. Within them, products and squares

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Unit quaternions: conversions from and to roll, pitch and yaw, and to rotation matrices.
 
 A quaternion rotates vectors from the body frame to the map frame. Function names state the order

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Silences NumPy's warnings of overflow and NaN, which the checks of results report instead."""
 
 from collections.abc import Callable

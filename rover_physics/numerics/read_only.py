@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read-only arrays, so that results derived from an array cannot become stale."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Records: structures of fixed shape that kernels read and write through one pointer.
 
 Numba passes a tuple of arrays as ten numbers per array. It passes a record as one address, with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Number of threads of a sweep; for a short sweep, waking threads takes longer than the sweep."""
 
 from collections import deque

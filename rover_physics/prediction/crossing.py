@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Poses between waypoints, where wheels climb faces, roll off edges, or sweep round in a turn.
 
 A wheel contact can jump from one waypoint to the next. The poses in between then decide whether

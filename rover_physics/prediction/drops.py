@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wheels that roll off an edge: where they fall, and how far they drop.
 
 A wheel falls where its contact is behind it, and neither friction nor the motors balance it there.

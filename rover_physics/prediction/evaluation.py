@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The full model at one pose, and the compiled sweep of it over many poses."""
 
 from typing import Any

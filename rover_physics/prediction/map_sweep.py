@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scores of many single poses, such as all cells of a map.
 
 A prediction keeps about 100 numbers per pose, which is 6 GB for a map of a million cells at eight

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rover, terrain and options, checked and packed into the records that kernels read."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sweeps of long paths in parts: the memory is that of a part, whatever the length of the path."""
 
 from collections.abc import Iterator

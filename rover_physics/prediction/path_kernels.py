@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels over the waypoints of a path: contact jumps, and sums of distance, time and energy."""
 
 from typing import Any, NamedTuple

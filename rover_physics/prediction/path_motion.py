@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motions of the body along a path: speed forward and sideways and yaw rate at each waypoint.
 
 The step from a waypoint to the next is a motion of constant speed and yaw rate, an arc. Waypoints

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What only the whole path shows of a rover with speed servos: lifts, wedged wheels, and drift.
 
 A wheel may lift while the others drive the rover on, and touch down again. How high it gets is the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The model at two poses with measured steering angles, as a simulated rover needs it."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quasi-static model along paths: poses in, `PathPrediction` out.
 
 A path can be swept up to its first failure. It is then swept in blocks, each longer than the one

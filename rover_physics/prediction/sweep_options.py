@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Options of a prediction: torque policy, friction, torque, soil, arm and direction."""
 
 from collections.abc import Mapping

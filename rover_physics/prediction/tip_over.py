@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tip-over measures of a settled rover, from its centre of mass and the forces on it."""
 
 import numpy as np

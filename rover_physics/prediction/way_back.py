@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The way back along a swept path on ground without soil, from the results of the way in.
 
 On Coulomb ground the forces at rest are the same in both directions. Only faces differ: a wheel

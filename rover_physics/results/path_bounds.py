@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on a prediction along a path over an uncertain map: one frozen record of intervals."""
 
 from dataclasses import dataclass, replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prediction of the rover along a path: one frozen record of arrays, a row per waypoint."""
 
 from dataclasses import dataclass, replace

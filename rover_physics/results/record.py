@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The one record of what is predicted at a pose: a new quantity is one row of QUANTITIES."""
 
 from typing import Any, NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How much of each limit a result uses: 0 far away, 1 at the limit, above 1 broken.
 
 The use is infinite where the rover does not settle or a value cannot be computed, and NaN where
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from rover_physics.limits import table
 from rover_physics.limits.table import NOT_COMPUTABLE, TOLERANCE, Limit, Sense
+from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.read_only import freeze_fields, view_read_only
@@ -66,8 +68,12 @@ class RoverLimits:
 
 
 def limits_of(rover: Rover, policy: str) -> RoverLimits:
-    """Return the limits of a rover under a torque policy."""
-    return _pack_limits(SameObject(rover), policy, table.LIMITS)
+    """Return the limits of a rover under a torque policy; those of equal torques for other words.
+
+    A prediction from a file has the policy "recorded".
+    """
+    known = policy if policy in TORQUE_POLICIES else EQUAL
+    return _pack_limits(SameObject(rover), known, table.LIMITS)
 
 
 class SameObject:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks that the parameters of a rover agree and that it can stand on flat ground."""
 
 import math

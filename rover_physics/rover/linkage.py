@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rocker-bogie linkage for kernels: its constants, and the positions of its parts."""
 
 from typing import Any

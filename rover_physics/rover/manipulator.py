@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The paper's three-joint arm: kinematics, mass and load on the body."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rover parameters: geometry, masses, actuators and safety limits; the keys of a rover file."""
 
 import math

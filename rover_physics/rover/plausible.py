@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks the numbers of a rover before kernels use them; a rover need not come from a file."""
 
 import math

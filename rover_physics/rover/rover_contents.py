@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The contents of a rover file for a rover, and its text."""
 
 from dataclasses import asdict

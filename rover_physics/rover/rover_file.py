@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rover files: presets, and YAML files with the same keys."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How wheels that steer follow a commanded motion: their angles, and when the rover may drive.
 
 The rover drives on while its wheels are near their angles, slowed by the cosine of the largest

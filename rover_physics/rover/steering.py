@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Steering: angle and rolling speed of each wheel that a planar motion of the body asks for.
 
 A motion is (vx, vy, yaw rate) of the body origin on level ground, in the body frame, [m/s, rad/s].

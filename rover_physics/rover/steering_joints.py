@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The steered wheels of a rover and the joints that turn them: names, sign and limit."""
 
 import math

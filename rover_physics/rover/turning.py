@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How tightly a rover turns: its smallest radius, and whether it turns on the spot."""
 
 import math

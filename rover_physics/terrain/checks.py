@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of the fields of a terrain; each returns the value in its final type and layout.
 
 All raise a TerrainError that names the field, the value and the rule.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A hash of a terrain's content, by which two maps can be told apart."""
 
 import hashlib

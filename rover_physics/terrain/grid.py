@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Terrain: an elevation grid with unknown cells and layers of friction, soil and uncertainty."""
 
 from dataclasses import dataclass, replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Terrain for kernels: arrays read by address, with bilinear interpolation of heights.
 
 Numba passes an array from kernel to kernel as nine numbers, but its address as one. Passing two

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Preset terrains of the package, by name."""
 
 import os

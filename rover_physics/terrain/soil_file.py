@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Soils: parameters, presets and soil files."""
 
 import math

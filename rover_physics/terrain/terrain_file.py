@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads and writes the entries of terrain files (.npz), within a limit of cells."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Equilibrium of a rover with measured attitude, suspension and contact angles, as rows of a QP.
 
 The nine equations of `equilibrium` are solved for six loads, two lateral terms and the traction of

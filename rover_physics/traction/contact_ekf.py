@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact angles from motion, by an extended Kalman filter (EKF).
 
 The centre of a wheel that rolls without slip moves at its rolling speed along its contact tangent.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fallback if OSQP fails: all wheels get the same torque, and the answer is marked.
 
 `TractionWorkspace.solve` reports a failure if OSQP's status is not "solved" or a variable is not

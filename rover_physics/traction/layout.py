@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Indices of the variables and rows of the traction control's quadratic program (QP).
 
 All indices start at 0. Where a docstring says "First of", the entries of the six wheels follow in

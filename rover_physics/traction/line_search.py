@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How good shared forces are, by the round cone, and the best ones on the way to an answer."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact angles from a map: where the wheels of a rover of known pose are nearest to the ground.
 
 Attitude and suspension angles are measured, so the relative places of the wheels are more accurate

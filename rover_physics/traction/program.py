@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quadratic program (QP) that shares the torques: no wheel slips before all give their part.
 
 Variables, x = scale * y + shift in sixths of the weight: tractions T (6), loads N (6), lateral

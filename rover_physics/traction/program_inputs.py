@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the quadratic program (QP) is given beside the balance: limits of the wheels, weights."""
 
 from dataclasses import astuple, dataclass

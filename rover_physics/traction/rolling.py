@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the wheels of a rover roll with their measured steering angles.
 
 `shares` has the planar motion of the body in which the wheels roll. Here it is scaled so that the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Solving for the torques: a sequence of quadratic programs by OSQP, each about the last one."""
 
 from dataclasses import dataclass

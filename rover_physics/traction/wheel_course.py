@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the wheels roll with their measured steering angles, and how fast they should.
 
 The loops of the controller know one speed: the mean speed of the wheels, positive in their

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The forces of an answer at each wheel, in SI units."""
 
 import numpy as np

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Assessment of predictions: limits, verdicts, traversability classes, entrapment and reach."""

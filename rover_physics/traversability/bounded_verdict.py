@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Refusals that follow from the worst case within the bounds of an uncertain map."""
 
 from dataclasses import replace

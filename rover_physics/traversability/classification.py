@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Traversability classes: what drive a rover needs to pass, or that it cannot."""
 
 from collections.abc import Iterator, Sequence

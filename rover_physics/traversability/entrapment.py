@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Entrapment: a path is refused if the rover can drive in, but neither on nor back out.
 
 Driving back differs from driving in for three reasons. A wheel that dropped off an edge has to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The main calls of the package: paths or poses in, predictions and verdicts out."""
 
 from collections.abc import Sequence

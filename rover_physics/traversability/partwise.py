@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Judgement of long paths in parts: predictions are handed over and not kept."""
 
 from collections.abc import Iterator

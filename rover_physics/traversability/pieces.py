@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Judges many short pieces of path at once, as `judge_paths` does but faster.
 
 A search asks about thousands of pieces and needs to know only whether each passes, and what it

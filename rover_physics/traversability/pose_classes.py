@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Traversability classes of many single poses, as numbers, for hazard maps and surveys."""
 
 from collections.abc import Callable, Iterator, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reach query: whether the arm of the standing rover can reach a point and push there."""
 
 from collections.abc import Mapping

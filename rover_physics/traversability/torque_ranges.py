@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Torque ranges: the lowest and highest torque of each wheel that can keep all constraints.
 
 The forces that balance the rover and keep the paper's three constraints form a convex set. The

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verdict on a prediction: whether each waypoint keeps the limits, and if not, why."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the command-line options of the manipulator and checks their values."""
 
 import math

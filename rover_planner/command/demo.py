@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner demo`: queries a running server, shows a table and a picture."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner figure4`: Figure 4 of the paper."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The commands `rover_planner plan` and `replay-plan`: search a way between two poses."""
 
 import json

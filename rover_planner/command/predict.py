@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner predict`: writes loads, slip and margins along a path to a file."""
 
 from pathlib import Path

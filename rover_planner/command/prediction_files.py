@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads and writes the files of the `predict` command: poses and predictions."""
 
 import math

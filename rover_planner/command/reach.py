@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner reach`: whether the arm of a rover at rest reaches a point."""
 
 import json

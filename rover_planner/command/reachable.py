@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner reachable`: where a rover can go on a survey and return from."""
 
 import json

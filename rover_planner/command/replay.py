@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner replay`: answers the questions of a recorded drive again."""
 
 import json

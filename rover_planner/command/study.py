@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner study`: sweeps or optimises numbers of a rover."""
 
 from pathlib import Path

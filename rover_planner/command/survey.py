@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner survey`: judges a rover all over a map, on one machine or many."""
 
 import json

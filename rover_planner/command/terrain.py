@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner terrain`: makes a Mars-like terrain and saves it."""
 
 from pathlib import Path

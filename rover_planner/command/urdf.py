@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The commands `rover_planner urdf` and `rover`: rover files to URDF and back."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner view`: a web page that shows the rover on a terrain."""
 
 import contextlib

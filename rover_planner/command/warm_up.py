@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner warm-up`: compiles all kernels and keeps them on disk."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Child processes that end with their parent; each has its own process group.
 
 The program `python -m rover_planner.demo.child_process PARENT MODULE ...` runs a module that the

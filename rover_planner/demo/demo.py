@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The demo: runs a traverse_server and a mission planner in separate processes.
 
 It works as a user's system does: it publishes a map over DDS to a running server, and a mission

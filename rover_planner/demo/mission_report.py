@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answers to a mission's goals as a table for the terminal."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figure 4 of the paper: how the torque of one wheel changes the loads of all three of a side.
 
 The rover stands on level ground and the same torque acts on one wheel of both sides. The loads

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The common style of all pictures, and writing a picture to a file."""
 
 import io

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draws answers: candidate paths on the hill-shaded terrain, and wheel values along them."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draws a survey: classes, or what can be reached, on the shaded map with legend and scale bar."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draws the answer to a question for a way: the way, or the closed area, on the shaded map."""
 
 from pathlib import Path

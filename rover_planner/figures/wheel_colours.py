@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The colours and line styles of the wheels in every picture of the project, and on the page."""
 
 WHEEL_COLOURS = {"rear": "#0072b2", "middle": "#e69f00", "front": "#cc79a7"}

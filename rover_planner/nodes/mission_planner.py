@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node /mission_planner: queries a traverse_server over ROS 2 for a list of goals.
 
     mission_planner [--map TERRAIN] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--drive] [--json]

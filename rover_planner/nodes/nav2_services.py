@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What Nav2 asks a planner: the service ~/is_path_valid, the action ~/compute_path_to_pose.
 
 Both exist where nav2_msgs is installed.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node programs: their help texts and command-line arguments; needs no ROS."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Takes the questions of a node's services and has them judged, within their budget.
 
 A question's way: a service makes a `Question` of its request; the desk notes when it came and what

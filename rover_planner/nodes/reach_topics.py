@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topics and service of the arm in the traverse server: tool target, wrench, `~/check_reach`."""
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node /rover_simulator: simulates a rover on a terrain with the topics of a real rover."""
 
 import contextlib

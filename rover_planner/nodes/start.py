@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Starts the node programs; reports help and missing libraries before ROS is imported."""
 
 import importlib

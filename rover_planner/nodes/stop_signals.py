@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Signals that tell a node to end, taken without ROS, so that it can still send what it must.
 
 ROS's own handlers end the context at once: open questions would stay without an answer, and wheels

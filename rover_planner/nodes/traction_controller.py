@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node /traction_controller: commands wheel torques by a QP at a fixed rate."""
 
 import gc

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node /traverse_server: answers over ROS 2 whether the rover can traverse a path."""
 
 import gc

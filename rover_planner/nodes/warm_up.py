@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The kernels of the nodes beyond those of rover_physics, and the groups of all kernels."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prints docs/parameters.md."""
 
 from rover_planner.parameters.document import parameters_document

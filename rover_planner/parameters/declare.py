@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declares a node's parameters from their table, checks changes and passes them to the node."""
 
 import traceback

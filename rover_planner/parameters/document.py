@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Generates docs/parameters.md from the tables."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of `/rover_simulator`."""
 
 from dataclasses import dataclass

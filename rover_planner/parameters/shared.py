@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters that several nodes share."""
 
 from msg_adapters.gridding import CELL_HEIGHTS

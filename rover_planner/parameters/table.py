@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Base of the tables of node parameters: dataclasses whose fields have meaning, unit, bounds."""
 
 import math

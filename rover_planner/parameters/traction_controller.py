@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of `/traction_controller`."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Warns of parameters that are set at a node's start but do not exist."""
 
 import difflib

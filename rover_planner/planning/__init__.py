@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Path planning without ROS: candidate paths, their verdicts, and the answers to queries."""

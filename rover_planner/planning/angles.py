@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Angles in the range from -pi to pi."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a prediction in a file was made for, so that it can be judged again under the same."""
 
 from dataclasses import dataclass, replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Generates candidate paths in the plane between two poses: a direct curve and a fan around it.
 
 Every candidate is driven forward, leaves the start along the start's heading and arrives along the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiled loops over the samples of a candidate's curve."""
 
 from typing import NamedTuple

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dubins paths: forward connections of two poses by arcs of one radius and straight lines.
 
 Dubins, L. E. (1957), On curves of minimal length with a constraint on average curvature, American

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chooses a start and goals on a map for demos: goals on plain ground and difficult goals."""
 
 from dataclasses import dataclass

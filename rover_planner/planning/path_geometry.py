@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Geometry of paths: waypoints between given poses, and rings of goals around a goal."""
 
 import math

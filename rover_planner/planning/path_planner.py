@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plans and checks paths of a rover on a map; tries other goals near an unreachable one."""
 
 import itertools
@@ -135,9 +136,7 @@ class PathPlanner:
         )
 
     def _query(self, start: Pose, goal: Pose) -> PathAnswer:
-        return answer_path_query(
-            self.rover, self.terrain, start, goal, self.options
-        )
+        return answer_path_query(self.rover, self.terrain, start, goal, self.options)
 
     def _goals_to_stand_on(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Pose]:
         """Yield alternative goals where the rover can stand, nearest first, a few per ring.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Judges candidate paths between two poses, compares risk and energy, and explains the choice."""
 
 import math

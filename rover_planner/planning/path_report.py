@@ -1,9 +1,11 @@
+# SPDX-License-Identifier: Apache-2.0
 """Makes the report of a judged path: extremes, failure, classes and the search for it."""
 
 import math
 from collections.abc import Sequence
 
 from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
+from rover_physics.traversability.verdict import BOUNDS, EXTREMES
 from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.verdict_report import (
@@ -15,6 +17,9 @@ from rover_planner.planning.verdict_report import (
     VerdictReport,
     WaypointLists,
 )
+
+REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS)
+"""Fields of a verdict that a report has."""
 
 
 def report_path(
@@ -60,19 +65,7 @@ def _report_extremes(candidate: Candidate) -> PathReport:
     verdict, prediction = candidate.verdict, candidate.prediction
     return PathReport(
         policy=verdict.policy,
-        min_tip_over_ratio=verdict.min_tip_over_ratio,
-        max_friction_utilisation=verdict.max_friction_utilisation,
-        max_torque_saturation=verdict.max_torque_saturation,
-        max_tilt=verdict.max_tilt,
-        min_belly_clearance=verdict.min_belly_clearance,
-        max_wheel_drop=verdict.max_wheel_drop,
-        max_sinkage=verdict.max_sinkage,
-        map_sigmas=verdict.map_sigmas,
-        tip_over_ratio_bound=verdict.tip_over_ratio_bound,
-        friction_utilisation_bound=verdict.friction_utilisation_bound,
-        torque_saturation_bound=verdict.torque_saturation_bound,
-        tilt_bound=verdict.tilt_bound,
-        belly_clearance_bound=verdict.belly_clearance_bound,
+        extremes={name: getattr(verdict, name) for name in REPORTED},
         waypoints=len(candidate.poses),
         length=candidate.length,
         time=float(prediction.time[-1]) if candidate.is_complete else math.nan,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The candidate that turns on the spot: to face the goal, and once more when it is there."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report of a request: the verdict and its details as dataclasses and as flat JSON."""
 
 from collections.abc import Iterator, Mapping
@@ -23,32 +24,9 @@ class PathReport:
 
     policy: str
     """Torque policy that was assumed."""
-    min_tip_over_ratio: float
-    """Smallest tip-over ratio, NaN if no waypoint settled."""
-    max_friction_utilisation: float
-    """Largest friction utilisation."""
-    max_torque_saturation: float
-    """Largest torque saturation."""
-    max_tilt: float
-    """Largest tilt of the body [rad]."""
-    min_belly_clearance: float
-    """Smallest belly clearance [m]."""
-    max_wheel_drop: float
-    """Largest drop of a wheel that rolled off an edge [m]."""
-    max_sinkage: float
-    """Largest sinkage of a wheel into soil [m]."""
-    map_sigmas: float
-    """Standard deviations of the map that were allowed for; 0 if it has no elevation_std."""
-    tip_over_ratio_bound: float
-    """Smallest possible tip-over ratio within `map_sigmas`; NaN if the map is exact."""
-    friction_utilisation_bound: float
-    """Largest possible friction utilisation."""
-    torque_saturation_bound: float
-    """Largest possible torque saturation."""
-    tilt_bound: float
-    """Largest possible tilt [rad]."""
-    belly_clearance_bound: float
-    """Smallest possible belly clearance [m]."""
+    extremes: Mapping[str, float]
+    """Extremes of the verdict, its risk, and the bounds of them on an uncertain map, by the names
+    of its fields; each is a key of its own."""
     waypoints: int
     """Number of waypoints."""
     length: float
@@ -217,5 +195,7 @@ def _entries(part: Any) -> Iterator[tuple[str, Any]]:
         value = getattr(part, field.name)
         if is_dataclass(value):
             yield from _entries(value)
+        elif field.name == "extremes":
+            yield from value.items()
         elif value is not None:
             yield field.name, value

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A service whose responses are sent later, while the node goes on with other work."""
 
 from collections.abc import Callable

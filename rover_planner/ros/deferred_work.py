@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Work that a node does after it has answered a request, so that answers are not delayed."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Starts ROS where no log file can be written, and says what a node has to do without a disk."""
 
 import os

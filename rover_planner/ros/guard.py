@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keeps a node alive: an unexpected error is logged once with its trace, and counted."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hands functions from other threads to the executor's thread of a node."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prepares maps in a thread of their own, so that a node goes on meanwhile."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sends many responses in small groups, so that clients have time to take them."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Warns of publishers of another type than a node's subscription, which cannot be heard."""
 
 from collections.abc import Mapping

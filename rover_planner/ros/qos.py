@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quality-of-service profiles of all topics, by purpose."""
 
 from rclpy.qos import (

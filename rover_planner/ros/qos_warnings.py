@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Warns of publishers that a subscription cannot hear, with the parameter that mends it."""
 
 from collections.abc import Mapping

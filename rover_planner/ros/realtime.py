@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sets the real-time priority of this process, and keeps the kernel from holding it up."""
 
 import ctypes

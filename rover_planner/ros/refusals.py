@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Turns every error of a request into a refusal with a reason, so that the node continues."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Subscriptions to requests, such as paths: reliable, and loud about publishers not heard."""
 
 from collections.abc import Callable

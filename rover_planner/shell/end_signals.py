@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Makes a command end in order when the system asks it to."""
 
 import contextlib

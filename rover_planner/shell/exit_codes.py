@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exit codes of the command line and of the node programs."""
 
 EXIT_OK = 0

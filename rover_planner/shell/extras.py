@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks for optional libraries, which only some commands need."""
 
 import importlib.util

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loads the kernels of a program before it needs them; compiles those that are not on disk."""
 
 from collections.abc import Callable, Sequence

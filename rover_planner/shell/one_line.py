@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Puts any text into one short line that a terminal can show."""
 
 MAX_LINE = 300

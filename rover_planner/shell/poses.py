@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Poses and places on the command line, with commas or blanks between their numbers."""
 
 import math

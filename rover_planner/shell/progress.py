@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Progress on the terminal while a command runs: spinner, bar and steps."""
 
 import itertools

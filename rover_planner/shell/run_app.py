@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs a typer app; the caller handles exit codes and error messages."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs a program so that it always ends with an exit code and at most one line on stderr."""
 
 import contextlib

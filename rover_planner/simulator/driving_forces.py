@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Computes the forces on a rover under given wheel torques: tractions, loads and net push."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The MuJoCo model of a rover on a terrain, as MJCF text."""
 
 from xml.sax.saxutils import quoteattr

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The plant that simulates a rover in MuJoCo, with inertia and wheel slip."""
 
 import numpy as np

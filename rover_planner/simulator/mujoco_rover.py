@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A rover on rigid ground in MuJoCo, moved by wheel torques or by speed servos.
 
 It needs the package mujoco (extra `bench`). It shares only the rover's numbers with the model of

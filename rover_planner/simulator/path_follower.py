@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Path following: pure pursuit forwards and backwards, and turns on the spot between."""
 
 import math

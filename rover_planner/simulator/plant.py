@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The interface of a simulated rover, common to all physics engines."""
 
 from dataclasses import dataclass

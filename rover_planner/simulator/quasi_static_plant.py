@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The plant that simulates a quasi-static rover: it moves from one equilibrium to the next.
 
 With a commanded speed, the rover moves if the model allows it; otherwise it stops with the model's
@@ -7,7 +8,6 @@ The mean speed of the wheels is the only state with inertia. Limits of attitude,
 clearance apply in both cases. Wheels that steer turn at the rate of the rover file; `SteeredDrive`
 says how the drive waits for them.
 """
-
 
 import numpy as np
 

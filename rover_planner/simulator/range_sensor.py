@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A terrain sensor on the rover's mast, with range, field of view, occlusion and noise."""
 
 from dataclasses import dataclass

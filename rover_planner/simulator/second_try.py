@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Path following that backs off and tries again where the rover stands still."""
 
 import math

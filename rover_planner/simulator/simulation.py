@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The simulation without ROS: drives a plant along a path, by speeds or by torques."""
 
 from dataclasses import dataclass

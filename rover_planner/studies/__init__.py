@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Design studies: sweeps and optimisations of a rover's numbers."""

@@ -1,7 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
 """Objectives of studies: utilisation, tip-over margin, energy, tallest step, load imbalance."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -121,7 +123,7 @@ def _make_axis(half: float, cell: float, aspect: float = 1.0) -> Floats:
 
 def _lift_limit(study: Study, rover: Rover) -> Rover:
     """Return the rover without the limit that the objective measures."""
-    lifted = {
+    lifted: dict[str, Any] = {
         "worst_utilisation": {"friction_utilisation": NO_LIMIT},
         "tip_over_margin": {"tip_over_ratio": -NO_LIMIT},
     }.get(study.objective, {})

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Access to numbers of a rover file by dotted names, such as suspension.wheels.front.x."""
 
 import difflib

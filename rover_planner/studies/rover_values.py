@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Values of a rover that can be changed interactively: labels, units and ranges."""
 
 import dataclasses

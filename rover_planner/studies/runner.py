@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs a study: all combinations of a sweep, or an optimisation by scipy."""
 
 import contextlib

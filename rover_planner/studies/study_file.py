@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Studies and their files: a rover, its varied numbers, the drives and the objective."""
 
 import math

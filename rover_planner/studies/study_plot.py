@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draws a study: the objective over one or two parameters, or over the trials."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Describes a study and its result in lines of text, for the terminal and for the page."""
 
 from rover_planner.studies.runner import StudyResult, Trial, count_trials

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The survey of one chunk: the work of one task, in whatever process it runs."""
 
 import functools

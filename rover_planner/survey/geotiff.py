@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """GeoTIFF maps: checked when they are opened, read by windows, written as COG."""
 
 import contextlib

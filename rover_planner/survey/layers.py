@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a survey keeps of each cell: names, types and meanings of its layers."""
 
 from collections.abc import Mapping

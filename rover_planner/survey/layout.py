@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How a map is cut for a survey: cells, tiles and chunks.
 
 The rover is judged at every `step`-th cell of the map. Cells are judged tile by tile, each tile in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Maps that are read by windows: those kept in a store, and GeoTIFF files."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Colours of a survey's classes, in its pictures and on the page."""
 
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES

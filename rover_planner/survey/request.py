@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is asked of a survey: rover, options, headings and distance of cells."""
 
 import hashlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Zarr store of a survey: created whole, filled chunk by chunk, never mixed with another."""
 
 import contextlib

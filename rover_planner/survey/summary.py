@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The numbers of a survey: shares of the surveyed cells by class, and area."""
 
 from typing import Any

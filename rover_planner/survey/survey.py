@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A survey from question to store: opens the map, creates the store or goes on with it."""
 
 from collections.abc import Callable

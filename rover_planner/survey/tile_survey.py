@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The survey of one tile: the rover at each of its cells and headings, and what is kept of it."""
 
 from collections.abc import Callable

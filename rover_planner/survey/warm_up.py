@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiles what a survey needs before its workers start, so that each of them only loads it."""
 
 from dataclasses import replace

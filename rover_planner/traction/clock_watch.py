@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Notices that the clock of the header stamps was stepped or, if it is simulated, has stopped."""
 
 from rover_planner.traction.stamps import NANOSECONDS

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether the rover may drive: enabled by an operator and not stopped by the emergency stop."""
 
 

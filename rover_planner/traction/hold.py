@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Torques of a rover that does not drive: held by its servos, braked or left to coast.
 
 - hold: each wheel has a PI servo to a rate of zero. It starts from the torques that balance the

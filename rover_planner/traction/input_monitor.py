@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Monitors inputs: whether each is available, recent and valid."""
 
 import math

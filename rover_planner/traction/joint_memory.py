@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Merges joint states of several publishers: each joint keeps its last value and its time."""
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits of what a rover can measure and do: impossible measurements, commands that are too fast.
 
 A measurement outside these limits comes from a broken sensor or driver, not from a rover.

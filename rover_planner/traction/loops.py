@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control loops around the torque allocation: speed, heading, slip, stall and torque rate."""
 
 from dataclasses import dataclass, field

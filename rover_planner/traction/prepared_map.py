@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A map that is prepared for the traction controller, so that updates are not delayed.
 
 Preparing a map takes several milliseconds, longer than an update may take. A separate thread does

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The settings of a traction controller: its parameters, loaded and ready to use."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decides when to stop pushing: the rover is commanded to move and has not for too long."""
 
 from statistics import median

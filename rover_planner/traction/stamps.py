@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Judges header stamps: frozen, delayed and future ones must not pass as recent measurements."""
 
 from rover_planner.errors import PlanningError

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times and counts of a traction controller, for diagnostics and measurements."""
 
 from collections import deque

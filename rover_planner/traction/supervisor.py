@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decides whether the rover drives or rests, and what its wheels do at rest."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The traction controller without ROS: keeps measurements and computes wheel torques."""
 
 import math

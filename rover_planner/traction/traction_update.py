@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The result of one update of the traction controller."""
 
 from dataclasses import dataclass

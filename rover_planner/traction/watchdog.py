@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A watchdog in a thread of its own: it acts when commands are not renewed in time.
 
 It counts on the monotonic clock and sleeps relative times, so a step of the system clock cannot

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Craters of a generated terrain: size distribution, and relief with rim and ejecta.
 
 Fresh simple craters have a depth, rim to floor, of about a fifth of their diameter. Their rim

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Opens the terrain file that a client names by a URL, below a folder and within limits."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Generates a Mars-like terrain from a seed: fractal relief, craters and rocks."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rocks of a generated terrain: size distribution, and shape on an elevation grid.
 
 Size-frequency law of Golombek and Rapp (1997), Size-frequency distributions of rocks on Mars and

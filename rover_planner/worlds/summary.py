@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A short description of a terrain for logs and the terminal."""
 
 import math

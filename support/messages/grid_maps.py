@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """GridMap messages for tests: objects with the fields of grid_map_msgs/GridMap."""
 
 import copy

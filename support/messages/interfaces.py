@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Builds a package of messages that PyPI lacks, with the ROS generators that it has and gcc."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded drives for tests: ground, a rover's messages, bags with them, and their replay."""
 
 import json

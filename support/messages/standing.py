@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a simulated rover measures of its own pose and suspension."""
 
 from rover_physics.names import SUSPENSION_JOINTS

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages about the arm's tool, for tests."""
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of transforms, as /tf carries them."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The project's checkout for tests: its files, its entry points, copies of it."""
 
 import runpy

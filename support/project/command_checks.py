@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Holds commands of the docs against the product without running them: names, options, values."""
 
 import ast

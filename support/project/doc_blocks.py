@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Code blocks of README and docs: read from the page, and the words of their commands."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processes of a test, known by a token that all of them inherit in their environment."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processes that cannot write to their disk: no rights to write anywhere, or no space left."""
 
 import ctypes

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Support of the tests of the page."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A real browser for tests: finds and starts it, and operates the page as a user does."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes the pictures of docs/viewer.md: `python -m support.viewer.pictures docs`."""
 
 import argparse

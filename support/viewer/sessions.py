@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Paths, grounds, sessions and slow scenarios for tests of the viewer."""
 
 import threading

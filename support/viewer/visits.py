@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A browser for the tests of a module, what it has heard of a page, and its camera."""
 
 import itertools

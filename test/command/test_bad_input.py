@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command line keeps its promise: bad input is exit code 2 and one line, whatever it is."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Child processes end with their parent, however it ends, and take their own children along."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command line as a whole: usage errors, help, negative numbers, and what it says it wrote."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The demo shows real answers over DDS, writes its picture and leaves nothing running."""
 
 import os

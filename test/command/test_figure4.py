@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figure 4 of the paper: loads against one torque, by the paper's equations and the model's."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of answers are drawn for accepted and refused paths, on maps with and without holes."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`predict` keeps its contract: arrays in a file, exit code 0, or exit code 2 and one line."""
 
 from dataclasses import replace

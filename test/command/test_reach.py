@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`reach` answers in JSON, or ends with exit code 2 and one line."""
 
 import json

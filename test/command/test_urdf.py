@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The commands `urdf` and `rover`: files there and back, and one line for bad input."""
 
 import pytest

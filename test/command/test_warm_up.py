@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`warm-up` compiles all kernels once, and says so if they cannot be kept."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded maps are read: a GridMap of legged robots, Hazcam points of Spirit."""
 
 import lzma

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every cloud becomes a terrain cell by cell, or is refused by name in bounded memory."""
 
 import array

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """GridMap messages become terrains cell by cell, wherever their circular buffer starts."""
 
 from types import SimpleNamespace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joints are read by name, with names, signs and offsets of the robot; odd ones are refused."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Attitude, odometry, commands, tool targets and wrenches: impossible ones are refused."""
 
 import math

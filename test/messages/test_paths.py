@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Poses keep place and heading through messages; those without meaning are refused by name."""
 
 import hashlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Predictions become flat labelled arrays, a trajectory by joint name, and markers."""
 
 import array
@@ -24,6 +25,7 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
 
@@ -105,7 +107,9 @@ def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(pre
     stock = []
     for unsettled in (49, 10, 50):
         cut = np.arange(len(prediction.settled)) < unsettled
-        part = replace(prediction, settled=prediction.settled & cut)
+        results = prediction.results.copy()
+        results["status"][~cut] = PoseStatus.NOT_SETTLED
+        part = replace(prediction, results=results)
         trajectory = joint_trajectory(part, rover, "map", STAMP, stock)
         assert len(trajectory.points) == unsettled
         assert trajectory == joint_trajectory(part, rover, "map", STAMP)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verdicts become diagnostics for people and strict JSON for programs."""
 
 import math

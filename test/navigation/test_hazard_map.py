@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A hazard map has the class of each pose, and what a change cannot reach is not judged again."""
 
 from dataclasses import replace
@@ -104,7 +105,7 @@ def test_at_a_limit_a_pose_has_the_class_of_the_full_judgement(excess):
     ramp = Terrain(0.3 * 0.05 * np.indices((60, 60))[1].astype(float), 0.05, (0.0, 0.0))
     pose = np.array([[1.5, 1.5, 0.0]])
     tilt = judge_poses(LSR1, ramp, pose, np.zeros(1))[0].pitch[0]
-    limits = replace(LSR1.limits, tilt=abs(float(tilt)) + np.radians(excess))
+    limits = replace(LSR1.limits, tilt=abs(float(tilt)) + excess)
     on_map = RoverOnMap(replace(LSR1, limits=limits), ramp, OPTIONS)
     found = classify_poses(on_map, pose)
     assert found == classes_of_judgements(on_map, pose)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A monitor finds the rest of the path and reasons to stop; a stop lasts until the next path."""
 
 from dataclasses import replace
@@ -100,7 +101,7 @@ def test_the_rest_is_judged_once_for_each_map(service):
     judged = [monitor.look(replace(one, time=10.0 + 0.1 * k)).judged for k in range(5)]
     assert judged == [2] * 5
     settings = service.settings
-    service.settings = replace(settings, query=replace(settings.query, friction=0.6))
+    service.settings = replace(settings, query=settings.query.change(friction=0.6))
     assert monitor.look(sight(service, STRAIGHT[10], 20.0)).judged == 3
     service.settings = settings
 

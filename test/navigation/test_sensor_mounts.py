@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a sensor is: its mount on the robot, and the robot at the time of the measurement."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Transforms between frames are those of their time, and stale ones are refused with their age."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shipped parameter files name parameters that exist, and joints that fit together."""
 
 import pytest

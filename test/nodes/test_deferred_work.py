@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is put off runs after the callback, requests first; messages wait for listeners."""
 
 import threading

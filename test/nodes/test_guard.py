@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nothing that a callback raises, and no message that cannot be read, ends a node."""
 
 import time

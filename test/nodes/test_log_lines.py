@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What lasts is logged when it begins and ends; what repeats, once in a while."""
 
 from rover_planner.ros.logs.repeat_log import PERIOD, RepeatLog

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Maps taken as bytes: each is prepared once, the latest is returned, bad ones are refused."""
 
 from builtin_interfaces.msg import Time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One table makes declaration, checks, docs and the typed values; bad values are refused."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nodes as processes of their own: they start, answer, and end cleanly when they are told to."""
 
 import os

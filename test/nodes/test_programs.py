@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node programs have help that is true, need ROS only to run, and name wrong words."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Precedence over other programs: taken by all threads, or refused with what would be right."""
 
 import subprocess

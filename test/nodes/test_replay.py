@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded drives are judged again: from SQLite and MCAP, with maps, joints and odometry."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Replays know the robot: IMU, mounted cameras, recorded transforms, names of joints."""
 
 import numpy as np

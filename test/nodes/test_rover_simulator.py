@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The simulator's node among the others: the whole system on one machine, without hardware."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Candidate paths meet both poses, are evenly sampled, smooth, and never too tight to drive."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dubins paths end at the goal, and the shortest is as long as it should be."""
 
 import numpy as np

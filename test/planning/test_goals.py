@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Goals are chosen from the map: known ground to stand on, hard ground, and beyond the edge."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """load_map reads terrain files below its folder and within its limits, and nothing else."""
 
 import os

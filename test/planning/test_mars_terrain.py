@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Made terrain repeats itself and has relief, craters and rocks as their sources give them."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The query sweeps the candidates, chooses by risk and then energy, and explains a refusal."""
 
 import dataclasses
@@ -142,7 +143,7 @@ def test_bad_requests_are_refused(rover):
         options = PathQueryOptions(count=0)
         answer_path_query(rover, flat(), (0, 0, 0), (1, 0, 0), options)
     with pytest.raises(ModelError, match="policy"):
-        options = dataclasses.replace(COARSE, policy="lucky")
+        options = COARSE.change(policy="lucky")
         answer_path_query(rover, flat(), (0, 0, 0), (1, 0, 0), options)
     with pytest.raises(PoseError):
         check_path(rover, flat(), np.zeros((3, 2)), COARSE)

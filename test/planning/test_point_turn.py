@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the candidate that turns on the spot."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Studies find what is best, say what cannot be, and read their files as strictly as others."""
 
 import csv

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The house: no circle of imports, and they run one way between rooms."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Benchmarks still run against the product as it is; what they find is not looked at here."""
 
 import importlib

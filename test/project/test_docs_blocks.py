@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The code blocks of README and docs run as they are written, from top to bottom of each page.
 
 A page gets an empty folder, and the programs of this checkout by their names. What cannot run

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What README and docs name exists: files, modules, links, options, and rooms in import order."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The examples run as they are: each prints its answers and draws its picture."""
 
 import ast

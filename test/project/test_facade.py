@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The API of rover_physics: its names work from the package, and cost nothing before their use."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A test run ends where its caller ignores signals."""
 
 import os

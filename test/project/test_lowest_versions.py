@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The lowest versions that setup.py declares install, and what is installed with them works."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The package as a whole: one version, entry points that exist, imports one way only."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """colcon builds and tests the package in a clean workspace, and its executables run there."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands that need more than a plain installation say what, and run nothing."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A program always ends with an exit code and at most one short line on stderr."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a survey finds does not depend on its chunks, nor on ground beyond the rover's reach."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
 
 import math

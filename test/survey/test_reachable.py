@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What can be reached on a surveyed map, and returned from, agrees with scipy's graphs."""
 
 import json

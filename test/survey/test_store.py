@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A store goes on where it was left, and is never mixed with another survey."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surveys with Dask: same bits however they run, and nothing lost however they end."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surveys that cannot go on end in one line, in order, and leave what they found."""
 
 import math

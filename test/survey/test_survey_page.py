@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A survey as layers of the page: its colours, its legend, and what is refused or said."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The picture of a survey: its colours are those of the legend, whatever the shape of the map."""
 
 import pytest

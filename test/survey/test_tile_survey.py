@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A survey finds of each pose what predict finds of it, and never passes over unknown ground."""
 
 from dataclasses import replace

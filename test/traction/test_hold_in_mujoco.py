@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """On a slope of 20 degrees in MuJoCo a rover is held, as docs/validation.md says."""
 
 import importlib

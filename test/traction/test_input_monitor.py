@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inputs that are missing, bad or stale are named; frozen, delayed and future stamps are seen."""
 
 import pytest

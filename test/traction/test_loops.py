@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loops: limited outputs do not add up, changes keep their shares, slip does not hide rolling."""
 
 import numpy as np

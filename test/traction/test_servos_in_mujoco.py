@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed servos with droop in MuJoCo: a rover that steers keeps its steering, and speed is lost."""
 
 import numpy as np

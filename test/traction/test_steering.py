@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The traction controller with wheels that steer: measured angles, their absence, curves."""
 
 from dataclasses import replace

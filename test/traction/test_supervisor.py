@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rover drives only while it may; at rest it is held, braked or left to coast."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Torques from measurements: zero at once when anything is missing, back when it is there."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The watchdog acts while no command is valid, and lets no late command through."""
 
 import threading

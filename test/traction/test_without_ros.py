@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The controller's decisions can be made where ROS is not installed."""
 
 import subprocess

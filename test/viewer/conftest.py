@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page that the tests in a browser share, one of each file, and its visitor."""
 
 from collections.abc import Iterator

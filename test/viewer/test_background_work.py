@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Work in the background with a real rover on a real map: newest wins, cancel, error, progress."""
 
 import subprocess
@@ -137,7 +138,7 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, spirit):
 
 
 def test_a_request_that_the_model_refuses_is_delivered_as_an_error(judge, spirit):
-    options = replace(spirit.options, policy="best")
+    options = spirit.options.change(max_torque=1.0, friction=0.3, payload=1e300)
     judge.ask(JudgeRequest(replace(spirit, options=options)))
     wait_for_idle(judge)
     (done,) = judge.take()

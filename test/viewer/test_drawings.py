@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The drawings of a verdict: they follow it one by one, and what looks the same is not sent."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page in a real browser: its layout, the drive, the camera, clicks, links and files."""
 
 import itertools

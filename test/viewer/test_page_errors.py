@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors on the page: it shows what failed and why, and goes on."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of the page without a browser: trajectories, playback, colours, dashboard, plots."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page in a real browser: numbers of the rover, files, studies, judging in the background."""
 
 import re

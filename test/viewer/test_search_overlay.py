@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The layers of a search on the ground of a real page, without a browser."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The session behind the page, without a browser: rovers, plans, recorded paths, ends."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of turned wheels and of the centre of rotation on the page."""
 
 import numpy as np

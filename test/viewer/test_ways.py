@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ways around obstacles on the page, without a browser: searched, shown, cancelled, explained."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a three-joint arm from the links and joints of a URDF."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The joint map: which joints of a URDF are the rover's, and what the URDF does not tell."""
 
 from dataclasses import dataclass, field

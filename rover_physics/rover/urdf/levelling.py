@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Brings the wheels of a robot onto level ground: by its pitch and the angle of its bogies."""
 
 from collections.abc import Callable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a rover from a URDF and a joint map: pivots, wheels, masses, drives and limits."""
 
 from dataclasses import dataclass

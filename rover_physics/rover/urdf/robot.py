@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a URDF file into links and joints; the parts that a rover is made from, no meshes."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the links of a robot are at given joint angles, and what hangs on a joint."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes a rover as URDF: links with inertias, joints with limits, collision cylinders."""
 
 import xml.etree.ElementTree as ElementTree

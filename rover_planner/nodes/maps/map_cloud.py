@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The topic ~/map of a traverse server: its map, with source and age of each cell."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The service ~/load_map of a traverse server: loads a terrain file on request."""
 
 from collections.abc import Callable

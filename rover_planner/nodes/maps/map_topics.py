@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The maps of a traverse server: topics, files, and what the rover itself knows."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives a rover to its goal: watches plan and rover, and asks for another plan if needed."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command-line options of the program mission_planner; needs no ROS."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Notices that a rover stands on its way, and how often it has stopped at one place."""
 
 import math

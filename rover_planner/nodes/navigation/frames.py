@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Transforms poses of messages to the map frame and to the body; listens to /tf and /tf_static."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keeps the hazard map in a thread; publishes it latched and serves ~/get_hazard_map."""
 
 import threading
@@ -170,9 +171,7 @@ class HazardTopics:
             ):
                 return
             query = settings.query
-            hazards.take(
-                RoverOnMap(settings.rover, known.terrain, query.model, query.map_sigmas)
-            )
+            hazards.take(RoverOnMap(settings.rover, known.terrain, query.model, query.map_sigmas))
             self._patience = MAX_PAUSE
             self._let_questions_go_first()  # in work it would take time from the slice
             pose = self._service.fresh_pose()

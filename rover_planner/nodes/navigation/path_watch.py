@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Watches the accepted path in a thread: publishes ~/stop at once, serves ~/monitor."""
 
 import threading

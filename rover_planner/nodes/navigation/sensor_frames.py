@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The frames of a node that also places clouds of sensors on the map."""
 
 from nav_msgs.msg import Odometry

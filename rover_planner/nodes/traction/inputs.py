@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The subscriptions of the traction controller: checks messages and passes them to its service."""
 
 import time

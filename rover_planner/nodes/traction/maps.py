@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The map of the traction controller: clouds of the map's frame, or of one that /tf connects."""
 
 import contextlib

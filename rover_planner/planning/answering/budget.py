@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The time that a question may take, and the request to stop it."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tells what an answer is about: the question, the path and the map."""
 
 import secrets

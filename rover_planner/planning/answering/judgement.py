@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answer to one request: the verdict at once, its report on demand."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The map that a traverse server knows: its terrain, where it comes from, and its age."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What diagnostics tell of the map: its source, age, size and coverage."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The last measured joint angles and pose of the rover, with the time of each."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Judges questions one after another in a thread, each within its time budget."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The questions of the services as plain values, and their answers."""
 
 from dataclasses import dataclass, replace

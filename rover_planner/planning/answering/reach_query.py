@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Queries whether the arm can reach a target and hold a load there, without ROS."""
 
 import copy

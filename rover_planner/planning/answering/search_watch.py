@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Watches a search for a way: tells of its progress, and ends it when the map has changed."""
 
 import time

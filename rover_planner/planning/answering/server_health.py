@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a traverse server has done and what is wrong with it, for its diagnostics."""
 
 from collections import Counter, deque

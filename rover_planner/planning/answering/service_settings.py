@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings of a traverse server: its parameters and the loaded rover."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All that a traverse server knows when a question is asked, and the answers from it."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compares measured suspension angles with those predicted where the rover stands."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The traverse server without ROS: keeps map, path and measurements, and answers queries."""
 
 import threading

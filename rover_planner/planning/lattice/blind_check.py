@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Refuses ways over never seen ground under the belly, as the settings say, and reports it."""
 
 from collections.abc import Sequence

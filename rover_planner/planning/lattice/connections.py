@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Connections of the start and the goal, which lie anywhere, to nodes of the lattice."""
 
 from collections.abc import Callable, Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a piece of path costs, in metres of level ground: time, energy and risk.
 
     cost = gear price x time x nominal speed

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Estimates how likely the model refuses an edge, from the steepness below the wheels.
 
 The ground is taken as the wheels feel it: the surface on which the lowest points of spheres with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The edges of the lattice: each is a primitive that begins at a node.
 
 What the model found of an edge is kept until the ground under it changes.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shortest paths over the edges of a lattice, compiled.
 
 An edge that is judged costs what the model found, or cannot be driven. One that is not judged

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cheap estimates of all nodes, from the heights below the wheels without the model.
 
 Nodes where the centre of a wheel is over unknown ground however the rover tilts are refused, as

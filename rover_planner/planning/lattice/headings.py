@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sixteen headings of the lattice.
 
 Each points from a node to another one at most two cells away, so that straight lines hit nodes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Asks the model about pieces of path and about single nodes, and counts the work."""
 
 import math

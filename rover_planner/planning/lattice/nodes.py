@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The nodes of the lattice: places on a square grid, each with sixteen headings.
 
 Nodes lie at whole multiples of the cell in the map frame, wherever the map begins, so that what

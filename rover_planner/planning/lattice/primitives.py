@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motion primitives of a rover: the pieces of path that join the nodes of a lattice.
 
 A primitive is a straight line, a curve of one arc with a straight line before or behind it, a turn

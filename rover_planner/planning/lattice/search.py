@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Searches a path around obstacles on a lattice of motion primitives, with the full model.
 
 The search is lazy (LazySP; Dellin and Srinivasa 2016, A unifying formalism for shortest path

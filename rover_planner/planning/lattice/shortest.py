@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shortest path from start to goal over what is known of a lattice so far."""
 
 from dataclasses import dataclass

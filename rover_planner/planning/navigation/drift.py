@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The difference of measured and predicted suspension angles over a time."""
 
 import math

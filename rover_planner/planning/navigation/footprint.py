@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The ground that decides whether a rover can stand: how far it reaches from the body origin."""
 
 import itertools

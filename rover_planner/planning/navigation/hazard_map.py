@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Traversability class of each cell of a map and each heading, judged anew where it changed."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Watches a drive: judges the rest of the accepted path again, and says when to stop."""
 
 import time

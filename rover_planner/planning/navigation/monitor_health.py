@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a monitor has found, for diagnostics."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Poses of messages as rigid transforms; takes any object with the fields of geometry_msgs."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where sensors are: their mounts on the robot, and the robot at the time of a measurement."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Transforms between frames with their times, as on /tf, and what leads from one to another."""
 
 import bisect

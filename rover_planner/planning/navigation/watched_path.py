@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The path that is driven, and where on it the rover is."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Places near a goal on unknown ground where the rover can stand: the frontier of the map."""
 
 import numpy as np

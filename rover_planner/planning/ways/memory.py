@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Remembers judged edges from one search to the next while the ground under them is the same."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Why there is no way: the closed area around the start or the goal, and what closes it in."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A question for a way between two poses."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files that hold a question for a way with its map, so that it can be asked again elsewhere."""
 
 import json

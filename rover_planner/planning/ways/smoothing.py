@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Smooths a way: stretches of it are replaced by single curves that cost less."""
 
 import numpy as np

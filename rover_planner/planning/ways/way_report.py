@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report on a search for a way, as plain values for JSON."""
 
 from typing import Any

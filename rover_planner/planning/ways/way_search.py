@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Searches a way between two poses, smooths it, and explains where there is none."""
 
 import math

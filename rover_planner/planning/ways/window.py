@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The part of a map that is searched: the nodes of the lattice, and the heights around them."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the messages that a traverse server needs from a rosbag2, in SQLite or MCAP."""
 
 from collections.abc import Iterator, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes messages to a rosbag2 with MCAP storage, which Foxglove and ros2 bag read."""
 
 from collections.abc import Iterator

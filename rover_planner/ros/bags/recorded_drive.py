@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A drive as it was recorded: poses of the body and the suspension angles measured there."""
 
 from collections.abc import Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where robot and sensors of a recording were on the map: transforms, odometry and mounts."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Feeds recorded messages to the service behind a traverse server, and collects its answers."""
 
 from collections.abc import Callable, Iterator

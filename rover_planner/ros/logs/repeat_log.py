@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decides when a refusal that comes again with each message is logged again."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Logs when a condition begins and when it ends, never each time that it is looked at."""
 
 import math

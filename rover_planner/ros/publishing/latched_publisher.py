@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A publisher whose last message reaches late subscribers, and no message that is out of date."""
 
 from functools import partial

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A publisher that makes its messages only if the topic has subscribers."""
 
 from collections.abc import Callable

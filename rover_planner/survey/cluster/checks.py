@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of a cluster: enough memory, the same version, the same folders."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The cluster of a survey: a Dask scheduler that runs, or processes of this machine."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs a survey on a Dask cluster: chunks in waves, failed ones again, finished ones never."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A Zarr store on the local disk whose files survive a power failure once they are written."""
 
 import asyncio

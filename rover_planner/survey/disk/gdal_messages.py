@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What GDAL's TIFF library writes to stderr by itself: caught, so that one line tells of it."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A layer of a survey as its store keeps it, which says in one line if it cannot be read."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reachable area of a survey, as it is kept in the survey's store."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The compiled step of the search over cells and headings."""
 
 import numpy as np

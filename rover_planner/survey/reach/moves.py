@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moves of a rover between surveyed cells: straight ahead along a heading to a cell ahead."""
 
 import math

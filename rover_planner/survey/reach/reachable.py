@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a rover can go on a surveyed map and come back from, over cells and headings."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs scripts in the browsers of visitors, and asks them what only they know.
 
 viser has no public way for either. Its own parts that need a script send the message that is used

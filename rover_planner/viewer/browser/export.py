@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One HTML file with the scene as it is and a report beside it, to send to somebody."""
 
 import html

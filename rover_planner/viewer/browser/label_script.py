@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The script that draws the labels of the scene, and keeps them apart on the screen.
 
 It runs in the page and in files that were saved from it. It follows the camera of viser, picture

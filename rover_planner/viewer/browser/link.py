@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A link that holds what the page shows: rover, changed numbers, ends, path, time and colours."""
 
 import math

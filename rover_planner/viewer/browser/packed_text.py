@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Packs a text, such as a rover file, into the letters of an address, and unpacks it again."""
 
 import base64

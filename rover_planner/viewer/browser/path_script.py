@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The script with which a visitor points at paths and selects them, in the table or in the scene.
 
 A row or a number under the mouse, or a row that has the focus, is coloured at once, and the server

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a sent page says in words and numbers beside its scene: verdict, failing pose, versions."""
 
 import html

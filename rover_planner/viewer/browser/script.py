@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The script that the page runs in each browser: typed numbers, clicks, keys, lost connections.
 
 viser sends a number at each key. "-0.05" is then 0 at its second key, and the page judges values

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Words that the page's scripts send to the server, through a text box that nobody sees.
 
 viser has no public way for scripts to send anything; a text box sends what it holds at each

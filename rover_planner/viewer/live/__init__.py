@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """A live rover: the data of its topics, kept for the page."""

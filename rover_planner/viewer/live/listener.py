@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node that listens to a rover and its planner, and keeps the latest data for the page."""
 
 import contextlib

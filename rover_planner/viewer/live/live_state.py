@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A live rover: the latest values of its topics, and the state of the page made of them."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How old the last message of each topic is, and which topics are stale."""
 
 import threading

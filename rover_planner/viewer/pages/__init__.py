@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pages: one that plans, one that follows a live rover."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compares the rover and its drive with those before a change, and takes changes back."""
 
 from collections.abc import Callable, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drawings that follow the verdict: one at a time, between the requests of visitors."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Colours the ground in the background: a layer that is predicted for the rover takes seconds."""
 
 from collections.abc import Callable, Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the session judged, brought onto the page: verdict, paths, rover and ground."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page that follows a live rover: the data of its topics, and plans asked of its server."""
 
 import time

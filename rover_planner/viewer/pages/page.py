@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page that plans: its tabs, and what visitors can request of the session behind it."""
 
 import time

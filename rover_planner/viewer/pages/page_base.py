@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The base of every page: a viser server, its panels, and the one thread that changes them."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shown path on the page: verdict, plots, lines over the ground, and the drive along it."""
 
 import math

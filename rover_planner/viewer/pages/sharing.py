@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sends what the page shows as a file or a link, and shows again what a link holds."""
 
 import dataclasses

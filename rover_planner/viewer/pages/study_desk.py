@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs studies for the page: the chosen one in the background, its result into the tab."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a visitor's browser needs when it connects: its link, and panels that fit in."""
 
 import threading

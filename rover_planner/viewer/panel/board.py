@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The board, after the paper's Figure 5: the rover from above with bars, and the worst so far."""
 
 import html

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The buttons of the camera, above the tabs: views to choose, and going along with the rover."""
 
 from collections.abc import Callable, Sequence

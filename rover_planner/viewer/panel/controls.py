@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The buttons and sliders of the page; they only pass on what a visitor does."""
 
 from collections.abc import Callable, Collection

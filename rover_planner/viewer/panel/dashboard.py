@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dashboard: the board with its numbers, and the verdict as text."""
 
 import html

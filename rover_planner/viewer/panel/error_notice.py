@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The notice of errors: what could not be drawn or done, and why."""
 
 import html

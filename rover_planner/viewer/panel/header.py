@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The header over the scene: rover, map, soil, policy and mode, the verdict, and what it plays."""
 
 import html

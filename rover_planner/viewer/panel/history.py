@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The values of a live rover since it is followed, for the plots."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The notices above the tabs: why a request was refused, and what is worked on, with buttons."""
 
 import html

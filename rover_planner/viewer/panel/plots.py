@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plots of loads, friction utilisation and stability margin over distance, with a cursor."""
 
 import itertools

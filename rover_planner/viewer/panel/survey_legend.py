@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The legend of a survey's layer: its classes or its scale, what it is about, and what differs."""
 
 import html

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The list of a live rover's topics with their ages; stale ones are grey."""
 
 import html

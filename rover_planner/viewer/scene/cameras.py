@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The cameras of all visitors: where they look from, and whether they go along with the rover."""
 
 from dataclasses import dataclass

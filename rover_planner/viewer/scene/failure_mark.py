@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The place of a failure in the scene: a ghost of the rover, the link that fails, the forces."""
 
 from typing import Any

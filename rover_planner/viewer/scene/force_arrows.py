@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Arrows at the contacts: the forces of the ground on the wheels."""
 
 from typing import Any

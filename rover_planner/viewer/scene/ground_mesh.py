@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The terrain as a mesh with a layer as its texture, and where a ray meets the ground."""
 
 import json

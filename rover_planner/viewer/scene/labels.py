@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Labels at places in the scene; the page draws them over it, and its script keeps them apart."""
 
 import html

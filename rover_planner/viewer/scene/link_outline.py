@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outlines of the links of a rover in a state: wheels, body, rockers and bogies."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The frame in which the scene is drawn: the map frame with an origin near the ground."""
 
 from dataclasses import dataclass, field

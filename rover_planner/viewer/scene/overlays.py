@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drawings over the ground: candidate paths with their numbers, refused places, start, goal."""
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ribbons on the ground with halos, which stand out from a ground of any colour."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The articulated rover in the scene, built from the numbers of its rover file."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Layers on the ground: the area that is closed in, and where a search has asked the model."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The terrain as a mesh with a layer of a survey as its texture."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The centre of rotation in a curve, as a pole, and a line to each wheel."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One worker thread that does the newest request: progress, cancel, and results as values."""
 
 import threading

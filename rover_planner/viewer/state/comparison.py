@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verdict of one path under one torque policy, of several shown side by side."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the page is about, in words: rover, map, soil, torque policy and mode."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the verdict took from between waypoints, and what it did not ask, in sentences."""
 
 import numpy as np

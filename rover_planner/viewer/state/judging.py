@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Judges a scenario step by step: the shown path or all candidates, policies, a way around."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Layers that colour the ground: its shape, and what the model predicts at each cell."""
 
 from collections.abc import Callable, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The clock of the page: play, pause, step, rewind and fast forward at a chosen speed."""
 
 from dataclasses import dataclass, field

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is judged, and what came out: frozen values that threads may share."""
 
 from collections.abc import Mapping

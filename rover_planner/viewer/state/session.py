@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The state behind the page: what visitors want judged, and what was judged last."""
 
 import dataclasses
@@ -183,8 +184,13 @@ class ViewSession:
         return self._judge_shown(rover=rover, arm_angles=dict(arm_angles))
 
     def change_options(self, **changes: object) -> bool:
-        """Change fields of PathQueryOptions and plan again."""
-        return self._want(options=self.wanted.options.change(**changes))
+        """Change options of the paths or of the model and plan again."""
+        try:
+            options = self.wanted.options.change(**changes)
+        except RoverError as error:
+            self.refusal = str(error)
+            return False
+        return self._want(options=options)
 
     def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
         """Take another rover, changed from a loaded one (default: not), and plan again.

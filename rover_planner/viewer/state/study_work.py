@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A study as work in the background: progress after each rover, then result and picture."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A survey whose layers colour the ground: opened, compared with what is shown, and read."""
 
 import json

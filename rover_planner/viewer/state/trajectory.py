@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A predicted path over time: the state of the rover at any time of the drive."""
 
 from dataclasses import dataclass, fields

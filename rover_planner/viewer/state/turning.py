@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where turned wheels point in a state of the rover, and where its centre of rotation is."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What visitors ask for, queued for the one thread that changes the page."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ground under the belly that was never seen: its share of a path, and where it is met first."""
 
 import math

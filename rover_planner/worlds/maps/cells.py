@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The grid of square cells that all parts of a living map share, and maps laid onto it."""
 
 from collections.abc import Callable

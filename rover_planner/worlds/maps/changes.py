@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a map differs from the one before."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The ground under a standing rover: six contacts from measured angles, and the surface between.
 
 A front camera never sees where the rover stands, but the rover does: where the attitude, the

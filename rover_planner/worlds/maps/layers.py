@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The layers of a living map's window: grown, moved and written without touching earlier ones."""
 
 from dataclasses import dataclass, replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A map that lives: local maps merge into a loaded one cell by cell, in a window.
 
 The window grows with what is seen, or rolls with the rover. Heights that a newer map does not have

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keeps the map of a server: what a loaded map, local maps and the standing rover add to it."""
 
 from dataclasses import dataclass, field

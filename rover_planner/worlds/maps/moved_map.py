@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moves a map of another frame to that of the server, and lays a turned one onto its cells.
 
 Ground is never made up: a cell is known only if all cells that its height comes from are known.

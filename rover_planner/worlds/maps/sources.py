@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What each cell of a map is known from, and since when."""
 
 from dataclasses import dataclass

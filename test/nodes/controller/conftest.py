@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A rover that is driven by a controller, for the tests of this folder."""
 
 import pytest

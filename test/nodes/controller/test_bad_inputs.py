@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inputs that cannot be used stop the rover, are named once, and pass by themselves."""
 
 import copy

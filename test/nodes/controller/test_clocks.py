@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """No clock and no hanging thread keeps the wheels turning with their last torque."""
 
 import time

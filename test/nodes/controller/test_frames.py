@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Odometry of another frame, and of a robot with another origin, is placed on the map."""
 
 import numpy as np

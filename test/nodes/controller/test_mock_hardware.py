@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A robot with its own joint names, mirrored motors and an encoder offset is driven over DDS.
 
 The mock hardware takes commands as forward_command_controllers of the shipped controllers.yaml do,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publishers that cannot be heard are named; two rovers in two namespaces do not meet."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Enabling, emergency stop, rest and the end of the node over DDS."""
 
 import os

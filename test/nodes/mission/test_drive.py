@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A drive goes on where its rover is held up, and ends where nothing helps."""
 
 import numpy as np

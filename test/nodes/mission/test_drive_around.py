@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The whole system drives around boulders that it sees only on the way, on both engines."""
 
 import numpy as np

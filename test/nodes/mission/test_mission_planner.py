@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The mission planner reads its goals, and tells by its exit code what came of them."""
 
 import json

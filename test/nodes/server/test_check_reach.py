@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The traverse server answers over DDS whether the arm can reach and push, or says why not."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Questions in another frame, from where the rover is, and about a robot with another origin."""
 
 import json

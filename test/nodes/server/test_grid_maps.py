@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """GridMaps over DDS: their layers are used, and those of other frames are placed by /tf."""
 
 import numpy as np

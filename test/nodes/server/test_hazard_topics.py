@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The hazard map over real DDS: latched, followed by changes, and the same as the service's."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nav2's questions: which poses of a path are not passable, and a path to a pose."""
 
 from types import SimpleNamespace

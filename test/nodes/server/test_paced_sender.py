@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many responses leave in small groups and in order; a few leave at once."""
 
 import time

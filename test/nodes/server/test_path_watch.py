@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The monitor stops the rover in time over real DDS, says why, and tells drift of the model."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Trials of a traverse server in its own process: bursts, no pause between questions, death."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Clouds in the frame of a sensor become the map that the same cloud in the map frame becomes."""
 
 import numpy as np

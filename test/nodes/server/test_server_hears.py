@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A traverse server hears parameters, maps, cancels and signals while it works on a question."""
 
 import threading

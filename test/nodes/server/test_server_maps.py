@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A traverse server merges maps of both kinds, and fills the ground on which the rover stands."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The traverse server answers over DDS, and says why not."""
 
 import json

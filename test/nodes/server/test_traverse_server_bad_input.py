@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bad input of every kind is refused with a reason and a log line, and the node lives on."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The traverse server finds paths around obstacles over DDS, and says why there is none."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounds on uncertain maps hold the prediction and what maps drawn at random give."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Clearance: the belly's height over the highest known ground below it, and only below it."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The same surface on cells of half the size gives the same poses and verdicts."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Of 20,000 poses on fractal ground and on rocks up to a wheel radius high nearly all settle."""
 
 from functools import lru_cache

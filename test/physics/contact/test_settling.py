@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settling: all six wheels touch, where MuJoCo says, with straight and with turned wheels."""
 
 import numpy as np

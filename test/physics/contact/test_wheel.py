@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact: a wheel's gap is the smallest over its lower half, and it touches where that is."""
 
 import numpy as np

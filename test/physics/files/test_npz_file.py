@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Archives: what NumPy writes is read to the bit, whatever else they hold is refused in time."""
 
 import io

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files that users name: only regular files of limited size are read, and nothing waits."""
 
 import os

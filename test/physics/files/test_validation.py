@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contents of a file become a type, or an error that names key, value and rule."""
 
 import subprocess

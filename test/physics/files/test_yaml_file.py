@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """YAML is read strictly, and whatever a file holds, its error is one short line."""
 
 import time

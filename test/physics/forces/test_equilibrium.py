@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Equilibrium: the nine balance equations hold, loads are MuJoCo's, and Figure 4 of the paper."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Equations (1) to (15) of the paper hold on settled poses and the forces found there.
 
 The paper: Hacot, Dubowsky and Bidaud, "Analysis and Simulation of a Rocker-Bogie Exploration

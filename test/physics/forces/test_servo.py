@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Policy "servo" on firm ground and on soil: the nine equations hold, and rovers do as they must.
 
 That mirrored grounds have mirrored answers is in test_symmetries.py.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One wheel on a speed servo, on firm ground and on soil: its forces and their derivatives."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Balance with turned wheels: any angles carry the weight, and no free force is lost."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The wheel-soil models against Wong's formulas worked by hand, their limits and their order."""
 
 import math

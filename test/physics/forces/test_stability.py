@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stability: the published check value, one on flat ground, and zero where the wheels lift."""
 
 import numpy as np

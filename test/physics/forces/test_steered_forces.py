@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces on turned wheels, against MuJoCo."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Symmetries: mirrored, turned, moved, heavier or the other way round, the answer is the same."""
 
 from dataclasses import replace

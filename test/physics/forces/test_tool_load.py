@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tool load: what force and moment at the arm's tip do to balance and tip-over measures.
 
 That the balance holds with it is in test_equilibrium.py.

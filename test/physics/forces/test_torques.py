@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Policy optimal: no torque set needs less friction, by linear programs of its own."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A new limit is one row of the table and a number in the rover file: all that judges obeys it."""
 
 from itertools import pairwise

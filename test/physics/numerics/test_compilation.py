@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels compile in other processes, which end with the one that started them."""
 
 import os

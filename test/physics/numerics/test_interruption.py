@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sweeps stop where their caller says so, and slices change no result."""
 
 import itertools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels are kept on disk where that is possible, and compile where it is not."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A kernel is compiled once with all that it calls, and can be called from Python as well."""
 
 import ast

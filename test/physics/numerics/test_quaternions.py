@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quaternions: of length 1, in the order that the name says, and the turns that scipy makes."""
 
 import math

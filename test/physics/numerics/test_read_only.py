@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read-only arrays: nobody's own is changed, none is copied in vain."""
 
 import numpy as np

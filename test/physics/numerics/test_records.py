@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Records: an array that shares one follows it, a copy does not."""
 
 import numpy as np

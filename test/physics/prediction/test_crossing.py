@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Between waypoints: faces are climbed through steep contacts, and what fails there is told."""
 
 from functools import lru_cache

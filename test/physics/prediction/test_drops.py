@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drops: a wheel that rolls off an edge falls by its height, and no slope counts as an edge."""
 
 from dataclasses import replace

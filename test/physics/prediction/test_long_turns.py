@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Long turns within a path are judged all along, however few waypoints they have."""
 
 from dataclasses import replace

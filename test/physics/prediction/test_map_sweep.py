@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scores of poses are those of a path, whatever the batches; a map is swept cell by cell."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a sweep needs is packed once, and anew where anything else is asked."""
 
 import numpy as np

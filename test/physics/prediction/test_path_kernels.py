@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loops over waypoints: jumps are found where they are, and what adds up is the sum."""
 
 import numpy as np

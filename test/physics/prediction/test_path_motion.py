@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motions along a path: arcs are arcs, however they are sampled, and unrelated poses are none."""
 
 from dataclasses import replace

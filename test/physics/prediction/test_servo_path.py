@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What only the path shows under policy "servo": lifts, wedged wheels, drift."""
 
 from dataclasses import replace

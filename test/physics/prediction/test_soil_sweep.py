@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Soil in the sweep: slip, sinkage, torque and verdict where the ground yields."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the division of stretches between waypoints."""
 
 import numpy as np

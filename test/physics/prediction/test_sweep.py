@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sweep: bad arguments, waypoints that stand for themselves, time and energy, several callers."""
 
 from concurrent.futures import ThreadPoolExecutor

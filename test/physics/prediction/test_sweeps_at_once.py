@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sweeps in several threads do not wait for each other, and find what each finds alone."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Manipulator: where the arm is, and what arm and payload do to mass, loads and margin."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rover file: presets, every wrong input, and what the numbers add up to."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands become steering angles and wheel speeds; the drive waits for wheels that steer."""
 
 from dataclasses import replace

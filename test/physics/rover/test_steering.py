@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Steering: wheels roll about the centre of rotation, within their limits."""
 
 from dataclasses import replace

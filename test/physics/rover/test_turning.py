@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of how tightly a rover turns."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rovers as URDF: there and back, in MuJoCo, and files of other conventions."""
 
 import math

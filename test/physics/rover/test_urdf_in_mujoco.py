@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MuJoCo loads the URDF of a rover and settles it where the model does."""
 
 from pathlib import Path

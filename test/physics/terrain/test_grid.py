@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The terrain: what is refused, the bilinear look-up, filled gaps and files."""
 
 from pathlib import Path

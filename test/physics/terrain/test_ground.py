@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A packed terrain: block maxima, unknown cells, and addresses that stay good."""
 
 import gc

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Soil files: the presets, and what is refused by name."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Terrain files: their size is known before they are unpacked, and memory stays below it."""
 
 import io

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact angles from simulated motion and from the map, over slopes, steps and rocks."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the planner calls passable with traction control is passed with it, and not without."""
 
 import pytest

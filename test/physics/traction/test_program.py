@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shared torques: they balance, need the least friction, and say what gives way."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Balance, shared torques and contact angles with turned wheels, against the sweep's model."""
 
 from dataclasses import replace

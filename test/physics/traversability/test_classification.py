@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Classes: passable, or with speed servos, or with traction control, or not; and why."""
 
 from dataclasses import replace

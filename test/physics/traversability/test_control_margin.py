@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The control margin: what a waypoint that needs traction control leaves to the controller."""
 
 from dataclasses import replace

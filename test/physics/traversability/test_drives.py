@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verdicts agree with drives in MuJoCo over steps, ditches, bumps and slopes."""
 
 from collections import Counter

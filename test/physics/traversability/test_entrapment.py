@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Trapped: holes that a rover can drive into but neither on nor back out of."""
 
 import resource

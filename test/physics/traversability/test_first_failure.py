@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A path that is swept up to its first failure gets the verdict of the whole path."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of what must not change a verdict: friction, torque, pieces, a shift, more waypoints."""
 
 import pytest

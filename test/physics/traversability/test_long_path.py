@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A long path that is judged in parts gets the verdict and the prediction of the whole path."""
 
 from dataclasses import replace

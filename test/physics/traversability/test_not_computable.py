@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nothing passes on NaN: a path is traversable only if all that decides it is a number."""
 
 import math
@@ -131,9 +132,7 @@ def model_of_infinite_weight():
 
 def test_a_pose_without_numbers_says_so_and_has_none():
     model = model_of_infinite_weight()
-    results = evaluate(
-        model.records, model.limits.records, model.limits.records, model.limits.records, POSES
-    )
+    results = evaluate(model.records, model.limits.records, POSES)
     assert (results["status"] == PoseStatus.NOT_COMPUTABLE).all()
     for one in QUANTITIES:
         if not (one.of_motion or one.of_path):
@@ -144,9 +143,7 @@ def test_a_pose_without_numbers_says_so_and_has_none():
 def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
     model = model_of_infinite_weight()
     assert not score(model, POSES, (5,)).passable.any()
-    results = evaluate(
-        model.records, model.limits.records, model.limits.records, model.limits.records, POSES
-    )
+    results = evaluate(model.records, model.limits.records, POSES)
     verdict = hold_against_limits(LSR1, predict_poses(model, POSES, results))
     assert verdict.code == "not_computable" and "not a finite number" in verdict.reason
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests that pieces of path are judged as `judge_paths` judges them."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reach: the arm's inverse kinematics, and the query whether the rover can reach and push."""
 
 from dataclasses import replace

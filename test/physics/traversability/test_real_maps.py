@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Real ground: plains are passable; rims, gaps and the map's edge refused, each by its name."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verdicts under policy "servo" agree with drives of speed servos in MuJoCo, along curves too."""
 
 from functools import lru_cache

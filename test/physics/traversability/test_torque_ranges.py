@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Torque ranges: as wide as linear programs of their own find them, and consistent."""
 
 from dataclasses import replace

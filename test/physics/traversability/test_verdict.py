@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits: each broken limit is told with its code, the wheel or joint, the value and the limit."""
 
 import json

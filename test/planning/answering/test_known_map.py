@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The age of a map counts from its stamp and from its arrival; its content has a hash."""
 
 import dataclasses

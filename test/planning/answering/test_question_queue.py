@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Questions are answered in order, within their time, once, or refused with the reason."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Diagnostics of a server: its map, its last question, and how long answers take."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The service knows a map, a path and joint angles, and answers from them without ROS."""
 
 import math

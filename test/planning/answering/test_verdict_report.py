@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report has one flat set of keys, in one order, that docs/traverse_server.md tells of."""
 
 import json

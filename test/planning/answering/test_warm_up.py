@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All kernels of answers are among those that a server's start compiles: no question waits."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the estimate how likely the model refuses an edge."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the shortest paths on a lattice against scipy's Dijkstra."""
 
 import numpy as np

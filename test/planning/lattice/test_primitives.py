@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the motion primitives: they join nodes, and the rover can drive them."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of path following with a rover that moves exactly as commanded."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The simulated rover: it stands where the model says, stops where it must, sees what it can."""
 
 import numpy as np

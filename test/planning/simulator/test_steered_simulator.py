@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulated rovers steer: along curves, on the spot, at the rate of their joints."""
 
 from dataclasses import replace

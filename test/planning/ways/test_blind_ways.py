@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The search for ways keeps to the rule about ground under the belly that was never seen."""
 
 import numpy as np
@@ -40,7 +41,7 @@ def flat_with_hole() -> Terrain:
 def ask(rule: str, seen: SeenGround | None = None, start=START) -> WayQuestion:
     ground = flat_with_hole()
     check = BlindCheck(LSR1, seen or seen_ground(ground, None), rule)
-    return WayQuestion(LSR1, ground, start, GOAL, OPTIONS, None, check)
+    return WayQuestion(LSR1, ground, start, GOAL, OPTIONS, check)
 
 
 @pytest.mark.parametrize("rule", [REFUSE, ALLOW_FOOTPRINT])

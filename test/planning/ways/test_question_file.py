@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the files that hold a question for a way."""
 
 import json
@@ -33,7 +34,7 @@ def test_a_question_is_read_as_it_was_written(written):
     read, settings = read_question(path)
     assert settings == SETTINGS
     assert (read.rover, read.options) == (question.rover, question.options)
-    assert read.joint_angles is None
+    assert read.options.model.joint_angles is None
     np.testing.assert_array_equal(read.start, question.start)
     np.testing.assert_array_equal(read.goal, question.goal)
     np.testing.assert_array_equal(read.terrain.elevation, question.terrain.elevation)

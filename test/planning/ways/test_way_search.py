@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the search for ways around obstacles."""
 
 from dataclasses import replace

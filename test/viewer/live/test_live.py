@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page follows a live graph: it shows what a rover, its server and controller publish."""
 
 import threading

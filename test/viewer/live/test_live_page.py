@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page of a live rover in a real browser, with simulator and server as nodes."""
 
 import time

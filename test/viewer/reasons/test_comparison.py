@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the verdicts under all torque policies, side by side."""
 
 from dataclasses import replace

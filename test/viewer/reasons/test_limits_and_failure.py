@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Why and where a path is refused: limits along it, the failure, candidates, before and after."""
 
 from dataclasses import replace

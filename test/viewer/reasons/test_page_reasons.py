@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page in a real browser: why and where a path is refused, rows, labels, layers."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the panels and the scene show of reasons: lanes, table, changes, board, scale, halos."""
 
 import dataclasses
@@ -200,7 +201,7 @@ def test_layers_with_limits_have_them_on_their_scales_and_classes_have_a_legend(
     assert "gradient(90deg" not in text and "1.00" not in text
     for name, layer in LAYERS.items():
         scale = build_ground_mesh(LSR1, ground, name).scale
-        assert (scale.limit is not None) == (layer.limit is not None)
+        assert (scale.limit is not None) == (layer.find_limit(LSR1) is not None)
         if scale.limit is not None:
             assert scale.low <= scale.limit <= scale.high
             text = draw_scale(name, scale)
@@ -228,9 +229,9 @@ def test_a_layer_along_a_path_has_the_heading_of_its_nearest_waypoint():
     at = np.array([-0.6, 0.7]), np.array([0.2])
     tilt = LAYERS["torque saturation"]
     options = session_on(waves).sweep_options()
-    along = predict_layer(tilt, LSR1, ground, path, at, options)
+    along, _ = predict_layer(tilt, LSR1, ground, path, at, options)
     for column, yaw in enumerate((0.4, -1.1)):
-        fixed = predict_layer(tilt, LSR1, ground, yaw, at, options)
+        fixed, _ = predict_layer(tilt, LSR1, ground, yaw, at, options)
         assert along[0, column] == fixed[0, column]
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report of a page that is sent: numbers that are not known, and names that are no HTML."""
 
 import re

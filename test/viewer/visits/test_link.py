@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Links: what they hold comes back, and damaged ones are refused by name."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Links that a page opens: what it cannot show is refused, and no link acts later."""
 
 from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pages of other maps in a real browser: at the coordinates of a UTM zone, and with a survey."""
 
 from io import BytesIO

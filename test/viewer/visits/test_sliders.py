@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sliders dragged to both ends on real pages in a real browser: it lives and is right."""
 
 import time

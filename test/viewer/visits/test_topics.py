@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ages of topics: what is streamed gets stale, what comes once does not."""
 
 from rover_planner.viewer.live.topic_ages import MAX_AGE, TopicAges

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The share of never seen ground under the belly is counted along a path, cell by cell."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The cells in which two maps differ are found, whatever their layers and their grids."""
 
 from dataclasses import replace

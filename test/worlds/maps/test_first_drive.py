@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A rover whose camera sees ahead only starts from where it stands and reaches its goal."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measured angles and pose give the six contacts, and with them the ground under the rover."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Local maps merge into a loaded one cell by cell, and nothing that was known is lost."""
 
 from dataclasses import replace

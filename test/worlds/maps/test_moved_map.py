@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A map of another frame is moved to that of the server, and no ground is made up."""
 
 import math

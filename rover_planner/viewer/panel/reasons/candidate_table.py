@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of the candidate paths, whose rows can be pointed at and selected."""
 
 import html

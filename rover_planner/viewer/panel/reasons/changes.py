@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What has changed of the rover and of its drive: a table, and buttons to undo and to reset."""
 
 import html

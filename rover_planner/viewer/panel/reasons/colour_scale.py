@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scale of the ground's colours: values, the limit, classes and what grey and hatched mean."""
 
 import html

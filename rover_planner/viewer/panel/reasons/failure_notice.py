@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A failure in words for the verdict, and the button below it that goes there."""
 
 import html

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lanes over the distance: for each limit a strip whose colours tell how much of it is used."""
 
 import html

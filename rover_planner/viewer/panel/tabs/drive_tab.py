@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tab of the drive: playback, verdict and the dashboard of the paper's Figure 5."""
 
 import time

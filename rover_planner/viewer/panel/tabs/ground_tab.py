@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tab of ground and path: what a click sets, torques, soil, and the ground's colours."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tab of the rover: presets, rover files, and a slider for each of its numbers."""
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tab to share what is shown: as one HTML file, or as a link to this page."""
 
 import html

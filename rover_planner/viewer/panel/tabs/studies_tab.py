@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tab of the studies: choose one, run it, see its picture, take over the best rover."""
 
 import html

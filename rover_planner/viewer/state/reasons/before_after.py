@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a change of the rover has changed: the drive before and after it, in curves and numbers."""
 
 from collections.abc import Callable, Mapping

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Candidate paths as rows of a table, and places for their numbers that do not overlap."""
 
 from collections.abc import Sequence

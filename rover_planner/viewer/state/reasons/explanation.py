@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Why a judged path can be driven or not: its limits, its failure, and the worst so far."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The first failure of a path: which limit, by how much, which wheel or link, where and when."""
 
 from dataclasses import dataclass, fields

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The limits that a verdict holds a path against: name, unit, value and direction of each."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The limits along a path: how much of each is used, by which wheel, and where it is broken."""
 
 from dataclasses import dataclass

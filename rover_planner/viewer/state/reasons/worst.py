@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The worst use of each limit so far, as the board shows it."""
 
 from dataclasses import dataclass
