@@ -86,8 +86,8 @@ def test_the_goal_at_the_start_is_a_single_pose_that_is_judged(rover):
 
 def test_options_reach_the_model(rover):
     slope = with_heights(flat(), lambda x, y: 0.2 * x + 0 * y)
-    grippy = dataclasses.replace(COARSE, friction=1.0, max_torque=100.0)
-    slippery = dataclasses.replace(COARSE, friction=0.05, max_torque=100.0)
+    grippy = COARSE.change(friction=1.0, max_torque=100.0)
+    slippery = COARSE.change(friction=0.05, max_torque=100.0)
     assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), grippy).traversable
     refused = answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), slippery)
     assert refused.chosen.verdict.code == "friction"

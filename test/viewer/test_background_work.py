@@ -221,11 +221,10 @@ def test_changes_add_up_although_the_judgements_between_are_dropped(session):
     finish(session)
     assert session.finished.scenario is session.finished.answered is session.wanted
     assert session.goal[:2] == (1.5, 0.5) and session.rover.friction == 0.5
-    assert session.arm_angles == {"arm_yaw": 0.3} and session.options.soil == "dry_sand"
+    assert session.arm_angles == {"arm_yaw": 0.3} and session.options.model.soil == "dry_sand"
     ends = session.start, session.goal
-    answer = answer_path_query(
-        session.rover, session.terrain, *ends, session.options, session.arm_angles
-    )
+    options = session.options.change(joint_angles=session.arm_angles)
+    answer = answer_path_query(session.rover, session.terrain, *ends, options)
     assert [c.verdict for c in session.candidates] == [c.verdict for c in answer.candidates]
 
 
@@ -233,9 +232,9 @@ def test_a_value_that_is_refused_when_it_is_judged_is_not_wanted_any_more_and_er
     session,
 ):
     shown = session.shown
-    assert session.change_options(policy="best")
+    assert session.change_options(soil="best")
     finish(session)
-    assert "policy" in session.refusal
+    assert "best" in session.refusal
     assert session.shown is shown and not session.is_outdated
     session.change_options(map_sigmas="many")  # type: ignore[arg-type]
     wait_for_idle(session)

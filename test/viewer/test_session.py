@@ -173,7 +173,7 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     session = ViewSession(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     session.replay(*read_prediction(file), read_recorded_assumptions(file))
     assert (session.rover.friction, session.rover.manipulator.payload) == (0.7, 0.5)
-    assert session.arm_angles == angles and session.options.policy == "optimal"
+    assert session.arm_angles == angles and session.options.model.policy == "optimal"
     assert session.change_rover([("wheel", "width")], 0.07)
     poses, rover = session.shown.candidate.poses, session.rover
     again = replace(options, friction=None, payload=None)

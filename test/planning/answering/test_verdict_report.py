@@ -19,6 +19,7 @@ from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.judgement import refusal
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.path_report import REPORTED
 from rover_planner.planning.verdict_report import VerdictReport, WaypointLists
 from support.grounds import make_terrain, wall_at
 
@@ -31,7 +32,10 @@ def keys_of(kind) -> list[str]:
     keys = []
     for name, hint in get_type_hints(kind).items():
         part = next((kind for kind in get_args(hint) if kind is not NoneType), hint)
-        keys += keys_of(part) if is_dataclass(part) else [name]
+        if name == "extremes":
+            keys += REPORTED
+        else:
+            keys += keys_of(part) if is_dataclass(part) else [name]
     return keys
 
 
@@ -116,7 +120,8 @@ def test_a_refusal_says_why_and_nothing_of_a_path():
 
 
 def test_numbers_that_json_lacks_become_null(full):
-    path = replace(full.report.path, energy=math.nan, tilt_bound=-math.inf)
+    extremes = dict(full.report.path.extremes) | {"tilt_bound": -math.inf}
+    path = replace(full.report.path, energy=math.nan, extremes=extremes)
     told = replace(full.report, path=path).to_dict()
     assert told["energy"] is None and told["tilt_bound"] is None
     json.dumps(told, allow_nan=False)

@@ -48,7 +48,7 @@ def pen(x, y):
 
 
 def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
-    return WayQuestion(rover, terrain, start, goal, replace(OPTIONS, **options))
+    return WayQuestion(rover, terrain, start, goal, OPTIONS.change(**options))
 
 
 @pytest.fixture(scope="module")

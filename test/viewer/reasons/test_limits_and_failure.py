@@ -32,7 +32,7 @@ def stepped(x, y):
 
 def why_on(height, **options):
     """Return prediction, verdict and explanation of a straight path of 2 m over a ground."""
-    options = PathQueryOptions(count=1, **options)
+    options = PathQueryOptions(count=1).change(**options)
     ends = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
     session = ViewSession(LSR1, make_terrain(height), *ends, options)
     shown = session.shown

@@ -223,4 +223,4 @@ def test_a_layer_colours_the_ground_with_its_limit_on_the_scale_and_a_soil_lets_
     onlooker.choose("Soil", "dry_sand")
     wait_until(lambda: page.session.shown.verdict.max_sinkage > 0.0, "wheels that sink")
     onlooker.choose("Soil", "none (Coulomb)")
-    wait_until(lambda: page.session.options.soil is None, "hard ground")
+    wait_until(lambda: page.session.options.model.soil is None, "hard ground")
