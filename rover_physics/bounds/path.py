@@ -69,8 +69,8 @@ def bound_path(
     Args:
         rover: The rover.
         terrain: The ground, with its layer `elevation_std`.
-        prediction: The result of `sweep_path` on the same terrain.
-        options: The options of that `sweep_path`.
+        prediction: The result of `judge_path` on the same terrain.
+        options: The options of that `judge_path`.
         sigmas: Number of standard deviations by which each height may be wrong; 0 or None for no
             bounds.
 
@@ -81,7 +81,7 @@ def bound_path(
     Raises:
         ModelError: `sigmas` is negative or not a number, an option that this rover cannot have, a
             terrain with too many soils, or policy "servo".
-        SoilError: As `sweep_path`.
+        SoilError: As `judge_path`.
     """
     allowed = check_sigmas(sigmas)
     if terrain.elevation_std is None or allowed == 0.0:

@@ -79,14 +79,14 @@ def score_poses(
         rover: The rover.
         terrain: The ground.
         poses: (..., 3) x, y [m] and yaw [rad] of base_link in the map frame.
-        options: As for `sweep_path`.
+        options: As for `judge_path`.
 
     Returns:
         Scores with the shape of `poses` without its last axis.
 
     Raises:
         PoseError: Poses of wrong shape, or not finite.
-        ModelError, SoilError: As `sweep_path`.
+        ModelError, SoilError: As `judge_path`.
     """
     given = np.asarray(poses)
     flat = check_poses(given.reshape(-1, 3) if given.shape[-1:] == (3,) else given)
@@ -102,14 +102,14 @@ def sweep_map(
         rover: The rover.
         terrain: The map of (ny, nx) cells.
         headings: Number of headings, the first along x, then equally spaced to the left.
-        options: As for `sweep_path`.
+        options: As for `judge_path`.
 
     Yields:
         Index of the first row, and scores (rows, nx, headings) of it and the rows that follow.
         A score takes 25 bytes per pose, and 4 for each limit.
 
     Raises:
-        ModelError, SoilError: As `sweep_path`.
+        ModelError, SoilError: As `judge_path`.
     """
     ny, nx = terrain.elevation.shape
     x = terrain.origin[0] + terrain.resolution * np.arange(nx)

@@ -43,10 +43,10 @@ class Part:
     there."""
 
 
-def sweep_in_parts(
+def predict_in_parts(
     rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
 ) -> Iterator[Part]:
-    """Sweep a path part by part; arguments and errors as `sweep_path`.
+    """Sweep a path part by part; arguments and errors as `judge_path`.
 
     A part ends before wheels whose fall depends on poses that are not yet swept. The next one
     begins before it, at a waypoint where no wheel falls.

@@ -25,7 +25,7 @@ from rover_physics.terrain.grid import Terrain
 
 
 @quiet
-def sweep_steered(
+def predict_steered(
     rover: Rover,
     terrain: Terrain,
     poses: np.ndarray,
@@ -40,10 +40,10 @@ def sweep_steered(
         poses: (n, 3) x, y [m] and yaw [rad] of base_link, map frame.
         course: Motion (3,) of base_link on the way, vx, vy [m/s] and yaw rate [rad/s], body frame;
             and steering angles (6,) of the wheels [rad], which need not fit the motion.
-        options: As for `sweep_path`.
+        options: As for `judge_path`.
 
     Raises:
-        PoseError, ModelError, SoilError: As `sweep_path`.
+        PoseError, ModelError, SoilError: As `judge_path`.
     """
     model, places = pack_model(rover, terrain, options), check_poses(poses)
     evaluate = _Evaluator(model, *course)

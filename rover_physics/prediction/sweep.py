@@ -78,7 +78,7 @@ class SweptPath:
         return SweptPath(self.path, prediction, self.results[:waypoints], crossings)
 
 
-def sweep_paths(
+def predict_paths(
     terrain: Terrain, model: PackedModel, paths: Sequence[np.ndarray], stop_at_failure: bool
 ) -> list[SweptPath]:
     """Sweep several paths at once, each in full or up to its first failure.

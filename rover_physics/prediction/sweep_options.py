@@ -29,7 +29,7 @@ JointAngles = tuple[tuple[str, float], ...]
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """Options of `sweep_path` and of all that is built on it; comparable and hashable.
+    """Options of `judge_path` and of all that is built on it; comparable and hashable.
 
     Raises:
         ModelError: A value out of range; the text names the option and its range.

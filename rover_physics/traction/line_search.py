@@ -15,8 +15,13 @@ from rover_physics.traction.layout import (
     TRACTION,
     TRACTIONS,
 )
-from rover_physics.traction.program import MIN_LOAD, MIN_PEAK, Reference
-from rover_physics.traction.program_inputs import ProgramInputs, max_pull_of
+from rover_physics.traction.program import (
+    MIN_LOAD,
+    MIN_PEAK,
+    ProgramInputs,
+    Reference,
+    max_pull_of,
+)
 
 LINE_END = 1.5
 """Where the search ends; 0 is at the last forces and 1 at the answer of a program."""

@@ -15,12 +15,12 @@ from rover_physics.traction.fallback import fall_back_to_equal_torques
 from rover_physics.traction.layout import FORCES, ROWS, TRACTION, TRACTIONS, VARIABLES
 from rover_physics.traction.line_search import find_best_between, measure_peak
 from rover_physics.traction.program import (
+    ProgramInputs,
     Reference,
     TractionQP,
     build_traction_qp,
     new_traction_qp,
 )
-from rover_physics.traction.program_inputs import ProgramInputs
 from rover_physics.traction.wheel_forces import WHEEL_FORCES, write_wheel_forces
 
 OSQP_SETTINGS = {

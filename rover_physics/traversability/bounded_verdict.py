@@ -28,7 +28,7 @@ _UNBOUNDED = {
 }
 
 
-def judge_worst_case(
+def refuse_worst_case(
     rover: Rover, prediction: PathPrediction, bounds: PathBounds, verdict: Verdict
 ) -> Verdict:
     """Add the refusals of the bounds to a verdict; its own refusals remain.

@@ -74,7 +74,7 @@ def classify_path(
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        options: As for `sweep_path`; its policy is ignored.
+        options: As for `judge_path`; its policy is ignored.
         sigmas: As for `judge_path`.
 
     Returns:

@@ -22,8 +22,8 @@ from rover_physics.forces.soil import use_of_shear
 from rover_physics.limits.table import TRAPPED
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.parts import PART, sweep_in_parts
-from rover_physics.prediction.sweep import SweptPath, sweep_paths
+from rover_physics.prediction.parts import PART, predict_in_parts
+from rover_physics.prediction.sweep import SweptPath, predict_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.prediction.way_back import predict_way_back
 from rover_physics.results.path_prediction import PathPrediction
@@ -192,9 +192,9 @@ def _judge_to_failure(
     """Judge a way up to its first failure; long ones in parts, to keep little in memory."""
     if len(poses) <= PART:
         model = pack_model(rover, terrain, options)
-        swept = sweep_paths(terrain, model, [poses], stop_at_failure=True)[0]
+        swept = predict_paths(terrain, model, [poses], stop_at_failure=True)[0]
         return hold_against_limits(rover, swept.prediction)
-    for part in sweep_in_parts(rover, terrain, poses, options):
+    for part in predict_in_parts(rover, terrain, poses, options):
         verdict = hold_against_limits(rover, part.prediction)
         if not verdict.traversable:
             at = part.first - part.context + verdict.first_failure

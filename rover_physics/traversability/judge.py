@@ -13,12 +13,12 @@ from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import check_poses, evaluator, predict_poses, sweep_paths
+from rover_physics.prediction.sweep import check_poses, evaluator, predict_paths, predict_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.bounded_verdict import judge_worst_case
+from rover_physics.traversability.bounded_verdict import refuse_worst_case
 from rover_physics.traversability.entrapment import course_of, refuse_if_trapped
 from rover_physics.traversability.verdict import Verdict, hold_against_limits, with_refusals
 
@@ -87,13 +87,13 @@ def judge_paths(
     model = pack_model(rover, terrain, options)
     checked = [check_poses(poses) for poses in paths]
     judged = []
-    for swept in sweep_paths(terrain, model, checked, stop_at_failure):
+    for swept in predict_paths(terrain, model, checked, stop_at_failure):
         check_interruption()
         verdict = hold_against_limits(rover, swept.prediction)
         if check_entrapment and verdict.code != "wheel_drop":
             course = course_of(rover, swept, options)
             verdict = refuse_if_trapped(rover, terrain, course, verdict, options)
-        judged.append(judge_bounds(rover, terrain, swept.prediction, verdict, options, sigmas))
+        judged.append(add_bounds(rover, terrain, swept.prediction, verdict, options, sigmas))
     return judged
 
 
@@ -144,10 +144,10 @@ def _judge_in_motion(
     model = pack_model(rover, terrain, options)
     prediction = predict_poses(model, places, evaluator(model)(places, motions=motions))
     verdict = hold_against_limits(rover, prediction)
-    return judge_bounds(rover, terrain, prediction, verdict, options, sigmas)
+    return add_bounds(rover, terrain, prediction, verdict, options, sigmas)
 
 
-def judge_bounds(
+def add_bounds(
     rover: Rover,
     terrain: Terrain,
     prediction: PathPrediction,
@@ -162,7 +162,7 @@ def judge_bounds(
     bounds = bound_path(rover, terrain, prediction, options, sigmas)
     if bounds is None:
         return prediction, verdict
-    worst = judge_worst_case(rover, prediction, bounds, verdict)
+    worst = refuse_worst_case(rover, prediction, bounds, verdict)
     if options.kept_margin > 0.0:
         worst = _pass_with_equal_torques(rover, terrain, prediction, verdict, worst, options)
     return replace(prediction, bounds=bounds), worst

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rover_physics.bounds.path import SIGMAS, check_sigmas
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.parts import PART, Part, sweep_in_parts
+from rover_physics.prediction.parts import PART, Part, predict_in_parts
 from rover_physics.prediction.path_motion import check_curvature
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -22,7 +22,7 @@ from rover_physics.traversability.entrapment import (
     find_one_way,
     refuse_if_trapped,
 )
-from rover_physics.traversability.judge import judge_bounds, judge_poses
+from rover_physics.traversability.judge import add_bounds, judge_poses
 from rover_physics.traversability.verdict import (
     Verdict,
     hold_against_limits,
@@ -84,7 +84,7 @@ class PartwiseJudge:
 
     def _judge_path(self) -> Iterator[PathPrediction]:
         rover, options = self._rover, self._options
-        for part in sweep_in_parts(rover, self._terrain, self._poses, options):
+        for part in predict_in_parts(rover, self._terrain, self._poses, options):
             verdict = hold_against_limits(rover, part.prediction)
             one_way = find_one_way(rover, part.prediction, options)
             self._found.add_course(part, verdict, one_way)
@@ -96,7 +96,7 @@ class PartwiseJudge:
 
     def _add(self, prediction: PathPrediction, verdict: Verdict) -> PathPrediction:
         """Add the bounds of a part and take its verdict; return it with the bounds."""
-        prediction, verdict = judge_bounds(
+        prediction, verdict = add_bounds(
             self._rover, self._terrain, prediction, verdict, self._options, self._sigmas
         )
         self._found.add_verdict(verdict)

@@ -84,8 +84,8 @@ def find_torque_ranges(
         rover: The rover.
         terrain: The ground.
         poses: (n, 3) x, y [m] and yaw [rad] of base_link in the map frame, n >= 1.
-        options: As for `sweep_path`; its policy and control margin are ignored.
-        curvature: As for `sweep_poses`, if the poses form no path.
+        options: As for `judge_path`; its policy and control margin are ignored.
+        curvature: As for `judge_poses`, if the poses form no path.
 
     Raises:
         PoseError: Poses of wrong shape, or not finite; or such curvatures.

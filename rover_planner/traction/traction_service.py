@@ -20,7 +20,7 @@ from rover_physics.traction.contact_ekf import (
     level_estimate,
 )
 from rover_physics.traction.map_contacts import MAP_SOURCE, MapContactFinder
-from rover_physics.traction.program_inputs import ProgramInputs
+from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import (
     MAX_PROGRAMS,
     TractionAnswer,

@@ -15,7 +15,7 @@ import numpy as np
 from rover_physics import SweepOptions, classify_path, find_torque_ranges, judge_path
 from rover_physics import judge_reach, load_rover, load_terrain, score_poses
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
-from rover_physics.traction.program_inputs import ProgramInputs
+from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 
 rover, ground = load_rover("lsr1"), load_terrain("spirit")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The questions of the services as plain values, and their answers."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from rover_planner.planning.verdict_report import IdentityReport
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class Question(ABC):
     """A question; it is judged in a thread."""
 
     service: str
@@ -20,6 +21,7 @@ class Question:
     hash: str
     """Hash of the request; empty if it has none."""
 
+    @abstractmethod
     def judge(self, situation: Situation) -> Any:
         """Return the judgement, which has a `code`.
 
@@ -28,7 +30,6 @@ class Question:
             RoverError: The model refuses the request.
             NewerMapError: It is to be judged again on the newest map.
         """
-        raise NotImplementedError
 
     def refuse(self, code: str, reason: str) -> Any:
         """Return a judgement that refuses the question."""

@@ -14,7 +14,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import BoundStatus
-from rover_physics.traversability.bounded_verdict import judge_worst_case
+from rover_physics.traversability.bounded_verdict import refuse_worst_case
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import fractal, plane, rocky
@@ -223,7 +223,7 @@ def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
     edges = bounds.status == BoundStatus.ON_EDGE
     assert 0 < edges.sum() < 0.2 * len(x)
     assert np.all(np.isnan(bounds.roll[edges]))
-    verdict = judge_worst_case(M2020, prediction, bounds, hold_against_limits(M2020, prediction))
+    verdict = refuse_worst_case(M2020, prediction, bounds, hold_against_limits(M2020, prediction))
     reasons = {verdict.reasons[i] for i in np.flatnonzero(edges) if "edge" in verdict.reasons[i]}
     assert reasons == {"a wheel may climb or fall off an edge within 3 sigma of the map"}
 

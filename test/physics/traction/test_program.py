@@ -21,8 +21,13 @@ from rover_physics.traction.layout import (
     VARIABLES,
 )
 from rover_physics.traction.line_search import find_best_between, measure_peak
-from rover_physics.traction.program import Reference, build_traction_qp, new_traction_qp
-from rover_physics.traction.program_inputs import ProgramInputs, TractionWeights
+from rover_physics.traction.program import (
+    ProgramInputs,
+    Reference,
+    TractionWeights,
+    build_traction_qp,
+    new_traction_qp,
+)
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from rover_physics.traversability.judge import judge_path
 from support.best_torques import can_stand

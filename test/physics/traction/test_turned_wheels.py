@@ -11,7 +11,7 @@ from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
 from rover_physics.traction.layout import LOADS, TRACTIONS
 from rover_physics.traction.map_contacts import MapContactFinder
-from rover_physics.traction.program_inputs import ProgramInputs
+from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from rover_physics.traversability.judge import judge_path, judge_poses
 from support.rough_grounds import fractal, plane, random_poses

@@ -182,7 +182,7 @@ def test_backwards_into_a_crater_is_as_much_a_trap():
 
 def test_on_coulomb_ground_without_drops_nothing_more_is_swept(monkeypatch):
     asked = []
-    for name in ("sweep_paths", "predict_way_back"):
+    for name in ("predict_paths", "predict_way_back"):
         sweep = getattr(trap, name)
         monkeypatch.setattr(
             trap,

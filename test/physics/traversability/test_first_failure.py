@@ -68,7 +68,7 @@ def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(cours
     whole = judge_path(ROVER, ground, poses, OPTIONS[option])[0]
     verdict = hold_against_limits(ROVER, whole)
     model = pack_model(ROVER, ground, OPTIONS[option])
-    swept = sweep.sweep_paths(ground, model, [poses], stop_at_failure=True)[0]
+    swept = sweep.predict_paths(ground, model, [poses], stop_at_failure=True)[0]
     stopped = hold_against_limits(ROVER, swept.prediction)
     assert first_refusal(stopped) == first_refusal(verdict)
     count = len(poses) if verdict.traversable else verdict.first_failure + 1

@@ -21,7 +21,7 @@ from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.rover.rover_file import load_rover, rover_from_dict
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.bounded_verdict import judge_worst_case
+from rover_physics.traversability.bounded_verdict import refuse_worst_case
 from rover_physics.traversability.classification import classify_path
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.reach import judge_reach
@@ -171,7 +171,7 @@ def test_a_bound_that_is_no_number_is_a_refusal():
     loads = prediction.bounds.wheel_loads.copy()
     loads[2, 4, 0] = math.nan
     bounds = replace(prediction.bounds, wheel_loads=loads)
-    worst = judge_worst_case(LSR1, prediction, bounds, verdict)
+    worst = refuse_worst_case(LSR1, prediction, bounds, verdict)
     assert (worst.first_failure, worst.code) == (2, "not_computable")
     assert "wheel_loads" in worst.reason and "3 sigma" in worst.reason
 
