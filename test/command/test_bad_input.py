@@ -202,7 +202,7 @@ def test_files_of_another_kind_are_one_line(capfd, files, name, content):
     [
         (b"no array", "entry poses"),
         (b"", "entry poses"),
-        (b"\x93NUMPY\x01\x00\x05\x00(((((", "((((("),
+        (b"\x93NUMPY\x01\x00\x05\x00(((((", "entry poses is damaged"),
     ],
 )
 def test_poses_that_are_no_array_are_refused(files, capfd, entry, names):

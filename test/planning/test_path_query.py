@@ -91,7 +91,7 @@ def test_options_reach_the_model(rover):
     assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), grippy).traversable
     refused = answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), slippery)
     assert refused.chosen.verdict.code == "friction"
-    weak = dataclasses.replace(COARSE, max_torque=0.05)
+    weak = COARSE.change(max_torque=0.05)
     assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), weak).chosen.verdict.code == (
         "torque"
     )

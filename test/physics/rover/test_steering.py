@@ -56,8 +56,8 @@ def test_every_wheel_rolls_where_the_body_takes_it_as_far_as_it_steers(rover, vx
     assert can_follow
     assert np.abs(angles).max() <= np.pi / 2
     limit = rover.steering.limit if rover.steering else 0.0
-    turns &= np.abs(angles) < limit  # 1.57 rad is a little less than a right angle
-    assert rolled[turns] == pytest.approx(carried[turns], abs=1e-9)
+    follows = turns & (np.abs(angles) < limit)  # 1.57 rad is a little less than a right angle
+    assert rolled[follows] == pytest.approx(carried[follows], abs=1e-9)
     assert not angles[~turns].any()
     assert rolling[~turns] == pytest.approx(carried[~turns, 0], abs=1e-15)
 
