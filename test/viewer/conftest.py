@@ -50,6 +50,7 @@ def visitor(opened, page):
 
     def begin_anew() -> None:
         page.playback.go_to(0.0)
+        page.drive_tab.outdated = True
         if session.wanted is not page.home:
             session.take_scenario(page.home)
             page.judged.show_inputs()
