@@ -51,6 +51,9 @@ class Task(Question):
 
     work: Callable[[Budget], object]
 
+    def judge(self, budget):
+        return self.work(budget)
+
     def refuse(self, code, _reason):
         return code
 
@@ -61,7 +64,7 @@ class Desk:
     def __init__(self, max_waiting: int = 100):
         self.told: list[tuple[str, object]] = []
         self.queue = QuestionQueue(
-            max_waiting, lambda asked: asked.question.work(asked.budget), lambda: None
+            max_waiting, lambda asked: asked.question.judge(asked.budget), lambda: None
         )
 
     def ask(self, name, work, seconds: float = 20.0, clock=time.monotonic) -> None:
