@@ -190,9 +190,19 @@ class Visitor:
         self.tab.mouse.up()
 
     def choose(self, label: str, option: str) -> None:
-        """Choose an option of a drop-down."""
-        self.row(label).locator("input:visible").first.click()
-        self.tab.get_by_role("option", name=option, exact=True).click()
+        """Choose an option of a drop-down, which a page that redraws its panel may close again."""
+
+        def is_chosen() -> bool:
+            self.row(label).locator("input:visible").first.click()
+            wanted = self.tab.get_by_role("option", name=option, exact=True)
+            try:
+                wanted.click(timeout=5000)
+            except Exception:  # playwright's TimeoutError; playwright is imported late
+                self.tab.keyboard.press("Escape")
+                return False
+            return True
+
+        wait_until(is_chosen, f"the option {option}")
 
     def text(self, selector: str) -> str:
         """Return the text of an element of the page."""
