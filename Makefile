@@ -36,8 +36,9 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 	@$(BIN)/python -m rover_planner view lsr1 $(if $(MAP),"$(MAP)")
 
 .PHONY: test
-test: lint kernels ## lint, type check and all tests
-	@run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
+test: $(READY) ## lint, type check and all tests
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync lint kernels
+	run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
 	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 --durations-min 10 --cache-clear "$$@" && return
 	  echo "== what failed, once more and alone, to tell more; the run has failed"

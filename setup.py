@@ -55,6 +55,7 @@ EXTRAS = {
         "ruff>=0.9,<1",
         "mypy>=1.14,<3",
         "pytest-cov>=6.0,<8",
+        "uv>=0.5,<1",
     ],
 }
 EXTRAS["all"] = [
