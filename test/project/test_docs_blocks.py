@@ -46,8 +46,8 @@ SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
 LONGEST = 300.0
 """Longest time for a block [s]."""
 
-LONG_PAGES = ("docs/command_line.md", "docs/integration/maps.md", "docs/simulator.md")
-"""Pages whose blocks take a minute or more."""
+QUICK_PAGES = ("README.md", "docs/python.md", "docs/soil.md", "docs/integration/robot.md")
+"""Pages whose blocks `make test` runs; those of the others take `make test-long`."""
 
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
 PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
@@ -187,7 +187,7 @@ def reader(tmp_path, programs):
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(page, marks=[pytest.mark.long] if page in LONG_PAGES else [])
+        pytest.param(page, marks=[] if page in QUICK_PAGES else [pytest.mark.long])
         for page in PAGES_TO_RUN
     ],
 )
