@@ -27,7 +27,7 @@ from rover_planner.planning.answering.situation import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.guard import INPUT_ERRORS
 
 Publish = Callable[[Judgement, IdentityReport], Any]
 ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]

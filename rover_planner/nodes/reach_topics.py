@@ -12,7 +12,7 @@ from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.questions import Answer, ReachCheck
 from rover_planner.planning.answering.reach_query import ReachJudgement, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.requests import subscribe_to_requests
+from rover_planner.ros.subscriptions import subscribe_to_requests
 
 
 class ReachTopics:

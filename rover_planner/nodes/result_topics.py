@@ -36,7 +36,7 @@ from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_work import DeferredWork
-from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
+from rover_planner.ros.lazy_publisher import LazyPublisher
 
 WHEEL_TOPICS = {
     "wheel_loads": "wheel_loads",

@@ -10,15 +10,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import rclpy
-import rclpy.logging
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
@@ -29,15 +25,11 @@ from msg_adapters.joints import convert_steering
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
-from rover_planner.nodes.programs import read_words
-from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
+from rover_planner.nodes.running import run_node
 from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
-from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 from rover_planner.worlds.summary import describe_terrain
@@ -223,35 +215,14 @@ def _make_broadcaster(node: Node) -> Any:
     return None
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    node, stop = None, StopSignals()
-    try:
-        options = read_words(NODE_NAME, words)
-        if options == EXIT_OK:  # help was printed
-            return EXIT_OK
-        rclpy.logging.get_logger(NODE_NAME).info(
-            "compiling kernels; the first start takes longest"
-        )
-        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
+
+    def make(options: dict[str, Any]) -> RoverSimulator:
         overrides = [Parameter(name, value=value) for name, value in options.items()]
-        node = RoverSimulator(parameter_overrides=overrides)
-        executor = SingleThreadedExecutor()
-        stop.defer(executor.wake)
-        warn_of_disk(node.get_logger())
-        executor.add_node(node)
-        while not stop.wanted:
-            executor.spin_once(timeout_sec=LOOK_FOR_STOP)
-    except INPUT_ERRORS as error:
-        rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
-        return EXIT_BAD_INPUT
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_OK
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return EXIT_OK
+        return RoverSimulator(parameter_overrides=overrides)
+
+    return run_node(NODE_NAME, argv, make)
 
 
 if __name__ == "__main__":

@@ -1,29 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /traction_controller: commands wheel torques by a QP at a fixed rate."""
 
-import gc
 import sys
 import time
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import rclpy
-import rclpy.logging
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from msg_adapters.commands import joint_order
 from msg_adapters.results.traction_status import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
-from rover_planner.nodes.programs import read_words
-from rover_planner.nodes.stop_signals import StopSignals
+from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs
 from rover_planner.nodes.traction.maps import TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
@@ -31,13 +25,10 @@ from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
-from rover_planner.ros.disk import init_ros, warn_of_disk
-from rover_planner.ros.guard import Guard, GuardedExecutor
-from rover_planner.ros.logs.transition_log import TransitionLog
+from rover_planner.ros.guard import Guard
+from rover_planner.ros.logs import TransitionLog
+from rover_planner.ros.process import take_priority
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
-from rover_planner.ros.realtime import take_priority
-from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clock_watch import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
@@ -287,38 +278,15 @@ class TractionController(Node):
         )  # fmt: skip
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    stop = StopSignals()
-    node = None
-    try:
-        if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
-            return EXIT_OK
-        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
-        rclpy.logging.get_logger(NODE_NAME).info(
-            "compiling kernels; the first start takes longest"
-        )
-        executor = GuardedExecutor()
+
+    def make(_: Any) -> TractionController:
         node = TractionController()
-        stop.defer(executor.wake)
-        warn_of_disk(node.get_logger())
         node.take_priority()
-        executor.add_guarded(node, node.guard)
-        gc.collect()
-        gc.freeze()
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        while not stop.wanted:
-            executor.spin_once(timeout_sec=0.1)
-    except INPUT_ERRORS as error:
-        rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
-        return EXIT_BAD_INPUT
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_OK
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return EXIT_OK
+        return node
+
+    return run_node(NODE_NAME, argv, make, SWITCH_INTERVAL)
 
 
 if __name__ == "__main__":

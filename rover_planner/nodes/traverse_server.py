@@ -1,23 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /traverse_server: answers over ROS 2 whether the rover can traverse a path."""
 
-import gc
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import rclpy
-import rclpy.logging
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -39,11 +34,10 @@ from rover_planner.nodes.navigation.frames import is_empty
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.navigation.sensor_frames import SensorFrames
-from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
-from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
+from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, WAYS
 from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
@@ -67,12 +61,9 @@ from rover_planner.planning.path_planner import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
-from rover_planner.ros.disk import init_ros, warn_of_disk
-from rover_planner.ros.guard import Guard, GuardedExecutor
+from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.qos import sensor_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.ros.requests import subscribe_to_requests
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.worlds.summary import describe_terrain
 
@@ -98,7 +89,6 @@ class TraverseServer(Node):
         behind = (*behind, *HAZARDS) if self._values.hazard_map else behind
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
         self._behind = load_kernels(EXACT, behind, self.get_logger().info)
-        warn_of_disk(self.get_logger())
         self._service = TraverseService(load_service_settings(self._values))
         self.guard = Guard(self.get_logger())
         """Takes unexpected errors."""
@@ -362,40 +352,9 @@ class TraverseServer(Node):
         self._diagnostics.publish(message)
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    logger, stop = rclpy.logging.get_logger(NODE_NAME), StopSignals()
-    try:
-        if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
-            return EXIT_OK
-        logger.info("compiling kernels; the first start takes longest")
-        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
-        _run(stop)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_OK
-    except INPUT_ERRORS as error:
-        logger.fatal(str(error))
-        return EXIT_BAD_INPUT
-    finally:
-        rclpy.try_shutdown()
-    return EXIT_OK
-
-
-def _run(stop: StopSignals) -> None:
-    """Make a node and spin it until it is to end; open questions are refused then."""
-    node, executor = None, GuardedExecutor()
-    try:
-        node = TraverseServer()
-        stop.defer(executor.wake)
-        executor.add_guarded(node, node.guard)
-        gc.collect()
-        gc.freeze()  # objects that live as long as the node are excluded from garbage collection
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        while not stop.wanted:
-            executor.spin_once(timeout_sec=LOOK_FOR_STOP)
-    finally:
-        if node is not None:
-            node.destroy_node()
+    return run_node(NODE_NAME, argv, lambda _: TraverseServer(), SWITCH_INTERVAL)
 
 
 if __name__ == "__main__":

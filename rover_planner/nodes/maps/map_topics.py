@@ -22,10 +22,10 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid, TransformError
-from rover_planner.ros.logs.repeat_log import RepeatLog
+from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.ros.qos import map_subscriptions, sensor_qos
-from rover_planner.ros.qos_warnings import warn_of_mismatch
+from rover_planner.ros.qos import sensor_qos
+from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
 from rover_planner.worlds.maps.moved_map import MapMove
@@ -119,13 +119,8 @@ class MapTopics:
             if not self._intake.offer(message, kind):
                 self._intake.do(self._renew)
 
-        for qos, mends in map_subscriptions(
-            parameters.map_durability, parameters.input_reliability
-        ):
-            events = warn_of_mismatch(self._node, topic, mends)
-            self._node.create_subscription(
-                kind, topic, offer, qos, event_callbacks=events, raw=True
-            )
+        durability, reliability = parameters.map_durability, parameters.input_reliability
+        subscribe_to_map(self._node, kind, topic, offer, durability, reliability)
 
     def _subscribe_to_imu(self, parameters: TraverseServerParameters) -> None:
         mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)

@@ -15,7 +15,7 @@ from rover_physics.rover.model import Rover
 from rover_planner.nodes.navigation.frames import Frames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import TransformError
-from rover_planner.ros.logs.repeat_log import RepeatLog
+from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 

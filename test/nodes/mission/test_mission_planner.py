@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.mission_planner import main, spin_until
-from rover_planner.nodes.programs import read_words
+from rover_planner.nodes.programs import read_arguments
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, wall_at, waves
@@ -79,7 +79,7 @@ def test_bad_words_are_exit_code_2_with_one_line(capfd, words, names):
 )
 def test_negative_numbers_need_no_equals_sign_and_words_of_ros_are_put_aside(words):
     ros_words = ["--ros-args", "-r", "__node:=planner", "-p", "use_sim_time:=true"]
-    options = read_words("mission_planner", [*words, *ros_words, "--", BEYOND, "--json"])
+    options = read_arguments("mission_planner", [*words, *ros_words, "--", BEYOND, "--json"])
     assert isinstance(options, MissionOptions)
     assert options.start == Pose(-3.0, 0.0, 0.0)
     assert options.goals == (Pose(-0.5, -0.1, 0.0), Pose(2.0, 0.0, 0.0))

@@ -12,7 +12,7 @@ from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from rover_planner.nodes.nav2_services import PathValidity
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
-from support.messages.transforms import send_transforms, transform_message
+from support.messages.transforms import send_transforms
 from support.planner_client import GOAL, START, ask, verdict_of
 from support.waiting import wait_until
 
@@ -118,18 +118,3 @@ def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, c
     wait_until(lambda: shifted.service.path is not None, "the path")
     np.testing.assert_allclose(shifted.service.path[:, 0], (0.3, 1.3), atol=1e-9)
     assert json.loads(client.check_path().message)["traversable"]
-
-
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda message: setattr(message.transform.translation, "x", np.nan),
-        lambda message: setattr(message.transform.rotation, "w", 2.0),
-        lambda message: setattr(message, "child_frame_id", ""),
-    ],
-)
-def test_a_transform_that_is_none_is_refused(server, spoil):
-    message = transform_message("map", "odom", MAP_ODOM, server.get_clock().now().to_msg())
-    spoil(message)
-    server.frames.take(SimpleNamespace(transforms=[message]))
-    assert not server.frames._tree.knows("map")
