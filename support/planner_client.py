@@ -28,6 +28,7 @@ SERVER = "/traverse_server"
 START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)
 """Default poses of a query: x, y [m] and yaw [rad]."""
 
+
 def spin_server(ros: RosRun, **overrides) -> TraverseServer:
     """Start a traverse server with parameters.
 

@@ -106,7 +106,7 @@ def test_a_terrain_comes_back_as_it_was_with_all_its_layers(datatype, shuffled):
     np.testing.assert_allclose(back.friction[known], 0.5 + layer[known], rtol=1e-7)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     rows=st.integers(2, 40),
     columns=st.integers(2, 40),
@@ -418,7 +418,7 @@ def take_or_refuse(cloud, resolution):
             assert len(str(error)) <= MAX_TEXT
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(
     rows=st.lists(st.tuples(*[st.floats(width=32)] * 3), min_size=1, max_size=12),
     resolution=st.sampled_from((0.0, 0.05, 1e-3, 1e5)),
@@ -431,7 +431,7 @@ def test_every_set_of_points_becomes_a_terrain_or_a_refusal(rows, resolution, ki
 SIZES = st.one_of(st.integers(0, 40), st.integers(0, 2**32 - 1))
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(
     data=st.binary(max_size=600),
     header=st.fixed_dictionaries(

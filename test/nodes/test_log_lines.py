@@ -48,7 +48,9 @@ def test_one_that_ended_before_it_could_be_told_is_told_with_its_end():
 
 def test_texts_that_differ_in_numbers_are_told_once_in_a_period_and_counted():
     log = RepeatLog()
-    lines = [log.line(f"it is {age:.3f} s old", 0.1 * age) for age in range(int(30 * REPEAT_PERIOD))]
+    lines = [
+        log.line(f"it is {age:.3f} s old", 0.1 * age) for age in range(int(30 * REPEAT_PERIOD))
+    ]
     told = [line for line in lines if line]
     assert told == [
         "it is 0.000 s old",

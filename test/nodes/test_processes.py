@@ -21,6 +21,7 @@ from support.project.without_disk import fill_disk
 from support.ros_fixtures import domain_id
 from support.waiting import wait_until
 
+
 @pytest.fixture
 def start_process():
     """Return a function that starts a node with parameters; what is left at the end is killed."""
