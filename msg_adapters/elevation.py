@@ -63,14 +63,8 @@ class CloudPoints:
     """Rounding error of the x and y coordinates [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class PointMove:
-    """What moves points from the frame of a sensor to that of the map: R p + t."""
-
-    rotation: NDArray[np.float64]
-    """(3, 3) R."""
-    translation: NDArray[np.float64]
-    """(3,) t [m]."""
+PointMove = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""R (3, 3) and t (3,) [m]: a point p of a sensor's frame is at R p + t in that of the map."""
 
 
 def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoints:
@@ -87,7 +81,7 @@ def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoint
     xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
     precision = rounding_error(points["x"], points["y"])
     if move is not None:
-        xyz = xyz @ move.rotation.T + move.translation  # NaN where a coordinate is
+        xyz = xyz @ move[0].T + move[1]  # NaN where a coordinate is
         precision = rounding_error(points["x"], points["y"], points["z"])
     return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 

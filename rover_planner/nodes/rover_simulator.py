@@ -26,9 +26,8 @@ from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
-from rover_planner.parameters.declare import declare_parameters
+from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings

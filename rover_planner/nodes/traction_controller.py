@@ -17,14 +17,18 @@ from std_srvs.srv import SetBool
 from msg_adapters.commands import joint_order
 from msg_adapters.results.traction_status import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
+from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs
 from rover_planner.nodes.traction.maps import TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, update_traction
-from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.declare import (
+    declare_parameters,
+    follow_changes,
+    warn_of_unknown_parameters,
+)
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.process import take_priority
@@ -77,13 +81,17 @@ class TractionController(Node):
         self.guard = Guard(self.get_logger())
         """Counts unexpected errors."""
         self._clock_watch = ClockWatch(self._values.clock_timeout)
+        self.frames = NodeFrames(self, self._values)
+        """Knows where the frames of messages are on the map."""
         self._maps = TractionMaps(
             self,
             self._values,
             lambda: self.service.settings.rover,
-            lambda: self._inputs.frames,
+            self.frames,
         )
-        self._inputs = TractionInputs(self, self._values, self.service, self._maps, self.guard)
+        self._inputs = TractionInputs(
+            self, self._values, self.service, self._maps, self.frames, self.guard
+        )
         names = self._inputs.joint_names
         order = joint_order(self._values.joints, names)
         self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
@@ -163,7 +171,7 @@ class TractionController(Node):
         self._supervisor.configure(self._load(parameters))
         self._clock_watch.timeout = parameters.clock_timeout
         self._inputs.stamps.tolerance = parameters.stamp_tolerance
-        self._inputs.frames.apply_timeout(parameters.transform_timeout)
+        self.frames.apply_timeout(parameters.transform_timeout)
         self._values = parameters
         self._maps.apply(parameters)
 

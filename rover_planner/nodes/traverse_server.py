@@ -30,18 +30,20 @@ from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_file_service import MapFileService
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
-from rover_planner.nodes.navigation.frames import is_empty
+from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
-from rover_planner.nodes.navigation.sensor_frames import SensorFrames
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, WAYS
-from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.declare import (
+    declare_parameters,
+    follow_changes,
+    warn_of_unknown_parameters,
+)
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
-from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import stamp_text
@@ -57,10 +59,12 @@ from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_planner import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
+from rover_planner.ros.frames import is_empty
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import subscribe_to_requests
@@ -94,7 +98,7 @@ class TraverseServer(Node):
         """Takes unexpected errors."""
         frame, reliability = self._values.map_frame, self._values.input_reliability
         self._joint_names = read_joint_map(self._values.joint_map, self._service.all_joint_names)
-        self.frames = SensorFrames(self, self._values)
+        self.frames = NodeFrames(self, self._values, sensor_poses(self._values))
         """Transforms poses to the map frame."""
         self.frames.listen()
         self._results = ResultTopics(
@@ -110,7 +114,7 @@ class TraverseServer(Node):
             self._service,
             self._values,
             lambda error: self._note_map(error),
-            self.frames.find_sensor,
+            self.frames,
         )
         self.desk = QuestionDesk(self, self._service, self._maps, self.guard)
         """Takes the questions of all services."""

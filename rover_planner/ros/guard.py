@@ -80,11 +80,11 @@ class GuardedExecutor(SingleThreadedExecutor):
 
     def __init__(self, **executor_arguments: Any):
         super().__init__(**executor_arguments)
-        self._guard: Guard | None = None
+        self._guard_of_node: Guard | None = None
 
     def add_node(self, node: Node) -> bool:
         """Add the node; errors of its callbacks go to its guard, if it has one."""
-        self._guard = getattr(node, "guard", None)
+        self._guard_of_node = getattr(node, "guard", None)
         return bool(super().add_node(node))
 
     def _make_handler(self, entity, node, take_from_wait_list):
@@ -109,9 +109,9 @@ class GuardedExecutor(SingleThreadedExecutor):
     def _report(self, place: str, error: Exception) -> None:
         if not self.context.ok():
             return  # whoever reads or publishes while ROS shuts down fails
-        if self._guard is None:
+        if self._guard_of_node is None:
             raise error
-        self._guard.report(place, error)
+        self._guard_of_node.report(place, error)
 
 
 def _name(entity: Any) -> str:

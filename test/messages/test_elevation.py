@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.elevation import (
-    PointMove,
     terrain_from_point_cloud,
     terrain_to_occupancy_grid,
     terrain_to_point_cloud,
@@ -250,9 +249,9 @@ def test_scattered_points_ask_for_a_resolution(quantum):
 
 def test_moved_points_are_those_that_were_moved_before_and_invalid_ones_are_left_out():
     c, s = np.cos(0.6), np.sin(0.6)
-    move = PointMove(np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]), np.ones(3))
+    move = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]), np.ones(3)
     points = np.random.default_rng(4).uniform(-1.0, 1.0, (4000, 3)) * [1.0, 1.0, 0.05]
-    here = points @ move.rotation.T + 1.0
+    here = points @ move[0].T + 1.0
     seen = np.vstack([points, [[np.nan, 0.0, 0.0], [0.0, 0.0, np.inf], [0.0, np.nan, np.nan]]])
     found = terrain_from_point_cloud(cloud_of(seen), 0.1, "max", move)
     assert_same(found, terrain_from_point_cloud(cloud_of(here), 0.1, "max"))

@@ -11,8 +11,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from rover_planner.errors import PlanningError
+from rover_planner.parameters.__main__ import TABLES, parameters_document
 from rover_planner.parameters.declare import declare_parameters, follow_changes
-from rover_planner.parameters.document import TABLES, parameters_document
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters

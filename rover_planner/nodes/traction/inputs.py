@@ -18,7 +18,7 @@ from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
-from rover_planner.nodes.navigation.frames import Frames
+from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.logs import TransitionLog
@@ -50,10 +50,14 @@ class TractionInputs:
         parameters: TractionControllerParameters,
         service: TractionService,
         maps: MapIntake,
+        frames: NodeFrames,
         guard: Guard,
     ):
-        """Subscribe to all inputs of a node; `guard` counts unexpected errors."""
-        self._node, self._service, self._maps = node, service, maps
+        """Subscribe to all inputs of a node; `guard` counts unexpected errors.
+
+        `frames` brings odometry of other frames to that of the map.
+        """
+        self._node, self._service, self._maps, self._frames = node, service, maps, frames
         self._errors = guard
         self._steering_sign = parameters.steering_sign
         arm = service.settings.rover.manipulator
@@ -68,8 +72,6 @@ class TractionInputs:
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
-        self.frames = Frames(node, parameters)
-        """Brings odometry of other frames to that of the map."""
         self._subscribe(parameters)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
@@ -158,8 +160,8 @@ class TractionInputs:
     def _take_odometry(self, odometry: Odometry, now: float) -> None:
         measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)
         if odometry.header.frame_id != self._map_frame:
-            self.frames.listen()  # only then: /tf of a whole robot costs the loop time
-        here = self.frames.localise_odometry(odometry)
+            self._frames.listen()  # only then: /tf of a whole robot costs the loop time
+        here = self._frames.localise_odometry(odometry)
         pose, deviation = odometry_to_pose(here, self._map_frame, self._base_frame)
         self._service.take_odometry(pose, deviation, measured)
         self._log.update(ODOMETRY, "", "odometry is used again", now)

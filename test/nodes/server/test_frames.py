@@ -2,6 +2,7 @@
 """Questions in another frame, from where the rover is, and about a robot with another origin."""
 
 import json
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,8 +21,8 @@ MAP_ODOM = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
 """Where odometry began, on the map."""
 
 
-def send(server, *edges, age=0.0, take="take"):
-    send_transforms(server, getattr(server.frames, take), *edges, age=age)
+def send(server, *edges, age=0.0, is_static=False):
+    send_transforms(server, partial(server.frames.take, is_static=is_static), *edges, age=age)
 
 
 def on_map(pose):
@@ -92,7 +93,7 @@ def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, last
 
 
 def test_odometry_in_another_frame_is_transformed(mapped, client, lasting):
-    send(mapped, ("map", "odom", MAP_ODOM), take="take_static")
+    send(mapped, ("map", "odom", MAP_ODOM), is_static=True)
     client.send_odometry((1.0, 2.0, 0.5), "odom")
     wait_until(lambda: mapped.service.fresh_pose() is not None, "odometry")
     right = MAP_ODOM.then(Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.5)).xyyaw

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """GridMaps: their layers are used, and those of other frames are placed by /tf."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -98,7 +100,9 @@ def test_a_map_is_refused_with_the_reason_until_its_transform_has_come(
 def test_a_turned_map_in_odom_is_the_same_ground_in_the_map_frame(start_server, offer):
     server = start_server(transform_timeout=30.0)
     here = Rigid.from_rpy(12.0, -7.0, 0.4, 0.0, 0.0, 0.7)
-    send_transforms(server, server.frames.take_static, ("map", "odom", here), age=0.0)
+    send_transforms(
+        server, partial(server.frames.take, is_static=True), ("map", "odom", here), age=0.0
+    )
     offer(server)
     found = wait_until(lambda: server.service.terrain, "the map")
     rows, columns = np.nonzero(np.isfinite(found.elevation))
