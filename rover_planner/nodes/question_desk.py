@@ -17,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from msg_adapters.results.server_status import search_diagnostics
+from msg_adapters.results.diagnostics import search_diagnostics
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.identity import Register

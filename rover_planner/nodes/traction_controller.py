@@ -15,7 +15,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from msg_adapters.commands import joint_order
-from msg_adapters.results.traction_status import traction_diagnostics
+from msg_adapters.results.diagnostics import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.running import run_node
@@ -73,7 +73,8 @@ class TractionController(Node):
         load_kernels(TRACTION, (), self.get_logger().info)
         update_traction(self._accepted[1])  # so that the first update is as fast as others
         self._supervisor = TractionSupervisor(self._accepted[1], self._values.enabled_at_start)
-        self._statistics = TractionStatistics(1.0 / self._values.rate)
+        self.statistics = TractionStatistics(1.0 / self._values.rate)
+        """Update times, counts and the last update."""
         self._command: TractionCommand | None = None
         self._log = TransitionLog(self.get_logger())
         self._warning = ""
@@ -109,11 +110,6 @@ class TractionController(Node):
     def service(self) -> TractionService:
         """The service that takes measurements and returns torques."""
         return self._supervisor.service
-
-    @property
-    def statistics(self) -> TractionStatistics:
-        """Update times, counts and the last update."""
-        return self._statistics
 
     @property
     def state(self) -> str:
@@ -212,7 +208,7 @@ class TractionController(Node):
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)
         self._topics.publish_forces(command.update)
-        self._statistics.take(command.update, start, time.perf_counter())
+        self.statistics.take(command.update, start, time.perf_counter())
         self._tell(command, now)
 
     def _write(self, command: TractionCommand) -> None:
@@ -272,7 +268,7 @@ class TractionController(Node):
         command = self._command
         if command is None:
             return
-        values = self._statistics.describe() | {
+        values = self.statistics.describe() | {
             "watchdog_trips": self._watchdog.trips,
             "internal_errors": self.guard.total,
             "brake": command.brake,

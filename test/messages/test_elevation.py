@@ -15,11 +15,11 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.elevation import (
     terrain_from_point_cloud,
-    terrain_to_occupancy_grid,
     terrain_to_point_cloud,
 )
 from msg_adapters.errors import MAX_TEXT, MessageError
 from msg_adapters.gridding import detect_raster
+from msg_adapters.results.grids import terrain_to_occupancy_grid
 from rover_physics.errors import TerrainError
 from rover_physics.terrain.grid import Terrain, load_terrain
 

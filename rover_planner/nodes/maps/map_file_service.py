@@ -7,7 +7,7 @@ from functools import partial
 from nav_msgs.srv import LoadMap
 from rclpy.node import Node
 
-from msg_adapters.elevation import terrain_to_occupancy_grid
+from msg_adapters.results.grids import terrain_to_occupancy_grid
 from rover_physics.files.validation import show_file
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.ros.deferred_service import Reply, serve_later

@@ -14,7 +14,7 @@ from nav_msgs.srv import GetMap
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from msg_adapters.results.hazard_grids import classes_to_grid
+from msg_adapters.results.grids import classes_to_grid
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import UNKNOWN, RoverOnMap

@@ -12,8 +12,7 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joint_map import read_joint_map
-from msg_adapters.joints import convert_steering
+from msg_adapters.joints import convert_steering, read_joint_map
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats

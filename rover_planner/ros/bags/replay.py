@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joint_map import JointMap, read_joint_map
+from msg_adapters.joints import JointMap, read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME

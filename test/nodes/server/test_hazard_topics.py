@@ -9,7 +9,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
 from rclpy.node import Node
 
-from msg_adapters.results.hazard_grids import VALUES
+from msg_adapters.results.grids import VALUES
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, waves

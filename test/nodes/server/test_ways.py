@@ -8,7 +8,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
 from msg_adapters.paths import path_to_poses
-from msg_adapters.results.closed_areas import NOT_REACHED, REACHED
+from msg_adapters.results.grids import NOT_REACHED, REACHED
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import SERVER, ask
