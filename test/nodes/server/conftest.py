@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A mapped server that the tests of a file share."""
+"""A mapped server that the tests of a file share.
+
+Its log goes silent where another server in this process ends: tests with servers of their own come
+first in a file.
+"""
 
 from types import SimpleNamespace
 

@@ -38,6 +38,66 @@ LISTS = {field.name for field in fields(WaypointLists)}
 AHEAD = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
 
 
+def check(client, server, poses=AHEAD) -> dict:
+    return json.loads(client.check_poses(server, poses).message)
+
+
+def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(start_server, ros):
+    server = start_server(planner="fan")
+    server.service.take_terrain(make_terrain(waves))
+    asker = ros.spin(Node("asker", context=ros.context))
+    client = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
+    for end in ((1.0, 0.3, 0.0), GOAL):
+        request = GetPlan.Request(start=stamped_pose(START, "map"), goal=stamped_pose(end, "map"))
+        plan = call(client, request).plan
+    late = ros.spin(PlannerClient(ros)).heard
+
+    def heard_all() -> bool:
+        if not all(late.values()) or late["plan"][-1] != plan:
+            return False
+        last = {topic: messages[-1] for topic, messages in late.items()}
+        headers = [last[topic].header for topic in ("predicted_joints", "verdict")]
+        headers += [marker.header for marker in last["markers"].markers]
+        arrays = [array_values(last[topic]) for topic in (*WHEEL_TOPICS, "tip_over_margin")]
+        waypoints = int(verdict_of(last)["waypoints"])
+        return all(header == plan.header for header in headers) and all(
+            len(values) == waypoints for values in arrays
+        )
+
+    wait_until(heard_all, "all results of the last answer")
+
+
+def test_a_map_published_before_the_server_came_is_heard(client, start_server):
+    publisher = client.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+    publisher.publish(terrain_to_point_cloud(make_terrain(waves), "map"))
+    server = start_server()
+    wait_until(lambda: server.service.terrain is not None, "the map")
+
+
+def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
+    server = start_server(policy="optimal", plan_spacing=50.0, candidate_count=1)
+    client.send_terrain(make_terrain(lambda x, y: 0.45 * np.maximum(x - 0.13, 0.0)))
+    plan = client.can_traverse((-1.5, 0.0, 0.0), (1.5, 0.0, 0.0))
+    verdict = check(client, server, [[-1.5, 0.0, 0.0], [1.5, 0.0, 0.0]])
+    classes = np.array(verdict["traversability_classes"])
+    changes = np.flatnonzero(classes[1:] != classes[:-1]) + 1
+    assert len(changes) and len(plan.poses) == 2 + len(changes)
+    found = [pose.pose.position.x for pose in plan.poses[1:-1]]
+    np.testing.assert_allclose(found, -1.5 + 0.02 * changes, atol=1e-9)
+
+
+def test_a_terrain_file_is_loaded_by_its_url(server, client, tmp_path):
+    terrain, file = make_terrain(gap), tmp_path / "some terrain.npz"
+    save_terrain(file, terrain)
+    for url in (str(file), "file://localhost" + str(file).replace(" ", "%20")):
+        response = client.load_map(url)
+        assert response.result == response.RESULT_SUCCESS
+    assert response.map.header.frame_id == "map"
+    unknown = np.array(response.map.data).reshape(terrain.elevation.shape) == -1
+    np.testing.assert_array_equal(unknown, np.isnan(terrain.elevation))
+    np.testing.assert_array_equal(server.service.terrain.elevation, terrain.elevation)
+
+
 def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp(shared):
     plan, verdict, results = ask(shared.client)
     assert verdict["traversable"] == "true" and verdict["reason"] == ""
@@ -68,31 +128,6 @@ def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp
     assert last.sec + last.nanosec * 1e-9 == pytest.approx(float(verdict["time"]), abs=1e-6)
 
 
-def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(start_server, ros):
-    server = start_server(planner="fan")
-    server.service.take_terrain(make_terrain(waves))
-    asker = ros.spin(Node("asker", context=ros.context))
-    client = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
-    for end in ((1.0, 0.3, 0.0), GOAL):
-        request = GetPlan.Request(start=stamped_pose(START, "map"), goal=stamped_pose(end, "map"))
-        plan = call(client, request).plan
-    late = ros.spin(PlannerClient(ros)).heard
-
-    def heard_all() -> bool:
-        if not all(late.values()) or late["plan"][-1] != plan:
-            return False
-        last = {topic: messages[-1] for topic, messages in late.items()}
-        headers = [last[topic].header for topic in ("predicted_joints", "verdict")]
-        headers += [marker.header for marker in last["markers"].markers]
-        arrays = [array_values(last[topic]) for topic in (*WHEEL_TOPICS, "tip_over_margin")]
-        waypoints = int(verdict_of(last)["waypoints"])
-        return all(header == plan.header for header in headers) and all(
-            len(values) == waypoints for values in arrays
-        )
-
-    wait_until(heard_all, "all results of the last answer")
-
-
 def test_a_wall_is_refused_for_a_physical_reason(shared):
     shared.client.send_terrain(make_terrain(wall_at(0.5)))
     plan, verdict, results = ask(shared.client)
@@ -104,13 +139,6 @@ def test_a_wall_is_refused_for_a_physical_reason(shared):
     assert "failing_pose" in namespaces and "reason" in namespaces
 
 
-def test_a_map_published_before_the_server_came_is_heard(client, start_server):
-    publisher = client.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-    publisher.publish(terrain_to_point_cloud(make_terrain(waves), "map"))
-    server = start_server()
-    wait_until(lambda: server.service.terrain is not None, "the map")
-
-
 def test_a_map_from_a_volatile_publisher_is_heard(shared):
     publisher = shared.client.create_publisher(
         PointCloud2, "elevation_cloud", map_qos(DurabilityPolicy.VOLATILE)
@@ -118,10 +146,6 @@ def test_a_map_from_a_volatile_publisher_is_heard(shared):
     wait_until(lambda: publisher.get_subscription_count() > 0, "the subscription")
     publisher.publish(terrain_to_point_cloud(make_terrain(gap), "map"))
     shared.client.wait_for_log("map from elevation_cloud")
-
-
-def check(client, server, poses=AHEAD) -> dict:
-    return json.loads(client.check_poses(server, poses).message)
 
 
 def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):
@@ -163,18 +187,6 @@ def test_the_class_is_named_and_drawn_whichever_policy_is_assumed(shared):
     assert drawn == pytest.approx((LIME.r, LIME.g, LIME.b))
 
 
-def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
-    server = start_server(policy="optimal", plan_spacing=50.0, candidate_count=1)
-    client.send_terrain(make_terrain(lambda x, y: 0.45 * np.maximum(x - 0.13, 0.0)))
-    plan = client.can_traverse((-1.5, 0.0, 0.0), (1.5, 0.0, 0.0))
-    verdict = check(client, server, [[-1.5, 0.0, 0.0], [1.5, 0.0, 0.0]])
-    classes = np.array(verdict["traversability_classes"])
-    changes = np.flatnonzero(classes[1:] != classes[:-1]) + 1
-    assert len(changes) and len(plan.poses) == 2 + len(changes)
-    found = [pose.pose.position.x for pose in plan.poses[1:-1]]
-    np.testing.assert_allclose(found, -1.5 + 0.02 * changes, atol=1e-9)
-
-
 def test_soil_and_payload_of_the_server_count(shared):
     client = shared.client
 
@@ -205,15 +217,3 @@ def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, las
     assert answer.success and not verdict["suspension_agrees"]
     assert verdict["suspension_mismatch"]["rocker_left"] == pytest.approx(0.5, abs=0.05)
     assert results["verdict"].status[0].level == DiagnosticStatus.WARN
-
-
-def test_a_terrain_file_is_loaded_by_its_url(server, client, tmp_path):
-    terrain, file = make_terrain(gap), tmp_path / "some terrain.npz"
-    save_terrain(file, terrain)
-    for url in (str(file), "file://localhost" + str(file).replace(" ", "%20")):
-        response = client.load_map(url)
-        assert response.result == response.RESULT_SUCCESS
-    assert response.map.header.frame_id == "map"
-    unknown = np.array(response.map.data).reshape(terrain.elevation.shape) == -1
-    np.testing.assert_array_equal(unknown, np.isnan(terrain.elevation))
-    np.testing.assert_array_equal(server.service.terrain.elevation, terrain.elevation)
