@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from msg_adapters.errors import MessageError
-from msg_adapters.joint_map import OWN_NAMES, JointMap
+from msg_adapters.joints import OWN_NAMES, JointMap
 from rover_physics.names import WHEEL_JOINTS, WHEELS
 
 
@@ -49,12 +49,12 @@ def joint_order(joints: Sequence[str], names: JointMap = OWN_NAMES) -> NDArray[n
 
 def effort_commands(torques: NDArray[np.float64], order: NDArray[np.int64]) -> Float64MultiArray:
     """Convert torques (6,) [N m] in wheel order into efforts; `order` comes from `joint_order`."""
-    return Float64MultiArray(data=_doubles(torques[order]))
+    return Float64MultiArray(data=doubles(torques[order]))
 
 
 def wheel_values(values: NDArray[np.float64], rows: str = "") -> Float64MultiArray:
     """Convert values (6,), or (k, 6) with a label for rows, into an array with labelled dims."""
-    message = Float64MultiArray(data=_doubles(values))
+    message = Float64MultiArray(data=doubles(values))
     dims = [MultiArrayDimension(label="wheel", size=len(WHEELS), stride=len(WHEELS))]
     if rows:
         dims.insert(0, MultiArrayDimension(label=rows, size=len(values), stride=values.size))
@@ -64,10 +64,10 @@ def wheel_values(values: NDArray[np.float64], rows: str = "") -> Float64MultiArr
 
 def set_values(message: Float64MultiArray, values: NDArray[np.float64]) -> None:
     """Replace the values of a message by others of the same shape, faster than a new message."""
-    message.data = _doubles(values)
+    message.data = doubles(values)
 
 
-def _doubles(values: NDArray[np.float64]) -> array.array:
+def doubles(values: NDArray[np.float64]) -> array.array:
     """Copy values into the array type that message fields take without a check per element."""
     data = array.array("d")
     data.frombytes(np.asarray(values, dtype=np.float64).tobytes())

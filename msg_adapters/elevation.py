@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts elevation maps: PointCloud2 to Terrain and back, Terrain to OccupancyGrid.
+"""Converts elevation maps: PointCloud2 to Terrain and back.
 
 Points are read from the message without a copy. If they form a regular grid row by row, their
 heights become the terrain directly. Otherwise each point is assigned to the nearest cell centre.
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
@@ -63,14 +62,8 @@ class CloudPoints:
     """Rounding error of the x and y coordinates [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class PointMove:
-    """What moves points from the frame of a sensor to that of the map: R p + t."""
-
-    rotation: NDArray[np.float64]
-    """(3, 3) R."""
-    translation: NDArray[np.float64]
-    """(3,) t [m]."""
+PointMove = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""R (3, 3) and t (3,) [m]: a point p of a sensor's frame is at R p + t in that of the map."""
 
 
 def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoints:
@@ -87,7 +80,7 @@ def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoint
     xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
     precision = rounding_error(points["x"], points["y"])
     if move is not None:
-        xyz = xyz @ move.rotation.T + move.translation  # NaN where a coordinate is
+        xyz = xyz @ move[0].T + move[1]  # NaN where a coordinate is
         precision = rounding_error(points["x"], points["y"], points["z"])
     return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
 
@@ -246,25 +239,6 @@ def terrain_to_point_cloud(
     cloud.data = array.array("B")
     cloud.data.frombytes(values.tobytes())
     return cloud
-
-
-def terrain_to_occupancy_grid(terrain: Terrain, frame_id: str, stamp) -> OccupancyGrid:
-    """Convert a terrain into a grid of known (0) and unknown (-1) cells.
-
-    The origin is the corner of cell [0, 0], as nav_msgs/MapMetaData requires. It is half a cell
-    away from the terrain's own origin, which is the centre of that cell.
-    """
-    grid = OccupancyGrid()
-    grid.header.frame_id = frame_id
-    grid.header.stamp = stamp
-    grid.info.map_load_time = stamp
-    grid.info.resolution = float(terrain.resolution)
-    grid.info.height, grid.info.width = terrain.elevation.shape
-    grid.info.origin.position.x = terrain.origin[0] - terrain.resolution / 2.0
-    grid.info.origin.position.y = terrain.origin[1] - terrain.resolution / 2.0
-    grid.data = array.array("b")
-    grid.data.frombytes(np.where(np.isnan(terrain.elevation), -1, 0).astype(np.int8).tobytes())
-    return grid
 
 
 def _view_points(cloud: PointCloud2) -> NDArray[np.void]:

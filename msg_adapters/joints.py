@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads joint state messages: measured joint angles and rates by name; the steering's sign."""
+"""Reads joint states by name, with the robot's names, signs and offsets of the model's joints."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
 from msg_adapters.errors import MessageError
@@ -11,6 +14,8 @@ from rover_physics.names import STEERING_JOINTS
 from rover_physics.rover.steering_joints import STEERING_SIGNS
 
 _PLURALS = {"position": "positions", "velocity": "velocities"}
+FORM = "model_joint:robot_joint, model_joint:robot_joint:-1 or model_joint:robot_joint:-1:0.05"
+"""Form of an entry, for error texts."""
 
 
 def joint_positions(state: JointState, wanted: Collection[str]) -> dict[str, float]:
@@ -72,3 +77,139 @@ def _read_by_name(
             )
         found[name] = float(value)
     return found
+
+
+@dataclass(frozen=True)
+class JointLink:
+    """One joint of the model and its counterpart: angle = sign x angle in messages + offset."""
+
+    model: str
+    """Name of the joint in the model."""
+    robot: str
+    """Name of the joint in messages."""
+    sign: float = 1.0
+    """1, or -1 if positive angles of messages are negative ones of the model."""
+    offset: float = 0.0
+    """Angle of the model where the angle in messages is 0 [rad]."""
+
+
+class JointMap:
+    """Converts joint values of messages; joints that it does not name are the same in both."""
+
+    def __init__(self, links: Sequence[JointLink] = ()):
+        """Take the links.
+
+        Raises:
+            MessageError: A name occurs twice.
+        """
+        self._of_model = {link.model: link for link in links}
+        self._of_robot = {link.robot: link for link in links}
+        if not len(self._of_model) == len(self._of_robot) == len(links):
+            names = [name for link in links for name in {link.model, link.robot}]
+            twice = sorted({name for name in names if names.count(name) > 1})
+            raise MessageError(
+                f"joint_map names {', '.join(twice)} twice; each joint has one name"
+            )
+
+    def link(self, model: str) -> JointLink:
+        """Return the link of a joint of the model."""
+        return self._of_model.get(model) or JointLink(model, model)
+
+    def model_name(self, robot: str) -> str:
+        """Return the name in the model of a joint of messages; the model's own name stays."""
+        link = self._of_robot.get(robot)
+        return robot if link is None else link.model
+
+    def robot_names(self, names: Collection[str]) -> tuple[str, ...]:
+        """Return the names in messages of joints of the model."""
+        return tuple(self.link(name).robot for name in names)
+
+    def positions(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
+        """Return the angles [rad] of wanted joints of the model in a message, by name.
+
+        Raises:
+            MessageError: As `joint_positions`.
+        """
+        found = joint_positions(state, self.robot_names(wanted))
+        return {
+            link.model: link.sign * found[link.robot] + link.offset
+            for link in map(self.link, wanted)
+            if link.robot in found
+        }
+
+    def velocities(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
+        """Return the rates [rad/s] of wanted joints of the model in a message, by name.
+
+        Raises:
+            MessageError: As `joint_velocities`.
+        """
+        found = joint_velocities(state, self.robot_names(wanted))
+        return {
+            link.model: link.sign * found[link.robot]
+            for link in map(self.link, wanted)
+            if link.robot in found
+        }
+
+    def signs(self, names: Collection[str]) -> NDArray[np.float64]:
+        """Return the signs of joints of the model, which rates and efforts have too."""
+        return np.array([self.link(name).sign for name in names])
+
+    def offsets(self, names: Collection[str]) -> NDArray[np.float64]:
+        """Return the offsets of joints of the model [rad]."""
+        return np.array([self.link(name).offset for name in names])
+
+
+OWN_NAMES = JointMap()
+"""The map of a robot whose joints have the names, signs and zeros of the model."""
+
+
+def read_joint_map(entries: Sequence[str], known: Collection[str]) -> JointMap:
+    """Return the map of the parameter joint_map.
+
+    Args:
+        entries: One text for each joint, in a form of FORM.
+        known: Names of the joints of the model.
+
+    Raises:
+        MessageError: An entry has another form, a joint that is not known, or a name that another
+            joint has.
+    """
+    links = [_read_link(entry, known) for entry in entries]
+    joints = JointMap(links)
+    own = {name for name in known if name not in {link.model for link in links}}
+    for link in links:
+        if link.robot in own:
+            raise MessageError(
+                f"joint_map gives {link.model} the name {link.robot}, which is that of another "
+                f"joint; give {link.robot} a name too"
+            )
+    return joints
+
+
+def _read_link(entry: str, known: Collection[str]) -> JointLink:
+    parts = [part.strip() for part in entry.split(":")]
+    if not 2 <= len(parts) <= 4 or not all(parts):
+        raise MessageError(f"joint_map has {entry!r}; it must be {FORM}")
+    if parts[0] not in known:
+        raise MessageError(
+            f"joint_map has joint {parts[0]!r}, which the model does not have; its joints are "
+            f"{', '.join(known)}"
+        )
+    sign = _read_number(parts[2], entry) if len(parts) > 2 else 1.0
+    offset = _read_number(parts[3], entry) if len(parts) > 3 else 0.0
+    if abs(sign) != 1.0:
+        raise MessageError(f"joint_map has sign {parts[2]} in {entry!r}; it must be 1 or -1")
+    if not abs(offset) <= 2.0 * math.pi:
+        raise MessageError(
+            f"joint_map has offset {parts[3]} in {entry!r}; it must be an angle within 2 pi rad"
+        )
+    return JointLink(parts[0], parts[1], sign, offset)
+
+
+def _read_number(text: str, entry: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise MessageError(
+            f"joint_map has {text!r} in {entry!r}, which is no number; it must be {FORM}"
+        ) from None

@@ -4,21 +4,23 @@
 from functools import partial
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import OccupancyGrid, Odometry, Path
+import pytest
+from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan, LoadMap
-from rcl_interfaces.msg import Log, Parameter
+from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, PointCloud2
-from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
+from rover_physics.warm_up import warm_up
+from rover_planner.nodes.result_topics import RESULT_KINDS
+from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, result_qos, topic_qos
+from rover_planner.shell import kernels
 from support.ros_fixtures import RosRun, call
 from support.waiting import wait_until
 
@@ -26,19 +28,20 @@ SERVER = "/traverse_server"
 START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)
 """Default poses of a query: x, y [m] and yaw [rad]."""
 
-RESULTS = {
-    "plan": Path,
-    "predicted_joints": JointTrajectory,
-    "wheel_loads": Float64MultiArray,
-    "slip_ratios": Float64MultiArray,
-    "friction_utilisation": Float64MultiArray,
-    "torque_saturation": Float64MultiArray,
-    "tip_over_margin": Float64MultiArray,
-    "verdict": DiagnosticArray,
-    "closed_area": OccupancyGrid,
-    "markers": MarkerArray,
-}
-"""Topics of the server's results and their types."""
+
+def spin_server(ros: RosRun, **overrides) -> TraverseServer:
+    """Start a traverse server with parameters.
+
+    Questions have more time than by default, so that a busy machine makes no difference; kernels
+    that a test needs later are loaded when it does.
+    """
+    warm_up()
+    values = {"time_budget": 60.0} | overrides
+    parameters = [Parameter(name, value=value) for name, value in values.items()]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "LOADING_DELAY", 1e6)
+        server = TraverseServer(context=ros.context, parameter_overrides=parameters)
+    return ros.spin(server)
 
 
 class PlannerClient(Node):
@@ -46,10 +49,10 @@ class PlannerClient(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("test_planner", context=ros.context)
-        self.heard: dict[str, list] = {topic: [] for topic in RESULTS}
+        self.heard: dict[str, list] = {topic: [] for topic in RESULT_KINDS}
         self.logs: list[str] = []
-        self._answers, self._counts = 0, dict.fromkeys(RESULTS, 0)
-        for topic, kind in RESULTS.items():
+        self._answers, self._counts = 0, dict.fromkeys(RESULT_KINDS, 0)
+        for topic, kind in RESULT_KINDS.items():
             self.create_subscription(
                 kind, f"{SERVER}/{topic}", partial(self._hear, topic), result_qos()
             )
@@ -123,12 +126,8 @@ class PlannerClient(Node):
 
     def set_parameter(self, name: str, value) -> tuple[bool, str]:
         """Set a parameter; return whether it was accepted, and the reason if not."""
-        parameter = Parameter(name=name)
-        kind = {bool: 1, int: 2, float: 3, str: 4}[type(value)]
-        parameter.value.type = kind
-        field = ("bool_value", "integer_value", "double_value", "string_value")[kind - 1]
-        setattr(parameter.value, field, value)
-        result = call(self._parameters, SetParameters.Request(parameters=[parameter])).results[0]
+        parameters = [Parameter(name, value=value).to_parameter_msg()]
+        result = call(self._parameters, SetParameters.Request(parameters=parameters)).results[0]
         return result.successful, result.reason
 
     def next_results(self, ask) -> tuple:

@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from rover_planner.ros.guard import Guard, GuardedExecutor
+from rover_planner.ros.guard import GuardedExecutor
 from support.waiting import TIMEOUT, wait_until
 
 DOMAINS = 50
@@ -50,14 +50,10 @@ class RosRun:
         self._ending = threading.Event()
         self._spinning: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
 
-    def spin(self, node: Node, executor: SingleThreadedExecutor | None = None) -> Node:
+    def spin(self, node: Node) -> Node:
         """Spin a node of this context in the background from now on."""
-        if executor is None and isinstance(getattr(node, "guard", None), Guard):
-            executor = GuardedExecutor(context=self.context)
-            executor.add_guarded(node, node.guard)
-        else:
-            executor = executor or SingleThreadedExecutor(context=self.context)
-            executor.add_node(node)
+        executor = GuardedExecutor(context=self.context)
+        executor.add_node(node)
         thread = threading.Thread(target=self._spin, args=(executor,), daemon=True)
         thread.start()
         self._spinning.append((node, executor, thread))
@@ -71,7 +67,7 @@ class RosRun:
         """End all nodes and the context."""
         self._ending.set()
         for node, executor, thread in self._spinning:
-            executor.wake()
+            executor.create_task(lambda: None)  # what `wake` alone wakes goes on waiting
             thread.join(TIMEOUT)
             executor.shutdown()
             node.destroy_node()
@@ -81,7 +77,7 @@ class RosRun:
         # executor.spin() is not used: it sometimes misses executor.shutdown().
         with contextlib.suppress(ExternalShutdownException):
             while not self._ending.is_set():
-                executor.spin_once(timeout_sec=0.2)
+                executor.spin_once(timeout_sec=TIMEOUT)
 
 
 def run_in_executor(node: Node, function: Callable[[], Any]) -> Any:

@@ -4,6 +4,7 @@
 import contextlib
 import os
 import signal
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -78,19 +79,9 @@ def start_server(ros):
 
     Questions have more time than by default, so that a busy machine makes no difference.
     """
-    from rclpy.parameter import Parameter
+    from support.planner_client import spin_server
 
-    from rover_physics.warm_up import warm_up
-    from rover_planner.nodes.traverse_server import TraverseServer
-
-    warm_up()
-
-    def start(**overrides):
-        values = {"time_budget": 60.0} | overrides
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
-        return ros.spin(TraverseServer(context=ros.context, parameter_overrides=parameters))
-
-    return start
+    return partial(spin_server, ros)
 
 
 @pytest.fixture

@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from msg_adapters.commands import doubles
 from msg_adapters.errors import MessageError
-from msg_adapters.joint_map import OWN_NAMES, JointMap
+from msg_adapters.joints import OWN_NAMES, JointMap
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
@@ -40,7 +41,7 @@ def waypoint_array(values: ArrayLike, column_label: str = "wheel") -> Float64Mul
         MultiArrayDimension(label="waypoint", size=rows, stride=rows * columns),
         MultiArrayDimension(label=column_label, size=columns, stride=columns),
     ]
-    message.data = _doubles(values)
+    message.data = doubles(values)
     return message
 
 
@@ -163,14 +164,7 @@ def _rates(values: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[n
     return rates
 
 
-def _doubles(values: NDArray[np.float64]) -> array.array:
-    """Copy values into the array type that message fields take without a check per element."""
-    data = array.array("d")
-    data.frombytes(values.tobytes())
-    return data
-
-
 def _rows(values: NDArray[np.float64]) -> list[array.array]:
-    """Copy the rows of values (n, k) into arrays as `_doubles` does."""
-    flat, width = _doubles(values), values.shape[1]
+    """Copy the rows of values (n, k) into arrays as `doubles` does."""
+    flat, width = doubles(values), values.shape[1]
     return [flat[k : k + width] for k in range(0, len(flat), width)]

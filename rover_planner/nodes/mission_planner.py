@@ -36,10 +36,10 @@ from msg_adapters.results.predictions import array_values
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.nodes.mission.options import MissionOptions
-from rover_planner.nodes.programs import read_words
-from rover_planner.ros.disk import init_ros
+from rover_planner.nodes.programs import read_arguments
+from rover_planner.ros.guard import INPUT_ERRORS
+from rover_planner.ros.process import init_ros
 from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, service_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.shell.exit_codes import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
@@ -263,20 +263,20 @@ class MissionPlanner(Node):
                 self._changed.wait(0.1)
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the node and return its exit code; see `rover_planner.nodes.programs`."""
-    return run_program(NODE_NAME, lambda: _run(words))
+    return run_program(NODE_NAME, lambda: _run(argv))
 
 
-def _run(words: Sequence[str] | None) -> int:
+def _run(argv: Sequence[str] | None) -> int:
     try:
-        options = read_words(NODE_NAME, words)
+        options = read_arguments(NODE_NAME, argv)
         if options == EXIT_OK:  # help was printed
             return EXIT_OK
         terrain = load_terrain(options.map_name) if options.map_name else None
     except INPUT_ERRORS as error:
         return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
-    init_ros(words)
+    init_ros(argv)
     node = MissionPlanner(options.map_frame, options.timeout)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

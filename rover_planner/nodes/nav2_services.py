@@ -27,20 +27,11 @@ from rover_planner.planning.answering.situation import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.guard import INPUT_ERRORS
+from rover_planner.ros.optional_types import find_type
 
 Publish = Callable[[Judgement, IdentityReport], Any]
 ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
-
-
-def nav2_service() -> type | None:
-    """Return nav2_msgs/srv/IsPathValid; None where it is not installed."""
-    try:
-        from nav2_msgs.srv import IsPathValid
-    except ImportError:
-        return None
-    kind: type = IsPathValid
-    return kind
 
 
 class PathValidity:
@@ -66,7 +57,7 @@ class PathValidity:
 
     def serve(self, node: Node) -> None:
         """Create the service, where its type is installed."""
-        kind = nav2_service()
+        kind = find_type("nav2_msgs.srv:IsPathValid")
         if kind is not None:
             serve_later(node, kind, "~/is_path_valid", self.take)
 
@@ -102,16 +93,6 @@ class PathValidity:
         self._desk.ask(question, send)
 
 
-def nav2_action() -> type | None:
-    """Return nav2_msgs/action/ComputePathToPose; None where it is not installed."""
-    try:
-        from nav2_msgs.action import ComputePathToPose
-    except ImportError:
-        return None
-    kind: type = ComputePathToPose
-    return kind
-
-
 ERROR_CODES = {
     "": 0,
     "bad_request": 201,
@@ -145,7 +126,7 @@ class PathComputation:
     @staticmethod
     def serve(node: Node, desk: QuestionDesk, read: ReadQuestion, publish: Publish) -> None:
         """Create the action, where its type is installed."""
-        kind: Any = nav2_action()
+        kind: Any = find_type("nav2_msgs.action:ComputePathToPose")
         if kind is None:
             return
         from rclpy.action import ActionServer

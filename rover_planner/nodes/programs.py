@@ -104,12 +104,12 @@ PROGRAMS = {
 """The node programs by name."""
 
 
-def read_words(name: str, words: Sequence[str] | None) -> Any:
+def read_arguments(name: str, argv: Sequence[str] | None) -> Any:
     """Return the values of a node program's options; ROS arguments are checked and removed.
 
     Args:
         name: One of PROGRAMS.
-        words: Its arguments; None takes those of the process.
+        argv: Its arguments; None takes those of the process.
 
     Returns:
         What the program's `read` returns; 0, an exit code, after help was printed.
@@ -119,7 +119,7 @@ def read_words(name: str, words: Sequence[str] | None) -> Any:
     """
     from rclpy.utilities import remove_ros_args
 
-    given = sys.argv[1:] if words is None else list(words)
+    given = sys.argv[1:] if argv is None else list(argv)
     _refuse_old_remappings(given)
     try:
         own = remove_ros_args([name, *given])[1:]
@@ -128,9 +128,9 @@ def read_words(name: str, words: Sequence[str] | None) -> Any:
     return run_app(make_app(name), name, own)
 
 
-def _refuse_old_remappings(words: Sequence[str]) -> None:
+def _refuse_old_remappings(argv: Sequence[str]) -> None:
     """Refuse NAME:=VALUE without --ros-args, which ROS reads as a remapping, not a parameter."""
-    for word in itertools.takewhile(lambda word: word != "--ros-args", words):
+    for word in itertools.takewhile(lambda word: word != "--ros-args", argv):
         if ":=" in word:
             raise PlanningError(
                 f"{word} has no meaning without --ros-args: set a parameter by --ros-args -p "

@@ -17,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from msg_adapters.results.server_status import search_diagnostics
+from msg_adapters.results.diagnostics import search_diagnostics
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.identity import Register
@@ -32,11 +32,10 @@ from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.guard import Guard
+from rover_planner.ros.guard import Guard, refuse_error
 from rover_planner.ros.handover import Handover
 from rover_planner.ros.paced_sender import PacedSender
 from rover_planner.ros.qos import topic_qos
-from rover_planner.ros.refusals import refuse_error
 
 LEAVE_TIME = 0.1
 """Time in which the last answers leave before the node is destroyed [s]."""

@@ -6,13 +6,13 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
-from msg_adapters.results.verdicts import report_to_json
+from msg_adapters.results.diagnostics import to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.questions import Answer, ReachCheck
 from rover_planner.planning.answering.reach_query import ReachJudgement, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.requests import subscribe_to_requests
+from rover_planner.ros.subscriptions import subscribe_to_requests
 
 
 class ReachTopics:
@@ -20,7 +20,8 @@ class ReachTopics:
 
     def __init__(self, node: Node, desk: QuestionDesk, map_frame: str, reliability: str):
         self._node, self._desk, self._map_frame = node, desk, map_frame
-        self._query = ReachQuery()
+        self.query = ReachQuery()
+        """The query, with the last target and wrench."""
         for kind, name, take in (
             (PoseStamped, "~/tool_target", self._take_target),
             (WrenchStamped, "~/tool_wrench", self._take_wrench),
@@ -28,23 +29,18 @@ class ReachTopics:
             subscribe_to_requests(node, kind, name, take, reliability)
         serve_later(node, Trigger, "~/check_reach", self._check_reach)
 
-    @property
-    def query(self) -> ReachQuery:
-        """The query, with the last target and wrench."""
-        return self._query
-
     def _take_target(self, message: PoseStamped) -> None:
         try:
-            self._query.take_target(target_to_point(message, self._map_frame))
+            self.query.take_target(target_to_point(message, self._map_frame))
         except MessageError as error:
-            self._query.refuse_target(str(error))
+            self.query.refuse_target(str(error))
             self._node.get_logger().error(f"~/tool_target refused: {error}")
 
     def _take_wrench(self, message: WrenchStamped) -> None:
         try:
-            self._query.take_wrench(*wrench_to_force_and_moment(message, self._map_frame))
+            self.query.take_wrench(*wrench_to_force_and_moment(message, self._map_frame))
         except MessageError as error:
-            self._query.refuse_wrench(str(error))
+            self.query.refuse_wrench(str(error))
             self._node.get_logger().error(f"~/tool_wrench refused: {error}")
 
     def _check_reach(
@@ -52,11 +48,11 @@ class ReachTopics:
     ) -> None:
         def send(answer: Answer) -> None:
             response.success = answer.judgement.possible
-            response.message = report_to_json(answer.judgement)
+            response.message = to_json(answer.judgement.to_dict())
             reply(response)
             self._log(answer.judgement)
 
-        self._desk.ask(ReachCheck("check_reach", "", self._query.copy()), send)
+        self._desk.ask(ReachCheck("check_reach", "", self.query.copy()), send)
 
     def _log(self, answer: ReachJudgement) -> None:
         logger = self._node.get_logger()

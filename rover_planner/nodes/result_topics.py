@@ -17,9 +17,10 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.identity import path_hash
-from msg_adapters.joint_map import OWN_NAMES, JointMap
+from msg_adapters.joints import OWN_NAMES, JointMap
 from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
-from msg_adapters.results.closed_areas import area_to_grid, empty_area
+from msg_adapters.results.diagnostics import verdict_to_diagnostics
+from msg_adapters.results.grids import area_to_grid, empty_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import (
     MEASURES,
@@ -28,7 +29,6 @@ from msg_adapters.results.predictions import (
     tip_over_array,
     waypoint_array,
 )
-from msg_adapters.results.verdicts import verdict_to_diagnostics
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
@@ -36,7 +36,7 @@ from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_work import DeferredWork
-from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
+from rover_planner.ros.lazy_publisher import LazyPublisher
 
 WHEEL_TOPICS = {
     "wheel_loads": "wheel_loads",
@@ -220,13 +220,18 @@ class ResultMessages:
         )
 
     def _verdict(self) -> DiagnosticArray:
-        return verdict_to_diagnostics(self.report, self.rover.name, self.frame, self.stamp)
+        report = self.report
+        level = "warning" if report.has_warning else "ok"
+        return verdict_to_diagnostics(
+            level if report.traversable else "error", report.reason, report.summary(),
+            self.rover.name, self.frame, self.stamp,
+        )  # fmt: skip
 
     def _closed_area(self) -> OccupancyGrid:
         """Return the area that start or goal are closed in; without places if they are not."""
         way = self.judgement.way
         if way is None or way.closed is None:
-            return empty_area(self.frame, self.stamp)
+            return empty_grid(self.frame, self.stamp)
         cell, (column, row) = way.nodes.cell, way.nodes.first
         first = cell * column, cell * row
         return area_to_grid(way.closed.places, cell, first, self.frame, self.stamp)

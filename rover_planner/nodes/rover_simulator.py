@@ -10,15 +10,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import rclpy
-import rclpy.logging
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 
@@ -27,17 +23,13 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.joints import convert_steering
 from msg_adapters.paths import path_to_poses
+from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
-from rover_planner.nodes.programs import read_words
-from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
-from rover_planner.parameters.declare import declare_parameters
+from rover_planner.nodes.running import run_node
+from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.parameters.unknown import warn_of_unknown_parameters
-from rover_planner.ros.disk import init_ros, warn_of_disk
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 from rover_planner.worlds.summary import describe_terrain
@@ -60,13 +52,14 @@ class RoverSimulator(Node):
         self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
-        self._simulation = Simulation(self._settings)
+        self.simulation = Simulation(self._settings)
+        """The rover."""
         self._period = 1.0 / parameters.rate
         self._told = ""
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
-        self._state: PlantState = self._simulation.plant.state()
+        self._state: PlantState = self.simulation.plant.state()
         self.create_timer(self._period, self._advance)
         self.create_timer(1.0 / parameters.map_rate, self._publish_map)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
@@ -77,11 +70,6 @@ class RoverSimulator(Node):
             f"{', '.join(f'{value:.2f}' for value in self._settings.start)}, terrain "
             f"{parameters.terrain_file or 'made'}: {describe_terrain(self._settings.terrain)}"
         )
-
-    @property
-    def simulation(self) -> Simulation:
-        """The rover."""
-        return self._simulation
 
     def _create_publishers(self) -> None:
         qos = sensor_qos()
@@ -104,7 +92,7 @@ class RoverSimulator(Node):
 
     def _take_path(self, path: Path) -> None:
         try:
-            self._simulation.take_path(path_to_poses(path, self._frame))
+            self.simulation.take_path(path_to_poses(path, self._frame))
         except MessageError as error:
             self.get_logger().error(f"path refused: {error}")
 
@@ -112,7 +100,7 @@ class RoverSimulator(Node):
         if _stamp_of(twist) in self._own_stamps:
             return
         try:
-            self._simulation.take_speeds(*twist_to_speeds(twist), time.monotonic())
+            self.simulation.take_speeds(*twist_to_speeds(twist), time.monotonic())
         except MessageError as error:
             self.get_logger().error(f"cmd_vel refused: {error}", throttle_duration_sec=5.0)
 
@@ -126,10 +114,10 @@ class RoverSimulator(Node):
             return
         torques = np.empty(6)
         torques[self._order] = efforts
-        self._simulation.take_torques(torques, time.monotonic())
+        self.simulation.take_torques(torques, time.monotonic())
 
     def _advance(self) -> None:
-        self._state = state = self._simulation.advance(time.monotonic(), self._period)
+        self._state = state = self.simulation.advance(time.monotonic(), self._period)
         stamp = self.get_clock().now().to_msg()
         efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
         positions, velocities = (
@@ -147,8 +135,8 @@ class RoverSimulator(Node):
         self._imu.publish(
             imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
         )
-        if self._commands is not None and not self._simulation.has_speeds(time.monotonic()):
-            twist = _twist(self._simulation.steering, stamp)
+        if self._commands is not None and not self.simulation.has_speeds(time.monotonic()):
+            twist = _twist(self.simulation.steering, stamp)
             self._own_stamps.append(_stamp_of(twist))
             self._commands.publish(twist)
         if self._transforms is not None:
@@ -171,27 +159,23 @@ class RoverSimulator(Node):
         self._publish_diagnostics()
 
     def _publish_diagnostics(self) -> None:
-        state, speeds = self._state, self._simulation.steering
+        state, speeds = self._state, self.simulation.steering
         said = {
             "position": np.round(state.position, 3).tolist(),
             "wanted_speed": round(speeds[0], 4),
             "wanted_yaw_rate": round(speeds[1], 4),
-            "follows_path": self._simulation.follows_path,
+            "follows_path": self.simulation.follows_path,
         }
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.ERROR if state.stopped else DiagnosticStatus.OK,
-            name=f"{NODE_NAME}: rover",
-            message=state.stopped or "nothing stops the rover",
-            hardware_id=self._settings.rover.name,
-            values=[KeyValue(key=key, value=json.dumps(value)) for key, value in said.items()],
+        told = {key: json.dumps(value) for key, value in said.items()}
+        level, text = (
+            ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+        status = make_status(SIMULATOR, level, text, told, self._settings.rover.name)
+        self._diagnostics.publish(diagnostics([status], self.get_clock().now().to_msg()))
 
     def _publish_map(self) -> None:
         stamp = self.get_clock().now().to_msg()
-        self._cloud.publish(terrain_to_point_cloud(self._simulation.look(), self._frame, stamp))
+        self._cloud.publish(terrain_to_point_cloud(self.simulation.look(), self._frame, stamp))
 
 
 def _twist(speeds: tuple[float, float], stamp: Any) -> TwistStamped:
@@ -223,35 +207,14 @@ def _make_broadcaster(node: Node) -> Any:
     return None
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    node, stop = None, StopSignals()
-    try:
-        options = read_words(NODE_NAME, words)
-        if options == EXIT_OK:  # help was printed
-            return EXIT_OK
-        rclpy.logging.get_logger(NODE_NAME).info(
-            "compiling kernels; the first start takes longest"
-        )
-        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
+
+    def make(options: dict[str, Any]) -> RoverSimulator:
         overrides = [Parameter(name, value=value) for name, value in options.items()]
-        node = RoverSimulator(parameter_overrides=overrides)
-        executor = SingleThreadedExecutor()
-        stop.defer(executor.wake)
-        warn_of_disk(node.get_logger())
-        executor.add_node(node)
-        while not stop.wanted:
-            executor.spin_once(timeout_sec=LOOK_FOR_STOP)
-    except INPUT_ERRORS as error:
-        rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
-        return EXIT_BAD_INPUT
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_OK
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return EXIT_OK
+        return RoverSimulator(parameter_overrides=overrides)
+
+    return run_node(NODE_NAME, argv, make)
 
 
 if __name__ == "__main__":

@@ -1,43 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /traction_controller: commands wheel torques by a QP at a fixed rate."""
 
-import gc
 import sys
 import time
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import rclpy
-import rclpy.logging
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from msg_adapters.commands import joint_order
-from msg_adapters.results.traction_status import traction_diagnostics
+from msg_adapters.results.diagnostics import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
-from rover_planner.nodes.programs import read_words
-from rover_planner.nodes.stop_signals import StopSignals
+from rover_planner.nodes.navigation.frames import NodeFrames
+from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs
 from rover_planner.nodes.traction.maps import TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, update_traction
-from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.declare import (
+    declare_parameters,
+    follow_changes,
+    warn_of_unknown_parameters,
+)
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.parameters.unknown import warn_of_unknown_parameters
-from rover_planner.ros.disk import init_ros, warn_of_disk
-from rover_planner.ros.guard import Guard, GuardedExecutor
-from rover_planner.ros.logs.transition_log import TransitionLog
+from rover_planner.ros.guard import Guard
+from rover_planner.ros.logs import TransitionLog
+from rover_planner.ros.process import take_priority
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
-from rover_planner.ros.realtime import take_priority
-from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clock_watch import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
@@ -78,7 +73,8 @@ class TractionController(Node):
         load_kernels(TRACTION, (), self.get_logger().info)
         update_traction(self._accepted[1])  # so that the first update is as fast as others
         self._supervisor = TractionSupervisor(self._accepted[1], self._values.enabled_at_start)
-        self._statistics = TractionStatistics(1.0 / self._values.rate)
+        self.statistics = TractionStatistics(1.0 / self._values.rate)
+        """Update times, counts and the last update."""
         self._command: TractionCommand | None = None
         self._log = TransitionLog(self.get_logger())
         self._warning = ""
@@ -86,13 +82,17 @@ class TractionController(Node):
         self.guard = Guard(self.get_logger())
         """Counts unexpected errors."""
         self._clock_watch = ClockWatch(self._values.clock_timeout)
+        self.frames = NodeFrames(self, self._values)
+        """Knows where the frames of messages are on the map."""
         self._maps = TractionMaps(
             self,
             self._values,
             lambda: self.service.settings.rover,
-            lambda: self._inputs.frames,
+            self.frames,
         )
-        self._inputs = TractionInputs(self, self._values, self.service, self._maps, self.guard)
+        self._inputs = TractionInputs(
+            self, self._values, self.service, self._maps, self.frames, self.guard
+        )
         names = self._inputs.joint_names
         order = joint_order(self._values.joints, names)
         self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
@@ -110,11 +110,6 @@ class TractionController(Node):
     def service(self) -> TractionService:
         """The service that takes measurements and returns torques."""
         return self._supervisor.service
-
-    @property
-    def statistics(self) -> TractionStatistics:
-        """Update times, counts and the last update."""
-        return self._statistics
 
     @property
     def state(self) -> str:
@@ -172,7 +167,7 @@ class TractionController(Node):
         self._supervisor.configure(self._load(parameters))
         self._clock_watch.timeout = parameters.clock_timeout
         self._inputs.stamps.tolerance = parameters.stamp_tolerance
-        self._inputs.frames.apply_timeout(parameters.transform_timeout)
+        self.frames.apply_timeout(parameters.transform_timeout)
         self._values = parameters
         self._maps.apply(parameters)
 
@@ -213,7 +208,7 @@ class TractionController(Node):
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)
         self._topics.publish_forces(command.update)
-        self._statistics.take(command.update, start, time.perf_counter())
+        self.statistics.take(command.update, start, time.perf_counter())
         self._tell(command, now)
 
     def _write(self, command: TractionCommand) -> None:
@@ -273,7 +268,7 @@ class TractionController(Node):
         command = self._command
         if command is None:
             return
-        values = self._statistics.describe() | {
+        values = self.statistics.describe() | {
             "watchdog_trips": self._watchdog.trips,
             "internal_errors": self.guard.total,
             "brake": command.brake,
@@ -287,38 +282,15 @@ class TractionController(Node):
         )  # fmt: skip
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    stop = StopSignals()
-    node = None
-    try:
-        if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
-            return EXIT_OK
-        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
-        rclpy.logging.get_logger(NODE_NAME).info(
-            "compiling kernels; the first start takes longest"
-        )
-        executor = GuardedExecutor()
+
+    def make(_: Any) -> TractionController:
         node = TractionController()
-        stop.defer(executor.wake)
-        warn_of_disk(node.get_logger())
         node.take_priority()
-        executor.add_guarded(node, node.guard)
-        gc.collect()
-        gc.freeze()
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        while not stop.wanted:
-            executor.spin_once(timeout_sec=0.1)
-    except INPUT_ERRORS as error:
-        rclpy.logging.get_logger(NODE_NAME).fatal(str(error))
-        return EXIT_BAD_INPUT
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_OK
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return EXIT_OK
+        return node
+
+    return run_node(NODE_NAME, argv, make, SWITCH_INTERVAL)
 
 
 if __name__ == "__main__":

@@ -1,33 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /traverse_server: answers over ROS 2 whether the rover can traverse a path."""
 
-import gc
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import rclpy
-import rclpy.logging
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.joint_map import read_joint_map
+from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses, stamped_pose_to_array
-from msg_adapters.results.server_status import make_status, server_diagnostics
-from msg_adapters.results.verdicts import report_to_json
+from msg_adapters.results.diagnostics import (
+    HEALTH,
+    MONITOR,
+    diagnostics,
+    make_status,
+    to_json,
+)
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
@@ -35,19 +35,20 @@ from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_file_service import MapFileService
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
-from rover_planner.nodes.navigation.frames import is_empty
+from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
-from rover_planner.nodes.navigation.sensor_frames import SensorFrames
-from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
-from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
+from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, WAYS
-from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.declare import (
+    declare_parameters,
+    follow_changes,
+    warn_of_unknown_parameters,
+)
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
-from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import stamp_text
@@ -63,16 +64,15 @@ from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_planner import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
-from rover_planner.ros.disk import init_ros, warn_of_disk
-from rover_planner.ros.guard import Guard, GuardedExecutor
+from rover_planner.ros.frames import is_empty
+from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.qos import sensor_qos, topic_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.ros.requests import subscribe_to_requests
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.worlds.summary import describe_terrain
 
@@ -98,13 +98,13 @@ class TraverseServer(Node):
         behind = (*behind, *HAZARDS) if self._values.hazard_map else behind
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
         self._behind = load_kernels(EXACT, behind, self.get_logger().info)
-        warn_of_disk(self.get_logger())
-        self._service = TraverseService(load_service_settings(self._values))
+        self.service = TraverseService(load_service_settings(self._values))
+        """The service with the last map, path and joint angles."""
         self.guard = Guard(self.get_logger())
         """Takes unexpected errors."""
         frame, reliability = self._values.map_frame, self._values.input_reliability
-        self._joint_names = read_joint_map(self._values.joint_map, self._service.all_joint_names)
-        self.frames = SensorFrames(self, self._values)
+        self._joint_names = read_joint_map(self._values.joint_map, self.service.all_joint_names)
+        self.frames = NodeFrames(self, self._values, sensor_poses(self._values))
         """Transforms poses to the map frame."""
         self.frames.listen()
         self._results = ResultTopics(
@@ -117,12 +117,12 @@ class TraverseServer(Node):
         )
         self._maps = MapTopics(
             self,
-            self._service,
+            self.service,
             self._values,
-            lambda error: self._note_map(error),
-            self.frames.find_sensor,
+            lambda error: self.desk.health.take_map(error),
+            self.frames,
         )
-        self.desk = QuestionDesk(self, self._service, self._maps, self.guard)
+        self.desk = QuestionDesk(self, self.service, self._maps, self.guard)
         """Takes the questions of all services."""
         self.desk.set_limits(self._values.time_budget, self._values.max_waiting)
         self._create_subscriptions(reliability)
@@ -134,15 +134,16 @@ class TraverseServer(Node):
         self._files = MapFileService(
             self, self._maps, frame, self.guard, lambda: map_limits(self._values)
         )
-        self._reach = ReachTopics(self, self.desk, frame, reliability)
-        self._map_cloud = MapCloud(self, self._service, frame)
+        self.reach = ReachTopics(self, self.desk, frame, reliability)
+        """The topics and the service of the arm."""
+        self._map_cloud = MapCloud(self, self.service, frame)
         self._map_status = MapStatus()
         self.watch = PathWatch(
-            self, self._service, self._values, self.guard, self._find_watched, self._tell_stop
+            self, self.service, self._values, self.guard, self._find_watched, self._tell_stop
         )
         """Watches the accepted path."""
         self._hazards = HazardTopics(
-            self, self._service, self._values, self.guard, lambda: self.desk.open_count > 0
+            self, self.service, self._values, self.guard, lambda: self.desk.open_count > 0
         )
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -150,16 +151,6 @@ class TraverseServer(Node):
         follow_changes(self, lambda: self._values, load_service_settings, self._apply_parameters)
         warn_of_unknown_parameters(self, TraverseServerParameters)
         self._log_ready()
-
-    @property
-    def service(self) -> TraverseService:
-        """The service with the last map, path and joint angles."""
-        return self._service
-
-    @property
-    def reach(self) -> ReachTopics:
-        """The topics and the service of the arm."""
-        return self._reach
 
     def destroy_node(self) -> None:
         """Refuse open questions, end the threads and destroy the node."""
@@ -180,7 +171,7 @@ class TraverseServer(Node):
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability)
 
     def _log_ready(self) -> None:
-        name, known = self._service.settings.rover.name, self._service.known_map
+        name, known = self.service.settings.rover.name, self.service.known_map
         there = "no map yet"
         if known is not None:
             there = f"map {known.source}: {describe_terrain(known.terrain)}"
@@ -188,21 +179,16 @@ class TraverseServer(Node):
 
     def _apply_parameters(self, parameters: TraverseServerParameters) -> None:
         self._values = parameters
-        self._service.settings = load_service_settings(parameters)
+        self.service.settings = load_service_settings(parameters)
         self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
         self._maps.apply(parameters)
         self.watch.apply(parameters)
         self.frames.apply_timeout(parameters.transform_timeout)
         self._hazards.apply(parameters)
 
-    def _note_map(self, error: str) -> None:
-        self.desk.health.take_map(error)
-
     def _take_joints(self, state: JointState) -> None:
         try:
-            self._service.take_joints(
-                self._joint_names.positions(state, self._service.joint_names)
-            )
+            self.service.take_joints(self._joint_names.positions(state, self.service.joint_names))
         except MessageError as error:
             self.get_logger().warning(
                 f"{error}; the angles known before stay", throttle_duration_sec=5.0
@@ -214,7 +200,7 @@ class TraverseServer(Node):
             pose, _ = odometry_to_pose(here, self._values.map_frame)
             body = float(pose[2]), *odometry_to_tilt(here)
             self.frames.take_odometry(here)
-            self._service.take_pose(pose[[0, 1, 3]], body)
+            self.service.take_pose(pose[[0, 1, 3]], body)
             self._maps.look_under_rover()
         except INPUT_ERRORS as error:
             self.get_logger().warning(
@@ -225,9 +211,9 @@ class TraverseServer(Node):
         about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
         try:
             there = self.frames.localise_path(path)
-            self._service.take_path(path_to_poses(there, self._values.map_frame), *about)
+            self.service.take_path(path_to_poses(there, self._values.map_frame), *about)
         except INPUT_ERRORS as error:
-            self._service.refuse_path(str(error), *about)
+            self.service.refuse_path(str(error), *about)
             self.get_logger().error(f"~/path refused: {error}")
 
     def _can_traverse(
@@ -277,13 +263,13 @@ class TraverseServer(Node):
             here = self.frames.find_here()
         except INPUT_ERRORS:  # it is stale
             return None
-        return self._service.fresh_pose(MAX_POSE_AGE) if here is None else here
+        return self.service.fresh_pose(MAX_POSE_AGE) if here is None else here
 
     def _find_here(self) -> Pose:
         """Return the pose (3,) of the body by /tf, else by odometry."""
         here = self.frames.find_here()
         if here is None:
-            here = self._service.fresh_pose()
+            here = self.service.fresh_pose()
         if here is None:
             raise MessageError(
                 "start is empty, which means where the rover is, but neither /tf nor odometry of "
@@ -294,13 +280,13 @@ class TraverseServer(Node):
     def _check_path(
         self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
     ) -> None:
-        path = self._service.given_path
+        path = self.service.given_path
 
         def send(answer: Answer) -> None:
             about = replace(answer.identity, path_hash=path.hash, path_stamp=path.stamp)
             _, report = self.publish(answer.judgement, about)
             response.success = answer.judgement.traversable
-            response.message = report_to_json(report())
+            response.message = to_json(report().to_dict())
             reply(response)
 
         self.desk.ask(PathCheck("check_path", path.hash, path), send)
@@ -309,7 +295,7 @@ class TraverseServer(Node):
         self, judgement: Judgement, identity: IdentityReport
     ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; its results are published after the answer."""
-        rover, spacing = self._service.settings.rover, self._values.plan_spacing
+        rover, spacing = self.service.settings.rover, self._values.plan_spacing
         plan, report = self._results.take(judgement, identity, rover, spacing)
         if judgement.traversable and judgement.candidate is not None:
             poses = judgement.candidate.poses
@@ -336,7 +322,7 @@ class TraverseServer(Node):
         self._map_cloud.update()
         self._maps.retry()
         now = self.get_clock().now()
-        situation = self._service.situation(now.nanoseconds)
+        situation = self.service.situation(now.nanoseconds)
         missing = situation.refuse_map()
         counts = {
             **self._map_status.describe(situation),
@@ -351,51 +337,17 @@ class TraverseServer(Node):
             self.guard.recent(MEMORY),
             counts,
         )
-        name = self._service.settings.rover.name
-        watch = self.watch.describe()
-        message = server_diagnostics(
-            health.level, health.message, health.values, name, now.to_msg()
-        )
-        message.status.append(
-            make_status("traverse_server: monitor", watch.level, watch.message, watch.values, name)
-        )
-        self._diagnostics.publish(message)
+        name = self.service.settings.rover.name
+        statuses = [
+            make_status(status, one.level, one.message, one.values, name)
+            for status, one in ((HEALTH, health), (MONITOR, self.watch.describe()))
+        ]
+        self._diagnostics.publish(diagnostics(statuses, now.to_msg()))
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-    logger, stop = rclpy.logging.get_logger(NODE_NAME), StopSignals()
-    try:
-        if read_words(NODE_NAME, words) == EXIT_OK:  # help was printed
-            return EXIT_OK
-        logger.info("compiling kernels; the first start takes longest")
-        init_ros(words, signal_handler_options=SignalHandlerOptions.NO)
-        _run(stop)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return EXIT_OK
-    except INPUT_ERRORS as error:
-        logger.fatal(str(error))
-        return EXIT_BAD_INPUT
-    finally:
-        rclpy.try_shutdown()
-    return EXIT_OK
-
-
-def _run(stop: StopSignals) -> None:
-    """Make a node and spin it until it is to end; open questions are refused then."""
-    node, executor = None, GuardedExecutor()
-    try:
-        node = TraverseServer()
-        stop.defer(executor.wake)
-        executor.add_guarded(node, node.guard)
-        gc.collect()
-        gc.freeze()  # objects that live as long as the node are excluded from garbage collection
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        while not stop.wanted:
-            executor.spin_once(timeout_sec=LOOK_FOR_STOP)
-    finally:
-        if node is not None:
-            node.destroy_node()
+    return run_node(NODE_NAME, argv, lambda _: TraverseServer(), SWITCH_INTERVAL)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,70 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prints docs/parameters.md."""
+"""Prints docs/parameters.md, which is made of the tables."""
 
-from rover_planner.parameters.document import parameters_document
+from collections.abc import Iterator
+
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.table import ParameterSpec, ParameterTable, specs_of
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+
+TABLES: dict[str, type[ParameterTable]] = {
+    "/traverse_server": TraverseServerParameters,
+    "/traction_controller": TractionControllerParameters,
+    "/rover_simulator": RoverSimulatorParameters,
+}
+"""Tables of the nodes, by name and in the order of the document."""
+
+
+def parameters_document() -> str:
+    """Return the text of docs/parameters.md."""
+    return "\n".join(
+        [
+            "# Parameters",
+            "",
+            "Made from the tables in `rover_planner/parameters/` by",
+            "`python -m rover_planner.parameters > docs/parameters.md`; "
+            "a test holds them together.",
+            "",
+            *_sections(),
+            "The default shows the type; an empty one is a string. Parameters with \\* are set",
+            "at start (read-only), the others at any time "
+            "(`ros2 param set /traverse_server friction 0.6`).",
+            "A value of the wrong type, NaN, out of bounds or not among the choices "
+            "is refused with the reason.",
+            "",
+        ]
+    )
+
+
+def _sections() -> Iterator[str]:
+    """Yield the lines of a Markdown table per node; it only names rows of an earlier table."""
+    homes: dict[str, str] = {}
+    for node, table in TABLES.items():
+        rows = {spec.name: _row(spec) for spec in specs_of(table)}
+        yield from (f"## {node}", "")
+        yield from ("| name | default | allowed | meaning |", "|---|---|---|---|")
+        yield from (row for row in rows.values() if row not in homes)
+        yield ""
+        for home in dict.fromkeys(homes.values()):
+            same = [f"`{name}`" for name, row in rows.items() if homes.get(row) == home]
+            if same:
+                yield from (f"As for `{home}`: {', '.join(same)}.", "")
+        homes |= {row: node for row in rows.values() if row not in homes}
+
+
+def _row(spec: ParameterSpec) -> str:
+    default = f"`{spec.ros_default}`" if spec.default != "" else "empty"
+    name = f"`{spec.name}`" + ("\\*" if spec.read_only else "")
+    return f"| {name} | {default} | {_allowed(spec)} | {spec.meaning} |"
+
+
+def _allowed(spec: ParameterSpec) -> str:
+    """Return the bounds with their unit, or the choices, as text."""
+    if spec.bounds is not None:
+        return f"{spec.bounds[0]:g} to {spec.bounds[1]:g} {spec.unit}".rstrip()
+    return ", ".join(f"`{choice}`" for choice in spec.choices)
+
 
 if __name__ == "__main__":
     print(parameters_document(), end="")

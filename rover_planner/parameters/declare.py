@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Declares a node's parameters from their table, checks changes and passes them to the node."""
 
+import difflib
 import traceback
 from array import array
 from collections.abc import Callable, Iterable
@@ -27,6 +28,9 @@ from rover_planner.parameters.table import (
     specs_of,
 )
 from rover_planner.shell.one_line import one_line
+
+ROS_OWN = ("qos_overrides.",)
+"""Begins of names of parameters that ROS declares by itself."""
 
 Table = TypeVar("Table", bound=ParameterTable)
 
@@ -97,6 +101,27 @@ def follow_changes(
 
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(pass_on)
+
+
+def warn_of_unknown_parameters(node: Node, table: type[ParameterTable]) -> None:
+    """Log a warning for each parameter that was set at start and is not declared.
+
+    Args:
+        node: The node; all its parameters are declared.
+        table: Its table of parameters.
+    """
+    names = [spec.name for spec in specs_of(table)]
+    given = node._parameter_overrides  # rclpy has no public access to them
+    for name in sorted(given):
+        if not node.has_parameter(name) and not name.startswith(ROS_OWN):
+            node.get_logger().warning(_describe_unknown(name, names))
+
+
+def _describe_unknown(name: str, names: list[str]) -> str:
+    """Return a warning that a parameter does not exist, with the nearest existing name."""
+    nearest = difflib.get_close_matches(name, names, n=1)
+    hint = f"the nearest is {nearest[0]}" if nearest else "--help lists those there are"
+    return f"parameter {name} does not exist and is ignored; {hint}"
 
 
 def _refuse_empty_list(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 
 from rover_physics.names import CONTROL_POLICIES, EQUAL, WHEEL_JOINTS
-from rover_planner.parameters.shared import max_map_cells_parameter, steering_sign_parameter
+from rover_planner.parameters.shared import STEERING_SIGN, max_map_cells_parameter
 from rover_planner.parameters.table import ParameterTable, parameter
 
 ALL_AROUND = 6.28
@@ -126,5 +126,5 @@ class RoverSimulatorParameters(ParameterTable):
     seed: int = parameter(
         1, "Seed of noise and of a generated terrain.", bounds=(0, 2**31 - 1), read_only=True
     )
-    steering_sign: str = steering_sign_parameter()
+    steering_sign: str = STEERING_SIGN
     map_frame: str = parameter("map", "Frame of map, path and odometry.", read_only=True)

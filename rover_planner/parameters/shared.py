@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that several nodes share."""
+"""Parameters that several nodes share: values, and fields of their tables in capitals."""
 
 from msg_adapters.gridding import CELL_HEIGHTS
 from rover_physics.names import SUSPENSION_JOINTS
@@ -20,67 +20,45 @@ RELIABILITIES = (RELIABLE, BEST_EFFORT)
 """Values of the parameter input_reliability."""
 
 
-def max_torque_parameter() -> float:
-    """Return the field of the parameter max_torque [N m]."""
-    return parameter(
-        0.0,
-        "Largest torque of a wheel; 0 uses that of the rover file.",
-        unit="N m",
-        bounds=(0.0, 1e6),
-    )
-
-
-def steering_sign_parameter() -> str:
-    """Return the field of the parameter steering_sign."""
-    return parameter(
-        LEFT,
-        "Side to which positive angles of steering joints turn in messages; left as in REP-103.",
-        choices=tuple(STEERING_SIGNS),
-        read_only=True,
-    )
-
-
-def base_offset_parameter() -> tuple[float, ...]:
-    """Return the field of the parameter base_offset [m, rad]."""
-    return parameter(
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        "Pose of the model's body in the robot's frame: x, y, z in m, roll, pitch, yaw in rad; "
-        "starts, goals, paths, plans and odometry are of the robot's frame.",
-        bounds=(-100.0, 100.0),
-        read_only=True,
-    )
-
-
-def joint_map_parameter() -> tuple[str, ...]:
-    """Return the field of the parameter joint_map."""
-    return parameter(
-        tuple(f"{name}:{name}" for name in SUSPENSION_JOINTS),
-        "Names of the robot's joints: model_joint:robot_joint, then :-1 if it turns the other "
-        "way, then :offset, the model's angle in rad where the robot's is 0. Others have the "
-        "model's name.",
-        read_only=True,
-    )
-
-
-def steering_limit_parameter() -> float:
-    """Return the field of the parameter steering_limit [rad]."""
-    return parameter(
-        0.0,
-        "Largest angle that the steering joints reach; 0 takes that of the rover file. A rover "
-        "file that asks for more is refused.",
-        unit="rad",
-        bounds=(0.0, 3.2),
-    )
-
-
-def payload_parameter() -> float:
-    """Return the field of the parameter payload [kg]; `payload_or_none` reads its value."""
-    return parameter(
-        OWN_PAYLOAD,
-        "Mass at the tip of the manipulator; -1 uses that of the rover file.",
-        unit="kg",
-        bounds=(OWN_PAYLOAD, 1e6),
-    )
+MAX_TORQUE: float = parameter(
+    0.0,
+    "Largest torque of a wheel; 0 uses that of the rover file.",
+    unit="N m",
+    bounds=(0.0, 1e6),
+)
+STEERING_SIGN: str = parameter(
+    LEFT,
+    "Side to which positive angles of steering joints turn in messages; left as in REP-103.",
+    choices=tuple(STEERING_SIGNS),
+    read_only=True,
+)
+BASE_OFFSET: tuple[float, ...] = parameter(
+    (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    "Pose of the model's body in the robot's frame: x, y, z in m, roll, pitch, yaw in rad; "
+    "starts, goals, paths, plans and odometry are of the robot's frame.",
+    bounds=(-100.0, 100.0),
+    read_only=True,
+)
+JOINT_MAP: tuple[str, ...] = parameter(
+    tuple(f"{name}:{name}" for name in SUSPENSION_JOINTS),
+    "Names of the robot's joints: model_joint:robot_joint, then :-1 if it turns the other "
+    "way, then :offset, the model's angle in rad where the robot's is 0. Others have the "
+    "model's name.",
+    read_only=True,
+)
+STEERING_LIMIT: float = parameter(
+    0.0,
+    "Largest angle that the steering joints reach; 0 takes that of the rover file. A rover "
+    "file that asks for more is refused.",
+    unit="rad",
+    bounds=(0.0, 3.2),
+)
+PAYLOAD: float = parameter(
+    OWN_PAYLOAD,
+    "Mass at the tip of the manipulator; -1 uses that of the rover file.",
+    unit="kg",
+    bounds=(OWN_PAYLOAD, 1e6),
+)
 
 
 def payload_or_none(payload: float) -> float | None:
@@ -99,23 +77,17 @@ def payload_or_none(payload: float) -> float | None:
     return payload
 
 
-def map_resolution_parameter() -> float:
-    """Return the field of the parameter map_resolution [m]."""
-    return parameter(
-        0.0,
-        "Cell size for clouds; 0 uses the spacing of their points, which must be a regular grid.",
-        unit="m",
-        bounds=(0.0, 10.0),
-    )
-
-
-def cell_height_parameter() -> str:
-    """Return the field of the parameter cell_height."""
-    return parameter(
-        CELL_HEIGHTS[0],
-        "Height of a cell with several points; max keeps obstacles, median ignores stray points.",
-        choices=CELL_HEIGHTS,
-    )
+MAP_RESOLUTION: float = parameter(
+    0.0,
+    "Cell size for clouds; 0 uses the spacing of their points, which must be a regular grid.",
+    unit="m",
+    bounds=(0.0, 10.0),
+)
+CELL_HEIGHT: str = parameter(
+    CELL_HEIGHTS[0],
+    "Height of a cell with several points; max keeps obstacles, median ignores stray points.",
+    choices=CELL_HEIGHTS,
+)
 
 
 def max_map_cells_parameter(read_only: bool = False) -> int:
@@ -129,42 +101,28 @@ def max_map_cells_parameter(read_only: bool = False) -> int:
     )
 
 
-def imu_frame_parameter() -> str:
-    """Return the field of the parameter imu_frame."""
-    return parameter(
-        "",
-        "Frame of the IMU; empty is that of the body. Another frame_id is refused.",
-        read_only=True,
-    )
-
-
-def imu_mounting_parameter() -> tuple[float, ...]:
-    """Return the field of the parameter imu_mounting [rad]."""
-    return parameter(
-        (0.0, 0.0, 0.0),
-        "Roll, pitch and yaw of the IMU's axes in the body frame.",
-        unit="rad",
-        bounds=(-6.3, 6.3),
-        read_only=True,
-    )
-
-
-def map_durability_parameter() -> str:
-    """Return the field of the parameter map_durability."""
-    return parameter(
-        EITHER,
-        "Durability of the map publishers to subscribe to.",
-        choices=MAP_DURABILITIES,
-        read_only=True,
-    )
-
-
-def input_reliability_parameter() -> str:
-    """Return the field of the parameter input_reliability."""
-    return parameter(
-        RELIABLE,
-        "Reliability of the subscriptions to maps, paths and tool targets; best_effort also "
-        "hears best-effort publishers, and may lose messages.",
-        choices=RELIABILITIES,
-        read_only=True,
-    )
+IMU_FRAME: str = parameter(
+    "",
+    "Frame of the IMU; empty is that of the body. Another frame_id is refused.",
+    read_only=True,
+)
+IMU_MOUNTING: tuple[float, ...] = parameter(
+    (0.0, 0.0, 0.0),
+    "Roll, pitch and yaw of the IMU's axes in the body frame.",
+    unit="rad",
+    bounds=(-6.3, 6.3),
+    read_only=True,
+)
+MAP_DURABILITY: str = parameter(
+    EITHER,
+    "Durability of the map publishers to subscribe to.",
+    choices=MAP_DURABILITIES,
+    read_only=True,
+)
+INPUT_RELIABILITY: str = parameter(
+    RELIABLE,
+    "Reliability of the subscriptions to maps, paths and tool targets; best_effort also "
+    "hears best-effort publishers, and may lose messages.",
+    choices=RELIABILITIES,
+    read_only=True,
+)

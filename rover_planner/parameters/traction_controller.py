@@ -5,18 +5,18 @@ from dataclasses import dataclass
 
 from rover_physics.names import CONTROL_POLICIES, OPTIMAL, WHEEL_JOINTS
 from rover_planner.parameters.shared import (
-    base_offset_parameter,
-    cell_height_parameter,
-    imu_frame_parameter,
-    imu_mounting_parameter,
-    input_reliability_parameter,
-    joint_map_parameter,
-    map_durability_parameter,
-    map_resolution_parameter,
-    max_torque_parameter,
-    payload_parameter,
-    steering_limit_parameter,
-    steering_sign_parameter,
+    BASE_OFFSET,
+    CELL_HEIGHT,
+    IMU_FRAME,
+    IMU_MOUNTING,
+    INPUT_RELIABILITY,
+    JOINT_MAP,
+    MAP_DURABILITY,
+    MAP_RESOLUTION,
+    MAX_TORQUE,
+    PAYLOAD,
+    STEERING_LIMIT,
+    STEERING_SIGN,
 )
 from rover_planner.parameters.table import ParameterTable, parameter
 
@@ -98,8 +98,8 @@ class TractionControllerParameters(ParameterTable):
     friction: float = parameter(
         0.0, "Assumed Coulomb friction; 0 uses that of the rover file.", bounds=(0.0, 10.0)
     )
-    max_torque: float = max_torque_parameter()
-    payload: float = payload_parameter()
+    max_torque: float = MAX_TORQUE
+    payload: float = PAYLOAD
     policy: str = parameter(
         OPTIMAL,
         "How the wheels share the traction: smallest peak friction utilisation, or equal torques.",
@@ -127,9 +127,9 @@ class TractionControllerParameters(ParameterTable):
         unit="s/m",
         bounds=(0.0, 1e3),
     )
-    steering_limit: float = steering_limit_parameter()
-    steering_sign: str = steering_sign_parameter()
-    joint_map: tuple[str, ...] = joint_map_parameter()
+    steering_limit: float = STEERING_LIMIT
+    steering_sign: str = STEERING_SIGN
+    joint_map: tuple[str, ...] = JOINT_MAP
     map_frame: str = parameter(
         "map",
         "Frame of the map; odometry in another frame needs a transform of /tf.",
@@ -140,18 +140,18 @@ class TractionControllerParameters(ParameterTable):
         "Frame of the body; odometry of another child frame is refused.",
         read_only=True,
     )
-    base_offset: tuple[float, ...] = base_offset_parameter()
+    base_offset: tuple[float, ...] = BASE_OFFSET
     transform_timeout: float = parameter(
         0.5, "Age from which a transform of /tf is refused.", unit="s", bounds=(0.01, 60.0)
     )
-    imu_frame: str = imu_frame_parameter()
-    imu_mounting: tuple[float, ...] = imu_mounting_parameter()
+    imu_frame: str = IMU_FRAME
+    imu_mounting: tuple[float, ...] = IMU_MOUNTING
     cmd_vel_stamped: bool = parameter(
         True,
         "Whether cmd_vel is a geometry_msgs/TwistStamped; false for a geometry_msgs/Twist.",
         read_only=True,
     )
-    map_resolution: float = map_resolution_parameter()
-    cell_height: str = cell_height_parameter()
-    map_durability: str = map_durability_parameter()
-    input_reliability: str = input_reliability_parameter()
+    map_resolution: float = MAP_RESOLUTION
+    cell_height: str = CELL_HEIGHT
+    map_durability: str = MAP_DURABILITY
+    input_reliability: str = INPUT_RELIABILITY

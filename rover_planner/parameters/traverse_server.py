@@ -6,20 +6,20 @@ from dataclasses import dataclass
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_planner.parameters.shared import (
+    BASE_OFFSET,
+    CELL_HEIGHT,
     CONTROL_MARGIN,
-    base_offset_parameter,
-    cell_height_parameter,
-    imu_frame_parameter,
-    imu_mounting_parameter,
-    input_reliability_parameter,
-    joint_map_parameter,
-    map_durability_parameter,
-    map_resolution_parameter,
+    IMU_FRAME,
+    IMU_MOUNTING,
+    INPUT_RELIABILITY,
+    JOINT_MAP,
+    MAP_DURABILITY,
+    MAP_RESOLUTION,
+    MAX_TORQUE,
+    PAYLOAD,
+    STEERING_LIMIT,
+    STEERING_SIGN,
     max_map_cells_parameter,
-    max_torque_parameter,
-    payload_parameter,
-    steering_limit_parameter,
-    steering_sign_parameter,
 )
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 from rover_planner.worlds.maps.blind_ground import ALLOW, BLIND_GROUND
@@ -47,12 +47,12 @@ class TraverseServerParameters(ParameterTable):
         "Coulomb friction where the map has none; 0 uses that of the rover file.",
         bounds=(0.0, 10.0),
     )
-    max_torque: float = max_torque_parameter()
+    max_torque: float = MAX_TORQUE
     soil: str = parameter(
         "",
         "Soil of config/soils.yaml where the map names none; empty is Coulomb friction.",
     )
-    payload: float = payload_parameter()
+    payload: float = PAYLOAD
     policy: str = parameter(
         EQUAL,
         "How the wheels share the traction: equal torques, speed servos (servo), or optimal with "
@@ -103,9 +103,9 @@ class TraverseServerParameters(ParameterTable):
         unit="m",
         bounds=(0.0, 100.0),
     )
-    steering_limit: float = steering_limit_parameter()
-    steering_sign: str = steering_sign_parameter()
-    joint_map: tuple[str, ...] = joint_map_parameter()
+    steering_limit: float = STEERING_LIMIT
+    steering_sign: str = STEERING_SIGN
+    joint_map: tuple[str, ...] = JOINT_MAP
     map_frame: str = parameter(
         "map",
         "Frame of the map; requests in another frame need a transform of /tf.",
@@ -114,7 +114,7 @@ class TraverseServerParameters(ParameterTable):
     base_frame: str = parameter(
         "base_link", "Frame of the robot on /tf, where tf2_msgs is installed.", read_only=True
     )
-    base_offset: tuple[float, ...] = base_offset_parameter()
+    base_offset: tuple[float, ...] = BASE_OFFSET
     transform_timeout: float = parameter(
         0.5,
         "Age from which a transform of /tf is refused, and odometry for clouds of a sensor.",
@@ -127,10 +127,10 @@ class TraverseServerParameters(ParameterTable):
         "m and rad. Other frames are looked up on /tf.",
         read_only=True,
     )
-    map_resolution: float = map_resolution_parameter()
-    cell_height: str = cell_height_parameter()
-    map_durability: str = map_durability_parameter()
-    input_reliability: str = input_reliability_parameter()
+    map_resolution: float = MAP_RESOLUTION
+    cell_height: str = CELL_HEIGHT
+    map_durability: str = MAP_DURABILITY
+    input_reliability: str = INPUT_RELIABILITY
     elevation_layer: str = parameter(
         "elevation", "Layer of heights in a GridMap on elevation_map.", read_only=True
     )
@@ -195,8 +195,8 @@ class TraverseServerParameters(ParameterTable):
         "Whether roll and pitch of the standing rover are those of imu instead of odometry.",
         read_only=True,
     )
-    imu_frame: str = imu_frame_parameter()
-    imu_mounting: tuple[float, ...] = imu_mounting_parameter()
+    imu_frame: str = IMU_FRAME
+    imu_mounting: tuple[float, ...] = IMU_MOUNTING
     blind_ground: str = parameter(
         ALLOW,
         "Whether the belly may pass over ground that was never seen: allow, over filled ground "

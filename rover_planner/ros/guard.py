@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps a node alive: an unexpected error is logged once with its trace, and counted."""
+"""Keeps a node alive: errors are refusals with a reason; an unexpected one is logged once."""
 
 import functools
 import math
@@ -7,10 +7,19 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+
+from msg_adapters.errors import MessageError
+from rover_physics.errors import RoverError
+from rover_planner.errors import PlanningError
+
+INPUT_ERRORS = (MessageError, PlanningError, RoverError)
+"""Errors of the input; any other error is an internal error."""
+
+Answer = TypeVar("Answer")
 
 
 class Guard:
@@ -52,21 +61,31 @@ class Guard:
             self.report(getattr(function, "__name__", "a callback"), error)
 
 
+def refuse_error(
+    guard: Guard, request: str, error: Exception, refuse: Callable[[str, str], Answer]
+) -> Answer:
+    """Return `refuse(code, reason)` for an error; the guard counts and logs internal errors."""
+    if isinstance(error, INPUT_ERRORS):
+        return refuse("bad_request", str(error))
+    text = guard.report(request, error)
+    return refuse("internal_error", f"internal error: {text}")
+
+
 class GuardedExecutor(SingleThreadedExecutor):
     """An executor of one node that outlives errors in callbacks and in the reading of messages.
 
-    In rclpy such an error ends `spin`. After an error in the reading of a message, the node's
-    callback group stays blocked for ever.
+    They go to the node's `guard`. In rclpy, and for a node without one, such an error ends `spin`,
+    and after one in the reading of a message the node's callback group stays blocked for ever.
     """
 
     def __init__(self, **executor_arguments: Any):
         super().__init__(**executor_arguments)
         self._guard_of_node: Guard | None = None
 
-    def add_guarded(self, node: Node, guard: Guard) -> None:
-        """Add the node; errors of its callbacks go to the guard."""
-        self._guard_of_node = guard
-        self.add_node(node)
+    def add_node(self, node: Node) -> bool:
+        """Add the node; errors of its callbacks go to its guard, if it has one."""
+        self._guard_of_node = getattr(node, "guard", None)
+        return bool(super().add_node(node))
 
     def _make_handler(self, entity, node, take_from_wait_list):
         """Return a handler of an entity's work, as rclpy does, that raises no error."""

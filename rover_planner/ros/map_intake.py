@@ -13,7 +13,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.errors import MessageError
-from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.guard import INPUT_ERRORS
 
 WAIT = 0.02
 """Time between two checks of who waits for a map [s]."""

@@ -1,13 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Quality-of-service profiles of all topics, by purpose."""
 
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    QoSPolicyKind,
-    QoSProfile,
-    ReliabilityPolicy,
-)
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 
 from rover_planner.parameters.shared import (
     BEST_EFFORT,
@@ -17,24 +11,27 @@ from rover_planner.parameters.shared import (
     VOLATILE,
 )
 
-RELIABILITY, DURABILITY = QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY
+HEAR_BEST_EFFORT = {
+    QoSPolicyKind.RELIABILITY: f"set input_reliability to {BEST_EFFORT}, or publish it reliably"
+}
+"""What to do about best-effort publishers of what is subscribed to reliably."""
+HEAR_VOLATILE = {QoSPolicyKind.DURABILITY: f"set map_durability to {EITHER} or {VOLATILE}"}
+"""What to do about volatile publishers of what is subscribed to as transient local."""
 
 
 def topic_qos() -> QoSProfile:
     """Return the profile of ordinary topics: reliable, depth 10."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.RELIABLE
-    )
+    return QoSProfile(depth=10)
 
 
 def result_qos() -> QoSProfile:
     """Return the profile of results: reliable and transient local, for late subscribers."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=10,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    )
+    return QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def map_qos(durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> QoSProfile:
+    """Return the profile of maps: reliable, depth 1."""
+    return QoSProfile(depth=1, durability=durability)
 
 
 def latched_qos() -> QoSProfile:
@@ -44,18 +41,12 @@ def latched_qos() -> QoSProfile:
 
 def sensor_qos() -> QoSProfile:
     """Return the profile of sensor data: best effort, which matches every publisher."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
-    )
+    return QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def input_qos(reliability: str) -> QoSProfile:
-    """Return the profile of subscriptions to requests, such as paths: depth 10.
-
-    Args:
-        reliability: One of `RELIABILITIES`.
-    """
-    return replace_reliability(topic_qos(), reliability)
+def service_qos() -> QoSProfile:
+    """Return the profile of services that many clients may call at once."""
+    return QoSProfile(depth=100)
 
 
 def replace_reliability(profile: QoSProfile, reliability: str) -> QoSProfile:
@@ -65,21 +56,6 @@ def replace_reliability(profile: QoSProfile, reliability: str) -> QoSProfile:
         ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
     )
     return profile
-
-
-def map_qos(durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> QoSProfile:
-    """Return the profile of maps: reliable, depth 1."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=1,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=durability,
-    )
-
-
-def map_subscriptions_qos(durability: str) -> list[QoSProfile]:
-    """Return the profiles of `map_subscriptions` alone, reliable."""
-    return [profile for profile, _ in map_subscriptions(durability)]
 
 
 def map_subscriptions(
@@ -96,24 +72,18 @@ def map_subscriptions(
         reliability: One of `RELIABILITIES`.
 
     Returns:
-        Per subscription its profile, and what to do about publishers that it does not match, for
-        `warn_of_mismatch`.
+        Per subscription its profile, and what to do about publishers that it does not match.
     """
-    transient_local = map_qos(DurabilityPolicy.TRANSIENT_LOCAL)
-    volatile = map_qos(DurabilityPolicy.VOLATILE)
-    hear = {RELIABILITY: f"set input_reliability to {BEST_EFFORT}, or publish it reliably"}
-    late = {DURABILITY: f"set map_durability to {EITHER} or {VOLATILE}"}
+    transient_local, volatile = map_qos(), map_qos(DurabilityPolicy.VOLATILE)
     chosen = {
         # With both kinds, only the volatile one tells: it misses what neither hears.
-        EITHER: [(transient_local, {}), (volatile, hear)],
-        TRANSIENT_LOCAL: [(transient_local, {**hear, **late})],
-        VOLATILE: [(volatile, hear)],
+        EITHER: [(transient_local, {}), (volatile, HEAR_BEST_EFFORT)],
+        TRANSIENT_LOCAL: [(transient_local, HEAR_BEST_EFFORT | HEAR_VOLATILE)],
+        VOLATILE: [(volatile, HEAR_BEST_EFFORT)],
     }[durability]
     return [(replace_reliability(profile, reliability), mends) for profile, mends in chosen]
 
 
-def service_qos() -> QoSProfile:
-    """Return the profile of services that many clients may call at once."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.RELIABLE
-    )
+def map_subscriptions_qos(durability: str) -> list[QoSProfile]:
+    """Return the profiles of `map_subscriptions` alone, reliable."""
+    return [profile for profile, _ in map_subscriptions(durability)]

@@ -26,7 +26,9 @@ def transform_message(parent: str, child: str, rigid: Rigid, stamp: Time) -> Tra
     return message
 
 
-def send_transforms(node: Node, take: Callable[[Any], object], *edges: Edge, age: float) -> None:
+def send_transforms(
+    node: Node, take: Callable[[Any], object], *edges: Edge, age: float = 0.0
+) -> None:
     """Give the callback of a node transforms of an age [s] as a TFMessage.
 
     tf2_msgs is not on PyPI.

@@ -14,13 +14,12 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
 from msg_adapters.elevation import (
-    PointMove,
     terrain_from_point_cloud,
-    terrain_to_occupancy_grid,
     terrain_to_point_cloud,
 )
 from msg_adapters.errors import MAX_TEXT, MessageError
 from msg_adapters.gridding import detect_raster
+from msg_adapters.results.grids import terrain_to_occupancy_grid
 from rover_physics.errors import TerrainError
 from rover_physics.terrain.grid import Terrain, load_terrain
 
@@ -106,7 +105,7 @@ def test_a_terrain_comes_back_as_it_was_with_all_its_layers(datatype, shuffled):
     np.testing.assert_allclose(back.friction[known], 0.5 + layer[known], rtol=1e-7)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     rows=st.integers(2, 40),
     columns=st.integers(2, 40),
@@ -250,9 +249,9 @@ def test_scattered_points_ask_for_a_resolution(quantum):
 
 def test_moved_points_are_those_that_were_moved_before_and_invalid_ones_are_left_out():
     c, s = np.cos(0.6), np.sin(0.6)
-    move = PointMove(np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]), np.ones(3))
+    move = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]), np.ones(3)
     points = np.random.default_rng(4).uniform(-1.0, 1.0, (4000, 3)) * [1.0, 1.0, 0.05]
-    here = points @ move.rotation.T + 1.0
+    here = points @ move[0].T + 1.0
     seen = np.vstack([points, [[np.nan, 0.0, 0.0], [0.0, 0.0, np.inf], [0.0, np.nan, np.nan]]])
     found = terrain_from_point_cloud(cloud_of(seen), 0.1, "max", move)
     assert_same(found, terrain_from_point_cloud(cloud_of(here), 0.1, "max"))
@@ -418,7 +417,7 @@ def take_or_refuse(cloud, resolution):
             assert len(str(error)) <= MAX_TEXT
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(
     rows=st.lists(st.tuples(*[st.floats(width=32)] * 3), min_size=1, max_size=12),
     resolution=st.sampled_from((0.0, 0.05, 1e-3, 1e5)),
@@ -431,7 +430,7 @@ def test_every_set_of_points_becomes_a_terrain_or_a_refusal(rows, resolution, ki
 SIZES = st.one_of(st.integers(0, 40), st.integers(0, 2**32 - 1))
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(
     data=st.binary(max_size=600),
     header=st.fixed_dictionaries(

@@ -10,8 +10,7 @@ from sensor_msgs.msg import JointState
 
 from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
-from msg_adapters.joint_map import OWN_NAMES, read_joint_map
-from msg_adapters.joints import convert_steering, joint_positions
+from msg_adapters.joints import OWN_NAMES, convert_steering, joint_positions, read_joint_map
 from msg_adapters.results.predictions import JOINTS, joint_trajectory
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover

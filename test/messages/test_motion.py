@@ -5,18 +5,21 @@ import math
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.errors import MessageError
+from msg_adapters.frames import read_transform
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.planning.navigation.transforms import Rigid
 from support.messages.tool_messages import make_target, make_wrench
+from support.messages.transforms import transform_message
 
 NAN, INF = math.nan, math.inf
 
@@ -90,6 +93,13 @@ def read_wrench(message):
     return wrench_to_force_and_moment(message, "map")
 
 
+def transform(x=0.0, length=1.0, child="odom"):
+    still = Rigid.none()
+    message = transform_message("map", child, still, Time())
+    message.transform.translation.x, message.transform.rotation.w = x, length
+    return message
+
+
 MAST = "in frame 'mast'.*imu_frame and imu_mounting"
 
 
@@ -102,6 +112,10 @@ MAST = "in frame 'mast'.*imu_frame and imu_mounting"
         *[(read_odometry, odometry(y=y), "must be within 1e") for y in (1e200, -1e9, NAN, INF)],
         *[(read_odometry, odometry(variance=v), "variances within") for v in (1e200, NAN)],
         (read_odometry, odometry("mast"), "is of frame 'mast'; it must be of 'base_li"),
+        *[
+            (read_transform, message, "must be finite, a quaternion of length 1, and both frames")
+            for message in (transform(x=NAN), transform(length=2.0), transform(child=""))
+        ],
         (read_target, make_target(frame="odom"), "tool target is in frame 'odom'"),
         (read_target, make_target(frame=""), "without a frame_id"),
         *[(read_target, make_target(z=z), r"target is .* within 1e\+09") for z in (1e10, NAN)],

@@ -139,7 +139,7 @@ def test_poses_of_a_path_may_leave_their_frame_empty():
     np.testing.assert_array_equal(path_to_poses(path, "map"), np.zeros((1, 3)))
 
 
-@settings(max_examples=200)
+@settings(max_examples=50)
 @given(numbers=st.lists(st.floats(), min_size=7, max_size=7))
 def test_every_pose_is_read_or_refused(numbers):
     path = poses_path(np.zeros((2, 3)), "map")

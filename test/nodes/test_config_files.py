@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from msg_adapters.commands import joint_order
-from msg_adapters.joint_map import read_joint_map
+from msg_adapters.joints import read_joint_map
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import steering_joints

@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 
 import rover_planner.ros.deferred_work
 from rover_planner.ros.deferred_work import MAX_WAITING, DeferredWork
-from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
+from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import call
 from support.waiting import TIMEOUT, wait_until
@@ -140,11 +140,11 @@ def test_nobody_listens_so_nothing_is_made_and_who_comes_gets_the_latest(ros, to
 
 def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(ros, topic):
     visitor, seen = listen(ros, "visitor")
-    wait_until(lambda: topic._publisher.has_listeners, "its match")
+    wait_until(lambda: topic.has_listeners, "its match")
     topic.publish(lambda: Int32(data=1))
     wait_until(lambda: seen == [1], "the first")
     visitor.destroy_node()
-    wait_until(lambda: not topic._publisher.has_listeners, "the leave")
+    wait_until(lambda: not topic.has_listeners, "the leave")
     topic.publish(lambda: Int32(data=2))
     _, heard = listen(ros)
 

@@ -9,9 +9,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_physics.errors import PoseError
-from rover_planner.ros.guard import Guard, GuardedExecutor
+from rover_planner.ros.guard import Guard, GuardedExecutor, refuse_error
 from rover_planner.ros.handover import Handover
-from rover_planner.ros.refusals import refuse_error
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
@@ -49,15 +48,9 @@ class Fragile(Node):
         raise RuntimeError("tick")
 
 
-def spin_guarded(ros, node):
-    executor = GuardedExecutor(context=ros.context)
-    executor.add_guarded(node, node.guard)
-    return ros.spin(node, executor)
-
-
 def test_a_node_outlives_errors_of_timers_subscriptions_and_services(ros):
     node = Fragile(ros.context)
-    spin_guarded(ros, node)
+    ros.spin(node)
     other = ros.spin(Node("other", context=ros.context))
     words = other.create_publisher(String, "words", 10)
     wait_until(lambda: words.get_subscription_count() > 0, "the subscription")
@@ -79,7 +72,7 @@ def test_a_node_outlives_errors_of_timers_subscriptions_and_services(ros):
 def test_an_entity_that_cannot_be_read_does_not_block_the_node(ros):
     node = Fragile(ros.context)
     executor = GuardedExecutor(context=ros.context)
-    executor.add_guarded(node, node.guard)
+    executor.add_node(node)
 
     def fail(_):
         raise MemoryError("no room for the message")
@@ -114,7 +107,7 @@ def test_errors_of_the_input_are_bad_requests_and_others_internal_errors():
 def test_functions_of_other_threads_run_in_order_and_an_error_ends_nothing(ros):
     node = Fragile(ros.context)
     node.timer.cancel()
-    spin_guarded(ros, node)
+    ros.spin(node)
     handover, told = Handover(node, node.guard), []
     time.sleep(0.01)
     for k in range(50):

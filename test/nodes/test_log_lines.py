@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What lasts is logged when it begins and ends; what repeats, once in a while."""
 
-from rover_planner.ros.logs.repeat_log import PERIOD, RepeatLog
-from rover_planner.ros.logs.transition_log import TransitionLog
+from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
 
 
 class Lines(list):
@@ -49,7 +48,9 @@ def test_one_that_ended_before_it_could_be_told_is_told_with_its_end():
 
 def test_texts_that_differ_in_numbers_are_told_once_in_a_period_and_counted():
     log = RepeatLog()
-    lines = [log.line(f"it is {age:.3f} s old", 0.1 * age) for age in range(int(30 * PERIOD))]
+    lines = [
+        log.line(f"it is {age:.3f} s old", 0.1 * age) for age in range(int(30 * REPEAT_PERIOD))
+    ]
     told = [line for line in lines if line]
     assert told == [
         "it is 0.000 s old",

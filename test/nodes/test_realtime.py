@@ -4,12 +4,12 @@
 import subprocess
 import sys
 
-from rover_planner.ros.realtime import take_priority
+from rover_planner.ros.process import take_priority
 
 PROGRAM = """
 import os, threading
-from rover_planner.ros.disk import init_ros
-from rover_planner.ros.realtime import take_priority
+from rover_planner.ros.process import init_ros
+from rover_planner.ros.process import take_priority
 init_ros([])
 threading.Thread(target=threading.Event().wait, daemon=True).start()
 print(take_priority(3))

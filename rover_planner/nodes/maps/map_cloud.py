@@ -13,7 +13,7 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import NANOSECONDS
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.ros.publishing.latched_publisher import LatchedPublisher
+from rover_planner.ros.lazy_publisher import LazyPublisher
 
 TOPIC = "~/map"
 
@@ -24,7 +24,7 @@ class MapCloud:
     def __init__(self, node: Node, service: TraverseService, frame: str):
         """Create the publisher; `frame` is that of maps without one."""
         self._node, self._service, self._frame = node, service, frame
-        self._publisher = LatchedPublisher(node, PointCloud2, TOPIC)
+        self._publisher = LazyPublisher(node, PointCloud2, TOPIC)
         self._shown: KnownMap | None = None
         self._pool = ThreadPoolExecutor(1, "map_cloud")
         self._work: Future[None] | None = None
@@ -60,4 +60,4 @@ class MapCloud:
         frame = known.frame or self._frame
         cloud = terrain_to_point_cloud(known.received, frame, now.to_msg(), more=more)
         with contextlib.suppress(InvalidHandle):  # the node has ended meanwhile
-            self._publisher.publish(cloud)
+            self._publisher.send(cloud)

@@ -4,16 +4,12 @@
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, PointCloud2
 
-from msg_adapters.elevation import PointMove, terrain_from_point_cloud
 from msg_adapters.errors import MessageError
-from msg_adapters.frames import check_frame
-from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
@@ -21,20 +17,20 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.navigation.transforms import Rigid, TransformError
-from rover_planner.ros.logs.repeat_log import RepeatLog
+from rover_planner.planning.navigation.transforms import TransformError
+from rover_planner.ros.frames import Frames
+from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.ros.qos import map_subscriptions, sensor_qos
-from rover_planner.ros.qos_warnings import warn_of_mismatch
+from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
+from rover_planner.ros.optional_types import find_type
+from rover_planner.ros.qos import sensor_qos
+from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
-from rover_planner.worlds.maps.moved_map import MapMove
 from rover_planner.worlds.summary import describe_terrain
 
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 """Topics of maps: PointCloud2, and GridMap where its package is installed."""
-LOOK_PERIOD = 0.5
-"""Shortest time between two looks for unknown ground under the rover [s]."""
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""
 FIRST_MAPS = 20
@@ -42,30 +38,6 @@ FIRST_MAPS = 20
 MERGE_WAIT = 0.005
 """Longest wait of a question for a map that is to be merged into the one that is there [s]. A busy
 machine may take 15 ms more to wake the thread until it is 20 ms."""
-
-
-@dataclass(frozen=True)
-class MapSettings:
-    """How messages become maps."""
-
-    frame: str
-    """Frame of the map."""
-    resolution: float
-    """Cell size [m]; 0 takes the spacing of the points."""
-    cell_height: str
-    """Height of a cell with several points."""
-    layers: GridMapLayers
-    """Names of the layers of a GridMap."""
-
-
-def grid_map_type() -> type | None:
-    """Return grid_map_msgs/GridMap; None where it is not installed."""
-    try:
-        from grid_map_msgs.msg import GridMap
-    except ImportError:
-        return None
-    kind: type = GridMap
-    return kind
 
 
 class MapTopics:
@@ -77,7 +49,7 @@ class MapTopics:
         service: TraverseService,
         parameters: TraverseServerParameters,
         tell: Callable[[str], None],
-        find_sensor: Callable[[str, int | None], Rigid],
+        frames: Frames,
     ):
         """Subscribe to the maps and load the first one.
 
@@ -87,15 +59,14 @@ class MapTopics:
             parameters: The parameters of the node.
             tell: Called in the thread after each map: with the reason if it was refused, else
                 with an empty text.
-            find_sensor: Returns where a sensor's frame was in the map frame at a time [ns];
-                called in the thread; may raise INPUT_ERRORS.
+            frames: Knows where the frames of messages are on the map; asked in the thread.
 
         Raises:
             TerrainError: The file of the parameter terrain_file cannot be loaded.
         """
         self._node, self._service, self._tell = node, service, tell
-        self._find_sensor = find_sensor
-        self._settings = _settings_of(parameters)
+        self._frames = frames
+        self._settings = MapSettings.of(parameters)
         self._fills = parameters.fill_under_rover
         self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
         self._is_from_topic = False
@@ -110,7 +81,7 @@ class MapTopics:
         self._subscribe(CLOUD, PointCloud2, parameters)
         if parameters.imu_attitude:
             self._subscribe_to_imu(parameters)
-        grid_map = grid_map_type()
+        grid_map = find_type("grid_map_msgs.msg:GridMap")
         if grid_map is not None:
             self._subscribe(GRID_MAP, grid_map, parameters)
 
@@ -119,13 +90,8 @@ class MapTopics:
             if not self._intake.offer(message, kind):
                 self._intake.do(self._renew)
 
-        for qos, mends in map_subscriptions(
-            parameters.map_durability, parameters.input_reliability
-        ):
-            events = warn_of_mismatch(self._node, topic, mends)
-            self._node.create_subscription(
-                kind, topic, offer, qos, event_callbacks=events, raw=True
-            )
+        durability, reliability = parameters.map_durability, parameters.input_reliability
+        subscribe_to_map(self._node, kind, topic, offer, durability, reliability)
 
     def _subscribe_to_imu(self, parameters: TraverseServerParameters) -> None:
         mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
@@ -158,7 +124,7 @@ class MapTopics:
 
         Those of merging and filling count from the next map on.
         """
-        before, self._settings = self._settings, _settings_of(parameters)
+        before, self._settings = self._settings, MapSettings.of(parameters)
         self._fills = parameters.fill_under_rover
         settings, rover = keeper_settings(parameters), self._service.settings.rover
         self._intake.do(lambda: self._keeper.apply(rover, settings))
@@ -193,7 +159,7 @@ class MapTopics:
         if self._unplaced is None:
             return
         with contextlib.suppress(TransformError):
-            self._find_sensor(*self._unplaced)
+            self._frames.find(*self._unplaced)
             self._unplaced = None
             self._intake.repeat()
 
@@ -207,36 +173,19 @@ class MapTopics:
             self._service.renew_map()
 
     def _take_message(self, message: Any) -> None:
-        settings = self._settings
         self._topic = CLOUD if isinstance(message, PointCloud2) else GRID_MAP
-        stamp = stamp_to_ns(message.header.stamp)
+        frame, stamp = message.header.frame_id, stamp_to_ns(message.header.stamp)
         self._unplaced = None
-        source = self._find_source(message.header.frame_id, stamp)
-        if self._topic == CLOUD:
-            move = None if source is None else PointMove(*source.matrix)
-            terrain = terrain_from_point_cloud(
-                message, settings.resolution, settings.cell_height, move
-            )
-        else:
-            terrain = terrain_from_grid_map(message, settings.layers)
-            if source is not None:
-                terrain = self._keeper.place(terrain, MapMove(*source.matrix))
+        try:
+            source = self._frames.find_source(frame, stamp, self._topic)
+        except TransformError:
+            self._unplaced = frame, stamp
+            raise
+        terrain = read_map(message, self._settings, source, self._keeper)
         since = self._now() if stamp is None else stamp / NANOSECONDS
         kept = self._keeper.take(terrain, self._topic, since, self._service.standing())
         self._take(kept, self._topic, stamp)
         self._is_from_topic = True
-
-    def _find_source(self, frame: str, stamp: int | None) -> Rigid | None:
-        """Return where the frame of a map was in the map frame; None if it is that."""
-        if frame == self._settings.frame:
-            return None
-        if not frame:
-            check_frame(frame, self._settings.frame, self._topic)
-        try:
-            return self._find_sensor(frame, stamp)
-        except TransformError:
-            self._unplaced = frame, stamp
-            raise
 
     def _fill_under_rover(self) -> None:
         standing = self._service.standing()
@@ -279,15 +228,3 @@ class MapTopics:
         if line:
             self._node.get_logger().error(line)
         self._tell(error)
-
-
-def _settings_of(parameters: TraverseServerParameters) -> MapSettings:
-    layers = GridMapLayers(
-        parameters.elevation_layer, parameters.variance_layer, parameters.friction_layer
-    )
-    return MapSettings(
-        parameters.map_frame,
-        parameters.map_resolution,
-        parameters.cell_height,
-        layers,
-    )

@@ -14,7 +14,7 @@ from nav_msgs.srv import GetMap
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from msg_adapters.results.hazard_grids import classes_to_grid
+from msg_adapters.results.grids import classes_to_grid
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import UNKNOWN, RoverOnMap
@@ -23,12 +23,11 @@ from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedErr
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
-from rover_planner.ros.guard import Guard
+from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.handover import Handover
-from rover_planner.ros.logs.transition_log import TransitionLog
-from rover_planner.ros.publishing.lazy_publisher import LazyPublisher
+from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.qos import latched_qos
-from rover_planner.ros.refusals import INPUT_ERRORS
 
 PERIOD = 0.5
 """Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""

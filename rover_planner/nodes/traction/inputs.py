@@ -12,21 +12,18 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joint_map import read_joint_map
-from msg_adapters.joints import convert_steering
+from msg_adapters.joints import convert_steering, read_joint_map
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
-from rover_planner.nodes.navigation.frames import Frames
+from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.ros.guard import Guard
-from rover_planner.ros.logs.transition_log import TransitionLog
+from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.ros.publisher_check import ExpectedType, PublisherCheck
-from rover_planner.ros.qos import map_subscriptions, sensor_qos
-from rover_planner.ros.qos_warnings import warn_of_mismatch
-from rover_planner.ros.refusals import INPUT_ERRORS
+from rover_planner.ros.qos import sensor_qos
+from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.stamps import NANOSECONDS, StampCheck, StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
@@ -52,10 +49,14 @@ class TractionInputs:
         parameters: TractionControllerParameters,
         service: TractionService,
         maps: MapIntake,
+        frames: NodeFrames,
         guard: Guard,
     ):
-        """Subscribe to all inputs of a node; `guard` counts unexpected errors."""
-        self._node, self._service, self._maps = node, service, maps
+        """Subscribe to all inputs of a node; `guard` counts unexpected errors.
+
+        `frames` brings odometry of other frames to that of the map.
+        """
+        self._node, self._service, self._maps, self._frames = node, service, maps, frames
         self._errors = guard
         self._steering_sign = parameters.steering_sign
         arm = service.settings.rover.manipulator
@@ -70,8 +71,6 @@ class TractionInputs:
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
-        self.frames = Frames(node, parameters)
-        """Brings odometry of other frames to that of the map."""
         self._subscribe(parameters)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
@@ -92,28 +91,22 @@ class TractionInputs:
             (Odometry, ODOMETRY, self._take_odometry),
         ):
             self._node.create_subscription(kind, name, self._guard(name, take), sensor_qos())
-        for qos, mends in map_subscriptions(
-            parameters.map_durability, parameters.input_reliability
-        ):
-            events = warn_of_mismatch(self._node, CLOUD, mends)
-            self._node.create_subscription(
-                PointCloud2, CLOUD, self._maps.offer, qos, event_callbacks=events, raw=True
-            )
+        durability, reliability = parameters.map_durability, parameters.input_reliability
+        subscribe_to_map(self._node, PointCloud2, CLOUD, self._maps.offer, durability, reliability)
 
     def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
-        stamped = parameters.cmd_vel_stamped
-        other = (TWIST, "false") if stamped else (TWIST_STAMPED, "true")
         types = {
-            JOINT_STATES: ExpectedType("sensor_msgs/msg/JointState", {}),
-            IMU: ExpectedType("sensor_msgs/msg/Imu", {}),
-            CMD_VEL: ExpectedType(
-                TWIST_STAMPED if stamped else TWIST,
-                {other[0]: f"set parameter cmd_vel_stamped to {other[1]}"},
-            ),
-            ODOMETRY: ExpectedType("nav_msgs/msg/Odometry", {}),
-            CLOUD: ExpectedType("sensor_msgs/msg/PointCloud2", {}),
+            JOINT_STATES: "sensor_msgs/msg/JointState",
+            IMU: "sensor_msgs/msg/Imu",
+            CMD_VEL: TWIST_STAMPED if parameters.cmd_vel_stamped else TWIST,
+            ODOMETRY: "nav_msgs/msg/Odometry",
+            CLOUD: "sensor_msgs/msg/PointCloud2",
         }
-        return PublisherCheck(self._node, types)
+        advice = {
+            TWIST: "set parameter cmd_vel_stamped to false",
+            TWIST_STAMPED: "set parameter cmd_vel_stamped to true",
+        }
+        return PublisherCheck(self._node, types, advice)
 
     def _guard(self, name: str, take: Callable[[Any, float], None]) -> Callable[[Any], None]:
         """Return a callback that passes a message and the time of its arrival on.
@@ -166,8 +159,8 @@ class TractionInputs:
     def _take_odometry(self, odometry: Odometry, now: float) -> None:
         measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)
         if odometry.header.frame_id != self._map_frame:
-            self.frames.listen()  # only then: /tf of a whole robot costs the loop time
-        here = self.frames.localise_odometry(odometry)
+            self._frames.listen()  # only then: /tf of a whole robot costs the loop time
+        here = self._frames.localise_odometry(odometry)
         pose, deviation = odometry_to_pose(here, self._map_frame, self._base_frame)
         self._service.take_odometry(pose, deviation, measured)
         self._log.update(ODOMETRY, "", "odometry is used again", now)

@@ -8,14 +8,13 @@ from collections.abc import Callable
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.elevation import PointMove, terrain_from_point_cloud
-from msg_adapters.frames import check_frame
+from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.rover.model import Rover
-from rover_planner.nodes.navigation.frames import Frames
+from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import TransformError
-from rover_planner.ros.logs.repeat_log import RepeatLog
+from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 
@@ -30,7 +29,7 @@ class TractionMaps(MapIntake[PreparedMap]):
         node: Node,
         parameters: TractionControllerParameters,
         rover: Callable[[], Rover],
-        frames: Callable[[], Frames],
+        frames: NodeFrames,
     ):
         """Start the thread.
 
@@ -38,7 +37,7 @@ class TractionMaps(MapIntake[PreparedMap]):
             node: The node.
             parameters: Its parameters.
             rover: Returns the rover for which maps are prepared.
-            frames: Returns what knows where frames are on the map.
+            frames: Knows where the frames of clouds are on the map.
         """
         self._node, self._rover, self._frames = node, rover, frames
         self._parameters = parameters
@@ -57,31 +56,24 @@ class TractionMaps(MapIntake[PreparedMap]):
         """Listen to /tf if a map needs it, and take it when its frame is known; call it often."""
         if self._unplaced is None:
             return
-        frames = self._frames()
-        frames.listen()  # only then: /tf of a whole robot costs the loop time
+        self._frames.listen()  # only then: /tf of a whole robot costs the loop time
         with contextlib.suppress(TransformError):
-            frames.find(*self._unplaced)
+            self._frames.find(*self._unplaced)
             self._unplaced = None
             self.repeat()
 
     def _make(self, cloud: PointCloud2) -> PreparedMap:
         """Prepare a map from a cloud; called in the thread."""
-        values, move = self._parameters, self._find_move(cloud)
-        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
-        return prepare_map(self._rover(), terrain)
-
-    def _find_move(self, cloud: PointCloud2) -> PointMove | None:
-        """Return what moves the points to the map's frame; None if they are in it."""
-        self._unplaced = None
         frame, stamp = cloud.header.frame_id, stamp_to_ns(cloud.header.stamp)
-        if frame in ("", self._parameters.map_frame):
-            check_frame(frame, self._parameters.map_frame, CLOUD)
-            return None
+        self._unplaced = None
         try:
-            return PointMove(*self._frames().find(frame, stamp).matrix)
+            source = self._frames.find_source(frame, stamp, CLOUD)
         except TransformError:
             self._unplaced = frame, stamp
             raise
+        values, move = self._parameters, None if source is None else source.matrix
+        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
+        return prepare_map(self._rover(), terrain)
 
     def _tell(self, error: str) -> None:
         line = f"{CLOUD} refused, the last map stays: {error}"

@@ -6,14 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.elevation import PointMove, terrain_from_point_cloud
 from msg_adapters.errors import MessageError
-from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joint_map import JointMap, read_joint_map
+from msg_adapters.joints import JointMap, read_joint_map
+from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
+from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
@@ -30,6 +29,7 @@ from rover_planner.planning.answering.service_settings import (
 )
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.bags.bag_reader import (
     IMU,
@@ -42,15 +42,13 @@ from rover_planner.ros.bags.bag_reader import (
     Recorded,
 )
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
-from rover_planner.ros.bags.recorded_frames import RecordedFrames
+from rover_planner.ros.frames import Frames
+from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
-from rover_planner.worlds.maps.moved_map import MapMove
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
-LOOK_PERIOD = 0.5
-"""Shortest time between two looks for unknown ground under the rover [s], as in the node."""
 MAX_NOTES = 5
 """Number of refused messages that are told one by one."""
 
@@ -104,9 +102,7 @@ class Replay:
         self._service = TraverseService(load_service_settings(self.parameters))
         values = self.parameters
         self._keeper = MapKeeper(self._service.settings.rover, keeper_settings(values))
-        self._layers = GridMapLayers(
-            values.elevation_layer, values.variance_layer, values.friction_layer
-        )
+        self._map_settings = MapSettings.of(values)
         if values.terrain_file:
             terrain = load_terrain(values.terrain_file, values.max_map_cells)
             self._keep(self._keeper.load(terrain, 0.0, None), values.terrain_file, None)
@@ -115,7 +111,8 @@ class Replay:
         self._pose: NDArray[np.float64] | None = None
         self._measured = Measurements()  # by the times of the recording
         self._looked = -float("inf")
-        self.frames = RecordedFrames(values)
+        self._time = 0
+        self.frames = Frames(values, lambda: self._time, sensor_poses(values))
         """Where things are on the map."""
         self.joint_names = _read_joint_map(values, self._service.all_joint_names)
         """Names of the joints in messages."""
@@ -132,6 +129,7 @@ class Replay:
 
     def take(self, recorded: Recorded) -> Iterator[Answer]:
         """Take a message; yield the answers to the questions that it causes."""
+        self._time = recorded.stamp
         try:
             yield from self._take[recorded.kind](recorded)
         except (MessageError, PlanningError, RoverError) as error:
@@ -145,17 +143,10 @@ class Replay:
             yield self._judge_drive()
 
     def _take_map(self, recorded: Recorded) -> Iterator[Answer]:
-        message, values = recorded.message, self.parameters
-        stamp = stamp_to_ns(message.header.stamp)
-        source = self.frames.find_source(message, recorded.topic, recorded.stamp)
-        if isinstance(message, PointCloud2):
-            size, height = values.map_resolution, values.cell_height
-            move = None if source is None else PointMove(*source.matrix)
-            terrain = terrain_from_point_cloud(message, size, height, move)
-        else:
-            terrain = terrain_from_grid_map(message, self._layers)
-            if source is not None:
-                terrain = self._keeper.place(terrain, MapMove(*source.matrix))
+        header = recorded.message.header
+        stamp = stamp_to_ns(header.stamp)
+        source = self.frames.find_source(header.frame_id, stamp, recorded.topic)
+        terrain = read_map(recorded.message, self._map_settings, source, self._keeper)
         since = (recorded.stamp if stamp is None else stamp) / NANOSECONDS
         standing = self._measured.standing(recorded.stamp / NANOSECONDS)
         kept = self._keeper.take(terrain, recorded.topic, since, standing)
@@ -163,8 +154,8 @@ class Replay:
         goal = self.questions.goal
         if not is_new or goal is None:
             return
-        given, end = self.questions.start, self.frames.locate_pose(goal)
-        start: ArrayLike | None = self._pose if given is None else self.frames.locate_pose(given)
+        given, end = self.questions.start, self.frames.place_level(goal)
+        start: ArrayLike | None = self._pose if given is None else self.frames.place_level(given)
         if start is None:
             self.without_start += 1
             return
@@ -182,7 +173,8 @@ class Replay:
         yield from ()
 
     def _take_transforms(self, recorded: Recorded) -> Iterator[Answer]:
-        self.frames.take(recorded.message, is_static=recorded.kind == TF_STATIC)
+        for transform in recorded.message.transforms:
+            self.frames.take_transform(transform, is_static=recorded.kind == TF_STATIC)
         yield from ()
 
     def _take_imu(self, recorded: Recorded) -> Iterator[Answer]:
@@ -193,10 +185,13 @@ class Replay:
         yield from ()
 
     def _take_odometry(self, recorded: Recorded) -> Iterator[Answer]:
-        x, y, z, roll, pitch, yaw = self.frames.locate(recorded.message, recorded.stamp)
-        self._pose, now = np.array([x, y, yaw]), recorded.stamp / NANOSECONDS
+        here = self.frames.localise_odometry(recorded.message)
+        pose, _ = odometry_to_pose(here, self.parameters.map_frame)
+        body = float(pose[2]), *odometry_to_tilt(here)
+        self.frames.take_odometry(here)
+        self._pose, now = pose[[0, 1, 3]], recorded.stamp / NANOSECONDS
         self._service.take_pose(self._pose)
-        self._measured.take_pose(self._pose, now, (z, roll, pitch))
+        self._measured.take_pose(self._pose, now, body)
         self._look_under_rover(now)
         if self._service.known_map is None:
             return  # what is driven before the first map cannot be judged
@@ -219,7 +214,8 @@ class Replay:
             self._service.amend_map(filled.terrain, filled.sources)
 
     def _take_path(self, recorded: Recorded) -> Iterator[Answer]:
-        poses = self.frames.locate_path(recorded.message)
+        there = self.frames.localise_path(recorded.message)
+        poses = path_to_poses(there, self.parameters.map_frame)
         about = path_hash(recorded.message), stamp_text(stamp_to_ns(recorded.message.header.stamp))
         self._service.take_path(poses, *about)
         yield self._ask(CHECKED, recorded.stamp, Situation.check_path)

@@ -25,24 +25,14 @@ def nan_rate(rover):
     rover.joints.velocity[JOINTS.index("front_right_wheel")] = math.nan
 
 
-def large_attitude(rover):
-    rover.imu.orientation.w = 1e155
-
-
 def other_frame(rover):
     rover.imu.header.frame_id = "imu_link"
-
-
-def nan_speed(rover):
-    rover.speed = math.nan
 
 
 GOOD = "all inputs are right"
 SPOILS = [
     (nan_rate, "velocity nan of front_right_wheel"),
-    (large_attitude, "imu has orientation [0.0, 0.0, 0.0, 1e+155]"),
     (other_frame, "imu is in frame 'imu_link'; it must be in 'base_link', or the parameters"),
-    (nan_speed, "cmd_vel has linear.x nan"),
 ]
 
 
@@ -50,7 +40,7 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
     ros, rover, controller
 ):
     for spoil, text in SPOILS:
-        kept = copy.deepcopy(rover.joints), copy.deepcopy(rover.imu), rover.speed
+        kept = copy.deepcopy(rover.joints), copy.deepcopy(rover.imu)
         spoil(rover)
         spoilt = rover.wait_for_send()
         wait_until(lambda: rover.state == "fault", "the fault")
@@ -60,7 +50,7 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
         assert rover.status.level == rover.status.ERROR
         assert sum(push > 0.0 for _, push in rover.commands_after(spoilt)) <= CYCLES_IN_A_TENTH
         told = len(rover.log)
-        rover.joints, rover.imu, rover.speed = kept
+        rover.joints, rover.imu = kept
         wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving again")
         wait_until(lambda told=told: GOOD in " ".join(rover.log[told:]), "the good news")
         assert rover.count_lines(text) == 1
@@ -87,11 +77,10 @@ def test_a_joint_that_is_never_measured_is_named_and_the_rover_rests(
         assert rover.torque == 0.0 and rover.brakes[-1]
 
 
-@pytest.mark.parametrize(("side", "angle"), [("left", 0.2), ("right", -0.2)])
-def test_steering_is_read_with_the_sign_of_the_rover(rover, start_controller, side, angle):
+def test_steering_is_read_with_the_sign_of_the_rover(rover, start_controller):
     rover.joints.position[JOINTS.index("front_left_steering")] = 0.2
-    controller = start_controller(steering_sign=side)
-    wait_until(lambda: controller.service.steering[5] == angle, "the angle")
+    controller = start_controller(steering_sign="right")
+    wait_until(lambda: controller.service.steering[5] == -0.2, "the angle")
 
 
 def test_joints_that_do_not_reach_the_steering_limit_end_the_start(start_controller):
@@ -102,9 +91,7 @@ def test_joints_that_do_not_reach_the_steering_limit_end_the_start(start_control
 def spoilt_odometry(field):
     odometry = Odometry(child_frame_id="mast" if field == "frame" else "base_link")
     odometry.header.frame_id = "map"
-    if field == "orientation":
-        odometry.pose.pose.orientation.x = 1e155
-    elif field == "covariance":
+    if field == "covariance":
         odometry.pose.covariance[7] = math.nan
     return odometry
 
@@ -133,7 +120,7 @@ def test_corrupt_odometry_and_maps_are_not_used_and_the_rover_drives_on_with_the
     sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
     cloud_sender.publish(FLAT)
     refused = "odometry not used: odometry "
-    for field in ("orientation", "covariance", "frame"):
+    for field in ("covariance", "frame"):
         heard = len(rover.commands)
         send_until(
             sender,
@@ -173,14 +160,6 @@ def test_an_unforeseen_error_in_a_callback_is_a_fault_and_not_the_end(
         assert int(values["internal_errors"]) > 0
     wait_until(lambda: rover.state == "driving", "driving")
     assert rover.count_lines("Traceback") == 1 and ros.is_alive(controller)
-
-
-def test_a_command_of_ten_per_second_is_no_drop_out(rover, start_controller):
-    rover.cmd_vel_divider = 5
-    start_controller(cmd_vel_timeout=0.5)
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
-    heard = len(rover.commands)
-    wait_until(lambda: rover.pushes_on(heard, 50), "a second of commands that push")
 
 
 def test_a_change_of_the_cell_height_acts_on_the_map_that_is_there(

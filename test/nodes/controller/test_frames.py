@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odometry of another frame, and of a robot with another origin, is placed on the map."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
@@ -44,14 +46,16 @@ def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller, drive_
     cloud = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
     cloud.publish(terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time()))
     controller = start_controller(transform_timeout=5.0)
-    known = controller._inputs.frames
+    known = controller.frames
     send_transforms(controller, known.take, ("map", "odom", MAP_ODOM), age=7.5)
     stale = "the transform from 'odom' to 'map' is stale: it is "
     drive_in_odom(lambda: rover.count_lines(stale), "the refusal of a stale transform")
     line = next(line for line in rover.log if stale in line)
     assert 7.5 <= float(line.partition(stale)[2].split()[0]) < 7.5 + TIMEOUT
     drive_in_odom(lambda: contact_source(rover) == "motion", "the drive without the map")
-    send_transforms(controller, known.take_static, ("map", "odom", MAP_ODOM), age=0.0)
+    send_transforms(
+        controller, partial(known.take, is_static=True), ("map", "odom", MAP_ODOM), age=0.0
+    )
     drive_in_odom(lambda: contact_source(rover) == "map", "contacts from the map")
     right = (1.0, 0.0, 0.4, np.pi / 2)
     np.testing.assert_allclose(controller.service._pose, right, atol=1e-9)
@@ -75,8 +79,8 @@ def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(
     refusal = "the last map stays: no transforms connect the frames 'odom' and 'map'"
     wait_until(lambda: rover.count_lines(refusal), "the refusal")
     assert controller.service._terrain is None
-    take = controller._inputs.frames.take
-    send_transforms(controller, take, ("map", "odom", MAP_ODOM), age=0.0)
+    take = controller.frames.take
+    send_transforms(controller, take, ("map", "odom", MAP_ODOM))
     wait_until(lambda: controller.service._terrain is not None, "the map, without a new message")
     found = controller.service._terrain
     there = MAP_ODOM.rotation.apply((0.5, 0.25, 0.0)) + MAP_ODOM.translation

@@ -103,7 +103,13 @@ def test_a_stall_ends_the_push_and_is_reported(rover, start_controller):
     wait_until(lambda: rover.state == "standstill", "the way out")
 
 
-@pytest.mark.slow
+def test_a_node_that_ends_sends_zeros_last(rover, controller):
+    run_in_executor(controller, controller.stop)
+    wait_until(lambda: rover.torque == 0.0 and rover.brakes[-1], "zeros and the brake")
+    assert rover.state == "disabled"
+
+
+@pytest.mark.long
 def test_a_process_that_is_told_to_end_sends_zeros_last(rover):
     values = {"enabled_at_start": "true"} | PATIENT
     words = ["--ros-args"]

@@ -6,7 +6,7 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
-from rover_planner.planning.path_query import answer_path_query, check_path
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.grounds import make_terrain
@@ -15,6 +15,7 @@ from support.rough_grounds import plane
 LSR1 = load_rover("lsr1")
 MAP = plane(0.0, 0.0, half=4.0)
 STEP = 0.1
+COARSE = PathQueryOptions(count=1, waypoint_spacing=0.1)
 SETTINGS = DriveSettings(within=0.1, patience=0.3)
 
 
@@ -28,7 +29,7 @@ class SimulatedRover:
 
     def ask(self, start, goal):
         self.asked.append(np.array(start))
-        answer = answer_path_query(LSR1, MAP, start, goal)
+        answer = answer_path_query(LSR1, MAP, start, goal, COARSE)
         poses = answer.chosen.poses if answer.traversable else []
         return {"traversable": answer.traversable, "reason": answer.explain(), "poses": poses}
 
@@ -36,7 +37,7 @@ class SimulatedRover:
         self.follower = PathFollower(poses, 0.3)
 
     def check(self, poses):
-        candidate = check_path(LSR1, MAP, poses)
+        candidate = check_path(LSR1, MAP, poses, COARSE)
         return "" if candidate.verdict.traversable else candidate.verdict.reason
 
     def wait_for_pose(self, is_wanted, seconds):

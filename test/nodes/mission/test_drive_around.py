@@ -16,7 +16,6 @@ from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
 SERVER = {
@@ -28,13 +27,6 @@ SERVER = {
     "time_budget": 60.0,
 }
 SPEED = 0.1
-
-
-@pytest.fixture
-def ros():
-    run = RosRun()
-    yield run
-    run.close()
 
 
 def boulder_field() -> tuple[Terrain, tuple, tuple, float]:

@@ -2,6 +2,7 @@
 """Questions in another frame, from where the rover is, and about a robot with another origin."""
 
 import json
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from rover_planner.nodes.nav2_services import PathValidity
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
-from support.messages.transforms import send_transforms, transform_message
+from support.messages.transforms import send_transforms
 from support.planner_client import GOAL, START, ask, verdict_of
 from support.waiting import wait_until
 
@@ -20,8 +21,8 @@ MAP_ODOM = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
 """Where odometry began, on the map."""
 
 
-def send(server, *edges, age=0.0, take="take"):
-    send_transforms(server, getattr(server.frames, take), *edges, age=age)
+def send(server, *edges, age=0.0, is_static=False):
+    send_transforms(server, partial(server.frames.take, is_static=is_static), *edges, age=age)
 
 
 def on_map(pose):
@@ -92,7 +93,7 @@ def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, last
 
 
 def test_odometry_in_another_frame_is_transformed(mapped, client, lasting):
-    send(mapped, ("map", "odom", MAP_ODOM), take="take_static")
+    send(mapped, ("map", "odom", MAP_ODOM), is_static=True)
     client.send_odometry((1.0, 2.0, 0.5), "odom")
     wait_until(lambda: mapped.service.fresh_pose() is not None, "odometry")
     right = MAP_ODOM.then(Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.5)).xyyaw
@@ -118,18 +119,3 @@ def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, c
     wait_until(lambda: shifted.service.path is not None, "the path")
     np.testing.assert_allclose(shifted.service.path[:, 0], (0.3, 1.3), atol=1e-9)
     assert json.loads(client.check_path().message)["traversable"]
-
-
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda message: setattr(message.transform.translation, "x", np.nan),
-        lambda message: setattr(message.transform.rotation, "w", 2.0),
-        lambda message: setattr(message, "child_frame_id", ""),
-    ],
-)
-def test_a_transform_that_is_none_is_refused(server, spoil):
-    message = transform_message("map", "odom", MAP_ODOM, server.get_clock().now().to_msg())
-    spoil(message)
-    server.frames.take(SimpleNamespace(transforms=[message]))
-    assert not server.frames._tree.knows("map")

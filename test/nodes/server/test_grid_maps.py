@@ -1,128 +1,110 @@
 # SPDX-License-Identifier: Apache-2.0
-"""GridMaps over DDS: their layers are used, and those of other frames are placed by /tf."""
+"""GridMaps: their layers are used, and those of other frames are placed by /tf."""
+
+from functools import partial
 
 import numpy as np
 import pytest
-from builtin_interfaces.msg import Time
-from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from rover_physics.terrain.grid import Terrain
-from rover_planner.nodes.maps import map_topics
 from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.ros import map_intake
 from rover_planner.ros.qos import map_qos
 from support.grounds import make_terrain, waves
 from support.messages.grid_maps import grid_map_of, move_buffer, to_message
 from support.messages.interfaces import GRID_MAP_MSGS, TF2_MSGS, importable
-from support.messages.transforms import transform_message
+from support.messages.transforms import send_transforms, transform_message
 from support.planner_client import ask
 from support.waiting import wait_until
 
 PRIOR = make_terrain(waves)
 CELL = PRIOR.resolution
 REFUSED = "elevation_map refused, there is no map yet: "
+X0, X1, Y0, Y1 = PRIOR.bounds
+CENTRE = 0.5 * (X0 + X1), 0.5 * (Y0 + Y1)
 
 
-@pytest.fixture(scope="module")
-def grid_map_msgs(tmp_path_factory):
-    """Return grid_map_msgs.msg, built for these tests where it is not installed."""
-    folder = tmp_path_factory.mktemp("grid_map")
-    with importable("grid_map_msgs", GRID_MAP_MSGS, folder) as messages:
-        yield messages
-
-
-@pytest.fixture(scope="module")
-def tf2_msgs(tmp_path_factory):
-    """Return tf2_msgs.msg, built for these tests where it is not installed."""
-    with importable("tf2_msgs", TF2_MSGS, tmp_path_factory.mktemp("tf2")) as messages:
-        yield messages
-
-
-def test_layers_of_a_grid_map_with_a_moved_buffer_are_the_map_over_dds(
-    grid_map_msgs, start_server, client
-):
-    server = start_server(
-        planner="fan", elevation_layer="height", variance_layer="none", friction_layer="mu"
-    )
-    publisher = client.create_publisher(grid_map_msgs.GridMap, "elevation_map", map_qos())
-    wait_until(lambda: publisher.get_subscription_count() == 2, "the subscriptions")
-    layers = {"height": PRIOR.elevation, "variance": np.full(PRIOR.elevation.shape, 4.0)}
-    plain = grid_map_of(layers, PRIOR.resolution)
-    publisher.publish(to_message(grid_map_msgs.GridMap, move_buffer(plain, 17, 130)))
-    first = wait_until(lambda: server.service.known_map, "the map")
-    np.testing.assert_array_equal(first.terrain.elevation, PRIOR.elevation)
-    assert first.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
-    assert (first.source, first.frame) == ("elevation_map", "map")
-    assert first.terrain.elevation_std is None
-    _, verdict, _ = ask(client)
-    assert verdict["traversable"] == "true" and verdict["blind_share"] == "0.0"
-    slippery = grid_map_of(layers | {"mu": 0.01 + 0.0 * PRIOR.elevation}, PRIOR.resolution)
-    publisher.publish(to_message(grid_map_msgs.GridMap, slippery))
-    wait_until(lambda: server.service.known_map is not first, "the second map")
-    assert ask(client)[1]["code"] == "friction"
-    # A map that cannot be used is refused by the name of its topic, and the last one stays.
-    turned = to_message(grid_map_msgs.GridMap, plain)
-    turned.info.pose.orientation.z, turned.info.pose.orientation.w = 0.1, 0.995
-    publisher.publish(turned)
-    client.wait_for_log("elevation_map refused, the last good map stays: grid map is turned")
-
-
-def test_without_grid_map_msgs_the_server_has_no_such_topic(start_server, monkeypatch):
-    monkeypatch.setattr(map_topics, "grid_map_type", lambda: None)
-    server = start_server()
-    topics = {name for name, _ in server.get_topic_names_and_types()}
-    assert "/elevation_cloud" in topics and "/elevation_map" not in topics
-
-
-class Robot:
-    """What publishes GridMaps and transforms, as elevation_mapping and a localisation do."""
-
-    def __init__(self, node, grid_map: type, transforms: type):
-        self.node, self._grid_map, self._transforms = node, grid_map, transforms
-        static = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._maps = node.create_publisher(grid_map, "elevation_map", map_qos())
-        self._moving = node.create_publisher(transforms, "/tf", 10)
-        self._static = node.create_publisher(transforms, "/tf_static", static)
-
-    def is_heard(self) -> bool:
-        return (
-            self._maps.get_subscription_count() == 2 == 1 + self._moving.get_subscription_count()
+@pytest.mark.long  # builds two packages of messages
+def test_layers_and_transforms_are_the_map_over_dds(tmp_path, start_server, client):
+    with (
+        importable("grid_map_msgs", GRID_MAP_MSGS, tmp_path / "grid_map") as grid_map,
+        importable("tf2_msgs", TF2_MSGS, tmp_path / "tf2") as tf2,
+    ):
+        server = start_server(
+            planner="fan", elevation_layer="height", variance_layer="none", friction_layer="mu"
         )
-
-    def send_map(self, terrain: Terrain, frame: str = "odom", stamp: Time | None = None) -> None:
-        """Publish the layers of a terrain that has an odd number of cells."""
-        layers = {"elevation": terrain.elevation}
-        if terrain.elevation_std is not None:
-            layers["variance"] = terrain.elevation_std**2
-        if terrain.friction is not None:
-            layers["friction"] = terrain.friction
-        x0, x1, y0, y1 = terrain.bounds
-        centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-        stamp = self.node.get_clock().now().to_msg() if stamp is None else stamp
-        plain = move_buffer(grid_map_of(layers, terrain.resolution, centre), 5, 3)
-        self._maps.publish(to_message(self._grid_map, plain, frame, stamp))
-
-    def send_transform(self, rigid: Rigid, age: float = 0.0, *, is_static: bool = False) -> None:
-        """Tell where odom is on the map, at a time that is past [s]."""
-        stamp = (self.node.get_clock().now() - Duration(seconds=age)).to_msg()
-        message = self._transforms(transforms=[transform_message("map", "odom", rigid, stamp)])
-        (self._static if is_static else self._moving).publish(message)
+        maps = client.create_publisher(grid_map.GridMap, "elevation_map", map_qos())
+        static = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        tf = client.create_publisher(tf2.TFMessage, "/tf_static", static)
+        wait_until(lambda: maps.get_subscription_count() == 2, "the subscriptions")
+        layers = {"height": PRIOR.elevation, "variance": np.full(PRIOR.elevation.shape, 4.0)}
+        plain = grid_map_of(layers, CELL)
+        maps.publish(to_message(grid_map.GridMap, move_buffer(plain, 17, 130)))
+        first = wait_until(lambda: server.service.known_map, "the map")
+        np.testing.assert_array_equal(first.terrain.elevation, PRIOR.elevation)
+        assert first.terrain.origin == pytest.approx(PRIOR.origin, abs=1e-9)
+        assert (first.source, first.frame) == ("elevation_map", "map")
+        assert first.terrain.elevation_std is None
+        assert ask(client)[1]["traversable"] == "true"
+        slippery = grid_map_of(layers | {"mu": 0.01 + 0.0 * PRIOR.elevation}, CELL)
+        maps.publish(to_message(grid_map.GridMap, slippery))
+        wait_until(lambda: server.service.known_map is not first, "the second map")
+        assert ask(client)[1]["code"] == "friction"
+        lifted, now = Rigid.from_rpy(0, 0, 1.0, 0, 0, 0), client.get_clock().now().to_msg()
+        tf.publish(tf2.TFMessage(transforms=[transform_message("map", "odom", lifted, now)]))
+        wait_until(lambda: server.frames._tree.knows("odom"), "/tf_static")
+        maps.publish(to_message(grid_map.GridMap, plain, "odom", now))
+        wait_until(lambda: server.service.terrain.elevation.min() > 0.5, "the lifted map")
 
 
 @pytest.fixture
-def robot(client, grid_map_msgs, tf2_msgs):
-    return Robot(client, grid_map_msgs.GridMap, tf2_msgs.TFMessage)
+def offer(monkeypatch):
+    """Return a function that gives a server a GridMap, whose package is not on PyPI."""
+    messages = {}
+    monkeypatch.setattr(map_intake, "read_message", lambda raw, _: messages[raw])
+
+    def offer_map(server, frame="odom"):
+        message = grid_map_of({"elevation": PRIOR.elevation}, CELL, CENTRE)
+        message.header.frame_id = frame
+        messages[bytes([len(messages)])] = move_buffer(message, 5, 3)
+        server._maps._intake.offer(bytes([len(messages) - 1]), type(message))
+
+    return offer_map
 
 
-def test_a_turned_map_in_odom_is_the_same_ground_in_the_map_frame(robot, start_server):
+def test_a_map_is_refused_with_the_reason_until_its_transform_has_come(
+    start_server, client, offer
+):
     server = start_server(transform_timeout=30.0)
-    wait_until(robot.is_heard, "the subscriptions")
-    here = Rigid.from_rpy(12.0, -7.0, 0.4, 0.0, 0.0, 0.7)
-    robot.send_transform(here, is_static=True)
-    wait_until(lambda: server.frames._tree.knows("odom"), "/tf_static")
-    robot.send_map(PRIOR)
+    take = server.frames.take
+    offer(server, frame="")
+    client.wait_for_log(f"{REFUSED}elevation_map is without a frame_id; it must be in 'map'")
+    send_transforms(server, take, ("map", "odom", Rigid.none()), age=100.0)
+    offer(server)
+    client.wait_for_log(f"{REFUSED}the transform from 'odom' to 'map' is stale: it is 10")
+    send_transforms(server, take, ("map", "tilted", Rigid.from_rpy(0, 0, 0, 0.03, 0.04, 0)), age=0)
+    offer(server, frame="tilted")
+    client.wait_for_log(f"{REFUSED}the frame of the map leans by 0.05 rad (roll and pitch)")
+    offer(server, frame="moon")
+    client.wait_for_log(
+        f"{REFUSED}the message is in frame 'moon'; it must be in 'map', or in a frame of /tf or "
+        "sensor_mounts; known are base_link"
+    )
+    assert server.service.terrain is None
+    send_transforms(server, take, ("map", "moon", Rigid.from_rpy(0, 0, 1.0, 0, 0, 0)), age=0)
     wait_until(lambda: server.service.terrain is not None, "the map")
-    found = server.service.terrain
+    right = PRIOR.elevation.astype(np.float32) + 1.0
+    np.testing.assert_allclose(server.service.terrain.elevation, right, atol=1e-12)
+
+
+def test_a_turned_map_in_odom_is_the_same_ground_in_the_map_frame(start_server, offer):
+    server = start_server(transform_timeout=30.0)
+    here = Rigid.from_rpy(12.0, -7.0, 0.4, 0.0, 0.0, 0.7)
+    send_transforms(
+        server, partial(server.frames.take, is_static=True), ("map", "odom", here), age=0.0
+    )
+    offer(server)
+    found = wait_until(lambda: server.service.terrain, "the map")
     rows, columns = np.nonzero(np.isfinite(found.elevation))
     at = np.column_stack([
         found.origin[0] + CELL * columns, found.origin[1] + CELL * rows, 0.0 * rows
@@ -131,41 +113,3 @@ def test_a_turned_map_in_odom_is_the_same_ground_in_the_map_frame(robot, start_s
     right = PRIOR.elevation_at(own[:, 0], own[:, 1]) + 0.4
     np.testing.assert_allclose(found.elevation[rows, columns], right, atol=1e-6)
     assert 0.95 * PRIOR.elevation.size < len(rows) <= PRIOR.elevation.size
-
-
-def test_a_map_whose_transform_is_missing_stale_or_leans_is_refused_with_the_reason(
-    robot, start_server, client
-):
-    server = start_server(transform_timeout=30.0)
-    wait_until(robot.is_heard, "the subscriptions")
-    robot.send_map(PRIOR)
-    client.wait_for_log(
-        f"{REFUSED}the message is in frame 'odom'; it must be in 'map', or in a frame of /tf or "
-        "sensor_mounts; known are base_link"
-    )
-    robot.send_transform(Rigid.none(), age=100.0)
-    wait_until(lambda: server.frames._tree.knows("odom"), "/tf")
-    robot.send_map(PRIOR)
-    client.wait_for_log(f"{REFUSED}the transform from 'odom' to 'map' is stale: it is 10")
-    edge = server.frames._tree._edges["odom"]
-    old = edge.newest
-    robot.send_transform(Rigid.from_rpy(0.0, 0.0, 0.0, 0.03, 0.04, 0.0))
-    wait_until(lambda: edge.newest > old, "/tf")
-    robot.send_map(PRIOR)
-    client.wait_for_log(f"{REFUSED}the frame of the map leans by 0.05 rad (roll and pitch)")
-    robot.send_map(PRIOR, frame="")
-    client.wait_for_log(f"{REFUSED}elevation_map is without a frame_id; it must be in 'map'")
-    assert server.service.terrain is None
-
-
-def test_a_map_that_comes_before_its_transform_is_taken_when_that_has_come(
-    robot, start_server, client
-):
-    server = start_server(transform_timeout=30.0)
-    wait_until(robot.is_heard, "the subscriptions")
-    robot.send_map(PRIOR)
-    client.wait_for_log(f"{REFUSED}the message is in frame 'odom'")
-    robot.send_transform(Rigid.from_rpy(0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    right = PRIOR.elevation.astype(np.float32) + 1.0
-    np.testing.assert_allclose(server.service.terrain.elevation, right, atol=1e-12)

@@ -9,7 +9,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
 from rclpy.node import Node
 
-from msg_adapters.results.hazard_grids import VALUES
+from msg_adapters.results.grids import VALUES
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, waves
@@ -60,29 +60,27 @@ def is_free(grids, *part):
 
 @pytest.fixture
 def mapping(start_server, client):
-    server = start_server(hazard_map=True, hazard_headings=4)
+    server = start_server(hazard_map=True, hazard_headings=2)
     client.send_terrain(make_terrain(waves, half=3.0))
     return server
 
 
-def test_a_late_subscriber_gets_worst_best_and_one_heading(mapping, client, ros):
+def test_a_late_subscriber_gets_the_map_and_a_change_changes_the_grid_around_it(
+    mapping, client, ros
+):
     costmap = ros.spin(Costmap(ros, ("worst", "best", "heading_1")))
     for grids in costmap.grids.values():
         wait_until(lambda grids=grids: is_free(grids), "the whole map", 60.0)
-    grid, terrain = costmap.grids["worst"][-1], mapping.service.terrain
+    worst, best = costmap.grids["worst"], costmap.grids["best"]
+    grid, terrain = worst[-1], mapping.service.terrain
     assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(0.05)
     assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.025)
     assert (grid.info.height, grid.info.width) == terrain.elevation.shape
     assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
     wait_until(
-        lambda: call(costmap.ask, GetMap.Request()).map.data == costmap.grids["worst"][-1].data,
+        lambda: call(costmap.ask, GetMap.Request()).map.data == worst[-1].data,
         "the same map from the service",
     )
-
-
-def test_a_change_of_the_map_changes_the_grid_around_it(mapping, client, ros):
-    costmap = ros.spin(Costmap(ros, ("worst", "best")))
-    worst, best = costmap.grids["worst"], costmap.grids["best"]
     there, away = ((1.5, 2.5), (1.5, 2.5)), ((-2.0, 0.5), (-2.0, 0.5))
     # A grid may be published before all its cells are judged.
     wait_until(lambda: is_free(worst, *away) and is_free(best, *away), "the map", 60.0)

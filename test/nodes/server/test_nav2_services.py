@@ -26,24 +26,17 @@ def ask(server, poses):
     return replies[0]
 
 
-def test_a_passable_path_is_valid_and_has_no_bad_pose(server):
-    server.service.take_terrain(make_terrain(waves))
-    answer = ask(server, [(-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
-    assert answer.is_valid and answer.invalid_pose_indices == []
-
-
-def test_the_poses_behind_a_wall_are_named(server):
+def test_the_poses_of_a_path_that_are_not_passable_are_named(server):
+    answer = ask(server, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])  # there is no map
+    assert not answer.is_valid and answer.invalid_pose_indices == [0, 1]
     server.service.take_terrain(make_terrain(wall_at(0.5)))
+    answer = ask(server, [(-2.0, 0.0, 0.0), (-1.5, 0.0, 0.0), (-1.0, 0.0, 0.0)])
+    assert answer.is_valid and answer.invalid_pose_indices == []
     poses = [(x, 0.0, 0.0) for x in np.arange(-2.0, 0.6, 0.25)]
     answer = ask(server, poses)
     assert not answer.is_valid and answer.invalid_pose_indices
     assert min(answer.invalid_pose_indices) > 4
     assert all(0 <= index < len(poses) for index in answer.invalid_pose_indices)
-
-
-def test_a_path_that_cannot_be_judged_has_only_bad_poses(server):
-    answer = ask(server, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])  # there is no map
-    assert not answer.is_valid and answer.invalid_pose_indices == [0, 1]
 
 
 class GoalHandle:
@@ -77,23 +70,22 @@ def compute(server, start, goal):
     return handle
 
 
-def test_a_path_to_a_pose_is_the_plan_of_can_traverse(server, client, lasting):
+def test_a_path_to_a_pose_is_the_plan_of_can_traverse_and_a_goal_without_one_has_a_code(
+    start_server, client, lasting
+):
+    server, start, goal = start_server(planner="fan"), (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)
+    assert compute(server, start, goal).result.error_code == 201  # no map
     server.service.take_terrain(make_terrain(waves))
-    plan = path_to_poses(client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)), "map")
-    handle = compute(server, (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0))
+    assert compute(server, None, goal).result.error_code == 201  # nobody knows where it is
+    plan = path_to_poses(client.can_traverse(start, goal), "map")
+    handle = compute(server, start, goal)
     assert handle.ends == ["succeeded"] and handle.result.error_code == 0
     np.testing.assert_array_equal(path_to_poses(handle.result.path, "map"), plan)
-    client.send_odometry((-1.0, 0.0, 0.0))
+    client.send_odometry(start)
     wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
-    here = compute(server, None, (1.0, 0.2, 0.0))
+    here = compute(server, None, goal)
     np.testing.assert_allclose(path_to_poses(here.result.path, "map"), plan, atol=1e-9)
-
-
-def test_a_goal_without_a_path_is_aborted_with_a_code(start_server):
-    server = start_server(planner="fan")
-    assert compute(server, (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)).result.error_code == 201  # no map
     server.service.take_terrain(make_terrain(wall_at(0.5)))
-    handle = compute(server, (-1.0, 0.0, 0.0), (1.5, 0.0, 0.0))
+    handle = compute(server, start, (1.5, 0.0, 0.0))
     assert handle.ends == ["aborted"] and handle.result.error_code == NO_VALID_PATH
     assert handle.result.path.poses == []
-    assert compute(server, None, (1.5, 0.0, 0.0)).result.error_code == 201  # nobody knows where

@@ -16,7 +16,7 @@ from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import stamped_pose
 from rover_planner.planning.answering.situation import Situation
-from support.grounds import make_terrain, wall_at, waves
+from support.grounds import gap, make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, verdict_of
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -44,6 +44,10 @@ def working(start_server, client, ros, endless):
         yield server, future
 
 
+def best_effort() -> QoSProfile:
+    return QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
 def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(working, client, ros):
     server, future = working
     assert client.set_parameter("friction", 0.7) == (True, "")
@@ -60,78 +64,12 @@ def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(wor
     assert not call(service, Trigger.Request()).success
 
 
-def test_a_question_keeps_the_map_it_was_asked_about(start_server, client, ros, monkeypatch):
-    server = start_server()
-    client.send_terrain(make_terrain(waves))
-    first = server.service.known_map.fingerprint
-    find, begun, go_on = Situation.answer, threading.Event(), threading.Event()
-
-    def find_later(situation, *asked):
-        begun.set()
-        assert go_on.wait(60.0)
-        return find(situation, *asked)
-
-    monkeypatch.setattr(Situation, "answer", find_later)
-    _, future = begin(ros)
-    assert begun.wait(20.0), "the work on the question"
-    client.send_terrain(make_terrain(wall_at(0.5)))
-    go_on.set()
-    wait_until(future.done, "the answer")
-    assert len(future.result().plan.poses) > 2
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
-    assert verdict["map_hash"] == first != server.service.known_map.fingerprint
-
-
-def test_each_of_two_clients_can_tell_its_own_verdict(mapped, client, ros):
-    requests = [begin(ros, goal=(1.0 + 0.1 * k, 0.0, 0.0)) for k in range(6)]
-    for _, future in requests:
-        wait_until(future.done, "the answers")
-    told = client.heard["verdict"]
-    wait_until(lambda: len(told) == len(requests), "the verdicts")
-    verdicts = [verdict_of({"verdict": one}) for one in told]
-    numbers = [int(verdict["request"]) for verdict in verdicts]
-    assert numbers == sorted(set(numbers))
-    assert len({verdict["server"] for verdict in verdicts}) == 1
-    by_hash = {verdict["question_hash"]: verdict for verdict in verdicts}
-    for request, future in requests:
-        verdict = by_hash[plan_request_hash(request.start, request.goal, request.tolerance)]
-        plan = future.result().plan
-        assert verdict["path_hash"] == path_hash(plan)
-        stamp = f"{plan.header.stamp.sec}.{plan.header.stamp.nanosec:09d}"
-        assert verdict["path_stamp"] == stamp
-
-
 def test_stamps_of_answers_differ_even_while_the_clock_is_paused(start_server, client):
-    server = start_server(use_sim_time=True)
+    server = start_server(use_sim_time=True, planner="fan")
     server.service.take_terrain(make_terrain(waves))
     plans = [client.can_traverse(START, GOAL) for _ in range(3)]
     stamps = [plan.header.stamp.nanosec for plan in plans]
     assert stamps == sorted(set(stamps)) and {plan.header.stamp.sec for plan in plans} == {0}
-
-
-def test_the_log_has_one_line_for_each_new_content(server, client):
-    terrain = make_terrain(waves)
-    client.send_terrain(terrain)
-    for _ in range(3):
-        before = server.service.known_map
-        stamp = server.get_clock().now().to_msg()
-        client.send_cloud(terrain_to_point_cloud(terrain, "map", stamp))
-        wait_until(lambda b=before: server.service.known_map is not b, "the map")
-    other = make_terrain(wall_at(0.5))
-    client.send_cloud(terrain_to_point_cloud(other, "map"))
-    wait_until(lambda: sum("map from" in line for line in client.logs) == 2, "the second line")
-
-
-def test_map_parameters_act_on_the_map_that_is_there(server, client):
-    client.send_terrain(make_terrain(waves))
-    assert server.service.terrain.resolution == pytest.approx(0.05)
-    assert client.set_parameter("map_resolution", 0.1)[0]
-    wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.1), "the new cells")
-
-
-def best_effort() -> QoSProfile:
-    return QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def test_a_best_effort_map_is_heard_where_the_parameter_says_so(start_server, client):
@@ -178,3 +116,69 @@ def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, c
     assert float(values["last latency [ms]"]) > 0.0
     server.guard.report("a test", ZeroDivisionError("made up"))
     assert "ZeroDivisionError" in wait_for(DiagnosticStatus.ERROR).message
+
+
+def test_a_question_keeps_the_map_it_was_asked_about(shared, monkeypatch):
+    server, client = shared.server, shared.client
+    client.heard["verdict"].clear()
+    first = server.service.known_map.fingerprint
+    find, begun, go_on = Situation.answer, threading.Event(), threading.Event()
+
+    def find_later(situation, *asked):
+        begun.set()
+        assert go_on.wait(60.0)
+        return find(situation, *asked)
+
+    monkeypatch.setattr(Situation, "answer", find_later)
+    _, future = begin(shared.ros)
+    assert begun.wait(20.0), "the work on the question"
+    client.send_terrain(make_terrain(wall_at(0.5)))
+    go_on.set()
+    wait_until(future.done, "the answer")
+    assert len(future.result().plan.poses) > 2
+    wait_until(lambda: client.heard["verdict"], "the verdict")
+    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+    assert verdict["map_hash"] == first != server.service.known_map.fingerprint
+
+
+def test_each_client_can_tell_its_own_verdict(shared):
+    client = shared.client
+    client.heard["verdict"].clear()
+    requests = [begin(shared.ros, goal=(1.0 + 0.1 * k, 0.0, 0.0)) for k in range(3)]
+    for _, future in requests:
+        wait_until(future.done, "the answers")
+    told = client.heard["verdict"]
+    wait_until(lambda: len(told) == len(requests), "the verdicts")
+    verdicts = [verdict_of({"verdict": one}) for one in told]
+    numbers = [int(verdict["request"]) for verdict in verdicts]
+    assert numbers == sorted(set(numbers))
+    assert len({verdict["server"] for verdict in verdicts}) == 1
+    by_hash = {verdict["question_hash"]: verdict for verdict in verdicts}
+    for request, future in requests:
+        verdict = by_hash[plan_request_hash(request.start, request.goal, request.tolerance)]
+        plan = future.result().plan
+        assert verdict["path_hash"] == path_hash(plan)
+        stamp = f"{plan.header.stamp.sec}.{plan.header.stamp.nanosec:09d}"
+        assert verdict["path_stamp"] == stamp
+
+
+def test_the_log_has_one_line_for_each_new_content(shared):
+    server, client, terrain = shared.server, shared.client, make_terrain(gap)
+    client.send_terrain(terrain)
+    for _ in range(2):
+        before = server.service.known_map
+        stamp = server.get_clock().now().to_msg()
+        client.send_cloud(terrain_to_point_cloud(terrain, "map", stamp))
+        wait_until(lambda b=before: server.service.known_map is not b, "the map")
+    other = make_terrain(wall_at(0.5))
+    client.send_cloud(terrain_to_point_cloud(other, "map"))
+    wait_until(lambda: sum("map from" in line for line in client.logs) == 2, "the second line")
+
+
+def test_map_parameters_act_on_the_map_that_is_there(shared):
+    server, client = shared.server, shared.client
+    assert server.service.terrain.resolution == pytest.approx(0.05)
+    assert client.set_parameter("map_resolution", 0.1)[0]
+    wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.1), "the new cells")
+    assert client.set_parameter("map_resolution", 0.0)[0]
+    wait_until(lambda: server.service.terrain.resolution == pytest.approx(0.05), "the old ones")

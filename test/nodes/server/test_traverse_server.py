@@ -38,43 +38,12 @@ LISTS = {field.name for field in fields(WaypointLists)}
 AHEAD = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
 
 
-def test_a_passable_goal_gets_a_plan_of_settled_poses_and_the_results_of_the_model(mapped, client):
-    plan, verdict, results = ask(client)
-    assert verdict["traversable"] == "true" and verdict["reason"] == ""
-    assert verdict["traversability_class"] == PASSABLE and not LISTS & verdict.keys()
-    poses = path_to_poses(plan, "map")
-    np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-9)
-    spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    assert spacing.max() <= 0.12 and spacing[:-1].min() >= 0.08
-    heights = [pose.pose.position.z for pose in plan.poses]
-    ground = mapped.service.terrain.elevation_at(poses[:, 0], poses[:, 1])
-    assert np.all(np.abs(heights - ground - 0.3) < 0.1)
-    expected = mapped.service.answer(np.array(START), np.array(GOAL)).candidate.prediction
-    for topic, field in WHEEL_TOPICS.items():
-        np.testing.assert_array_equal(array_values(results[topic]), getattr(expected, field))
-    assert float(verdict["energy"]) == pytest.approx(expected.energy[-1])
+def check(client, server, poses=AHEAD) -> dict:
+    return json.loads(client.check_poses(server, poses).message)
 
 
-def test_all_results_of_a_path_share_stamp_frame_and_waypoints(mapped, client):
-    plan, verdict, results = ask(client)
-    headers = [results[topic].header for topic in ("plan", "predicted_joints", "verdict")]
-    headers += [marker.header for marker in results["markers"].markers]
-    headers += [pose.header for pose in plan.poses]
-    assert all(header == plan.header for header in headers)
-    assert plan.header.frame_id == "map" and plan.header.stamp.sec > 0
-    waypoints = int(verdict["waypoints"])
-    shapes = dict.fromkeys(WHEEL_TOPICS, ("wheel", 6))
-    for topic, (label, size) in (shapes | {"tip_over_margin": ("measure", len(MEASURES))}).items():
-        assert [dim.label for dim in results[topic].layout.dim] == ["waypoint", label]
-        assert array_values(results[topic]).shape == (waypoints, size)
-    joints = results["predicted_joints"]
-    assert tuple(joints.joint_names) == JOINTS + steering_joints(load_rover("lsr1"))
-    assert len(joints.points) == waypoints
-    last = joints.points[-1].time_from_start
-    assert last.sec + last.nanosec * 1e-9 == pytest.approx(float(verdict["time"]), abs=1e-6)
-
-
-def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(server, ros):
+def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(start_server, ros):
+    server = start_server(planner="fan")
     server.service.take_terrain(make_terrain(waves))
     asker = ros.spin(Node("asker", context=ros.context))
     client = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
@@ -98,74 +67,11 @@ def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(server, ro
     wait_until(heard_all, "all results of the last answer")
 
 
-def test_a_wall_is_refused_for_a_physical_reason(start_server, client):
-    start_server(planner="fan")
-    client.send_terrain(make_terrain(wall_at(0.5)))
-    plan, verdict, results = ask(client)
-    assert plan.poses == [] and results["plan"].poses == []
-    assert verdict["traversable"] == "false" and verdict["reason"]
-    assert verdict["code"] not in ("", "off_map", "unknown_ground", "bad_request")
-    assert -0.5 < json.loads(verdict["failure_pose"])[0] < 0.6
-    namespaces = [marker.ns for marker in results["markers"].markers]
-    assert "failing_pose" in namespaces and "reason" in namespaces
-
-
 def test_a_map_published_before_the_server_came_is_heard(client, start_server):
     publisher = client.create_publisher(PointCloud2, "elevation_cloud", map_qos())
     publisher.publish(terrain_to_point_cloud(make_terrain(waves), "map"))
     server = start_server()
     wait_until(lambda: server.service.terrain is not None, "the map")
-
-
-def test_a_map_from_a_volatile_publisher_is_heard(server, client):
-    publisher = client.create_publisher(
-        PointCloud2, "elevation_cloud", map_qos(DurabilityPolicy.VOLATILE)
-    )
-    wait_until(lambda: publisher.get_subscription_count() > 0, "the subscription")
-    publisher.publish(terrain_to_point_cloud(make_terrain(waves), "map"))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-
-
-def check(client, server, poses=AHEAD) -> dict:
-    return json.loads(client.check_poses(server, poses).message)
-
-
-def test_check_path_answers_in_json_with_all_results(mapped, client):
-    answer, results = client.next_results(lambda: client.check_poses(mapped, AHEAD))
-    verdict = json.loads(answer.message)
-    assert answer.success and verdict["traversable"] and verdict["first_failure"] == -1
-    assert verdict["length"] == pytest.approx(2.0) and verdict["waypoints"] == 101
-    assert verdict["traversability_class"] == PASSABLE and verdict["class_reason"] == ""
-    assert verdict["class_margin"] == pytest.approx(min(verdict["class_margins"]))
-    assert verdict["class_margin"] == verdict["class_margins"][verdict["class_waypoint"]]
-    assert {len(verdict[key]) for key in LISTS} == {101}
-    assert len(results["plan"].poses) == 21
-    assert results["verdict"].status[0].level == DiagnosticStatus.OK
-
-
-def test_check_path_says_why_not(mapped, client):
-    verdict = check(client, mapped, [[3.0, 0.0, 0.0], [6.0, 0.0, 0.0]])
-    assert verdict["traversable"] is False and verdict["code"] == "off_map" and verdict["reason"]
-    assert 3.0 <= verdict["failure_pose"][0] < 4.0
-    found = verdict["traversability_class"], verdict["class_constraint"], verdict["class_waypoint"]
-    assert found == (IMPASSABLE, "off_map", verdict["first_failure"])
-    assert verdict["class_margin"] is None and verdict["class_wheel"] == ""
-
-
-def test_the_class_is_named_and_drawn_whichever_policy_is_assumed(server, client):
-    client.send_terrain(make_terrain(lambda x, y: 0.45 * x))  # 24 degrees: servos climb it
-    for policy, traversable in (("equal", False), ("servo", True), ("optimal", True)):
-        assert client.set_parameter("policy", policy)[0]
-        answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))
-        verdict = json.loads(answer.message)
-        assert verdict["traversable"] == traversable and verdict["policy"] == policy
-        assert verdict["traversability_class"] == WITH_SPEED_SERVOS
-        assert verdict["class_constraint"] == "friction" and verdict["class_wheel"] in WHEELS
-        assert 0.0 < verdict["class_margin"] < 1.0
-        assert set(verdict["traversability_classes"]) == {WITH_SPEED_SERVOS}
-    line = next(marker for marker in results["markers"].markers if marker.ns == "path")
-    (drawn,) = {(colour.r, colour.g, colour.b) for colour in line.colors}
-    assert drawn == pytest.approx((LIME.r, LIME.g, LIME.b))
 
 
 def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
@@ -180,20 +86,6 @@ def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
     np.testing.assert_allclose(found, -1.5 + 0.02 * changes, atol=1e-9)
 
 
-def test_soil_and_payload_of_the_server_count(mapped, client):
-    def judge():
-        answer, results = client.next_results(lambda: client.check_poses(mapped, AHEAD))
-        return json.loads(answer.message), float(np.sum(results["wheel_loads"].data[:6]))
-
-    firm, light = judge()
-    assert client.set_parameter("soil", "dry_sand") == (True, "")
-    assert client.set_parameter("payload", 2.0) == (True, "")
-    sandy, heavy = judge()
-    assert firm["max_sinkage"] == 0.0 and sandy["max_sinkage"] > 0.001
-    assert sandy["energy"] > 2.0 * firm["energy"]
-    assert heavy == pytest.approx(light + 2.0 * 9.81, rel=0.01)
-
-
 def test_a_terrain_file_is_loaded_by_its_url(server, client, tmp_path):
     terrain, file = make_terrain(gap), tmp_path / "some terrain.npz"
     save_terrain(file, terrain)
@@ -206,13 +98,121 @@ def test_a_terrain_file_is_loaded_by_its_url(server, client, tmp_path):
     np.testing.assert_array_equal(server.service.terrain.elevation, terrain.elevation)
 
 
-def test_the_measured_suspension_raises_a_warning_where_it_disagrees(mapped, client, lasting):
+def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp(shared):
+    plan, verdict, results = ask(shared.client)
+    assert verdict["traversable"] == "true" and verdict["reason"] == ""
+    assert verdict["traversability_class"] == PASSABLE and not LISTS & verdict.keys()
+    poses = path_to_poses(plan, "map")
+    np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-9)
+    spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    assert spacing.max() <= 0.12 and spacing[:-1].min() >= 0.08
+    heights = [pose.pose.position.z for pose in plan.poses]
+    service = shared.server.service
+    ground = service.terrain.elevation_at(poses[:, 0], poses[:, 1])
+    assert np.all(np.abs(heights - ground - 0.3) < 0.1)
+    expected = service.answer(np.array(START), np.array(GOAL)).candidate.prediction
+    for topic, field in WHEEL_TOPICS.items():
+        np.testing.assert_array_equal(array_values(results[topic]), getattr(expected, field))
+        assert [dim.label for dim in results[topic].layout.dim] == ["waypoint", "wheel"]
+    assert float(verdict["energy"]) == pytest.approx(expected.energy[-1])
+    headers = [results[topic].header for topic in ("plan", "predicted_joints", "verdict")]
+    headers += [marker.header for marker in results["markers"].markers]
+    headers += [pose.header for pose in plan.poses]
+    assert all(header == plan.header for header in headers)
+    assert plan.header.frame_id == "map" and plan.header.stamp.sec > 0
+    joints, waypoints = results["predicted_joints"], int(verdict["waypoints"])
+    assert array_values(results["tip_over_margin"]).shape == (waypoints, len(MEASURES))
+    assert tuple(joints.joint_names) == JOINTS + steering_joints(load_rover("lsr1"))
+    assert len(joints.points) == waypoints
+    last = joints.points[-1].time_from_start
+    assert last.sec + last.nanosec * 1e-9 == pytest.approx(float(verdict["time"]), abs=1e-6)
+
+
+def test_a_wall_is_refused_for_a_physical_reason(shared):
+    shared.client.send_terrain(make_terrain(wall_at(0.5)))
+    plan, verdict, results = ask(shared.client)
+    assert plan.poses == [] and results["plan"].poses == []
+    assert verdict["traversable"] == "false" and verdict["reason"]
+    assert verdict["code"] not in ("", "off_map", "unknown_ground", "bad_request")
+    assert -0.5 < json.loads(verdict["failure_pose"])[0] < 0.6
+    namespaces = [marker.ns for marker in results["markers"].markers]
+    assert "failing_pose" in namespaces and "reason" in namespaces
+
+
+def test_a_map_from_a_volatile_publisher_is_heard(shared):
+    publisher = shared.client.create_publisher(
+        PointCloud2, "elevation_cloud", map_qos(DurabilityPolicy.VOLATILE)
+    )
+    wait_until(lambda: publisher.get_subscription_count() > 0, "the subscription")
+    publisher.publish(terrain_to_point_cloud(make_terrain(gap), "map"))
+    shared.client.wait_for_log("map from elevation_cloud")
+
+
+def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):
+    server, client = shared.server, shared.client
+    answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))
+    verdict = json.loads(answer.message)
+    assert answer.success and verdict["traversable"] and verdict["first_failure"] == -1
+    assert verdict["length"] == pytest.approx(2.0) and verdict["waypoints"] == 101
+    assert verdict["traversability_class"] == PASSABLE and verdict["class_reason"] == ""
+    assert verdict["class_margin"] == pytest.approx(min(verdict["class_margins"]))
+    assert verdict["class_margin"] == verdict["class_margins"][verdict["class_waypoint"]]
+    assert {len(verdict[key]) for key in LISTS} == {101}
+    assert len(results["plan"].poses) == 21
+    assert results["verdict"].status[0].level == DiagnosticStatus.OK
+
+    verdict = check(client, server, [[3.0, 0.0, 0.0], [6.0, 0.0, 0.0]])
+    assert verdict["traversable"] is False and verdict["code"] == "off_map" and verdict["reason"]
+    assert 3.0 <= verdict["failure_pose"][0] < 4.0
+    found = verdict["traversability_class"], verdict["class_constraint"], verdict["class_waypoint"]
+    assert found == (IMPASSABLE, "off_map", verdict["first_failure"])
+    assert verdict["class_margin"] is None and verdict["class_wheel"] == ""
+
+
+def test_the_class_is_named_and_drawn_whichever_policy_is_assumed(shared):
+    server, client = shared.server, shared.client
+    client.send_terrain(make_terrain(lambda x, y: 0.45 * x))  # 24 degrees: servos climb it
+    for policy, traversable in (("equal", False), ("servo", True), ("optimal", True)):
+        assert client.set_parameter("policy", policy)[0]
+        answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))
+        verdict = json.loads(answer.message)
+        assert verdict["traversable"] == traversable and verdict["policy"] == policy
+        assert verdict["traversability_class"] == WITH_SPEED_SERVOS
+        assert verdict["class_constraint"] == "friction" and verdict["class_wheel"] in WHEELS
+        assert 0.0 < verdict["class_margin"] < 1.0
+        assert set(verdict["traversability_classes"]) == {WITH_SPEED_SERVOS}
+    assert client.set_parameter("policy", "equal")[0]
+    line = next(marker for marker in results["markers"].markers if marker.ns == "path")
+    (drawn,) = {(colour.r, colour.g, colour.b) for colour in line.colors}
+    assert drawn == pytest.approx((LIME.r, LIME.g, LIME.b))
+
+
+def test_soil_and_payload_of_the_server_count(shared):
+    client = shared.client
+
+    def judge():
+        answer, results = client.next_results(lambda: client.check_poses(shared.server, AHEAD))
+        return json.loads(answer.message), float(np.sum(results["wheel_loads"].data[:6]))
+
+    firm, light = judge()
+    assert client.set_parameter("soil", "dry_sand") == (True, "")
+    assert client.set_parameter("payload", 2.0) == (True, "")
+    sandy, heavy = judge()
+    assert client.set_parameter("soil", "") == (True, "")
+    assert client.set_parameter("payload", -1.0) == (True, "")
+    assert firm["max_sinkage"] == 0.0 and sandy["max_sinkage"] > 0.001
+    assert sandy["energy"] > 2.0 * firm["energy"]
+    assert heavy == pytest.approx(light + 2.0 * 9.81, rel=0.01)
+
+
+def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, lasting):
+    server, client = shared.server, shared.client
     client.send_joints(["camera", "rocker_left"], [math.nan, 0.5])
-    wait_until(lambda: mapped.service.joints, "the joints")
+    wait_until(lambda: server.service.joints, "the joints")
     client.send_odometry((-0.5, 0.0, 0.0))
-    standing = mapped.service.situation
+    standing = server.service.situation
     wait_until(lambda: standing().measured_pose is not None, "the odometry")
-    answer, results = client.next_results(lambda: client.check_poses(mapped, AHEAD))
+    answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))
     verdict = json.loads(answer.message)
     assert answer.success and not verdict["suspension_agrees"]
     assert verdict["suspension_mismatch"]["rocker_left"] == pytest.approx(0.5, abs=0.05)

@@ -8,7 +8,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
 from msg_adapters.paths import path_to_poses
-from msg_adapters.results.closed_areas import NOT_REACHED, REACHED
+from msg_adapters.results.grids import NOT_REACHED, REACHED
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import SERVER, ask
@@ -27,15 +27,15 @@ def wall_with_gap(x, y):
 
 
 def pen(x, y):
-    """Return waves with a wall of 1 m around a square of 4 m."""
+    """Return waves with a wall of 1 m around a square of 2.6 m."""
     edge = np.maximum(np.abs(x), np.abs(y))
-    return waves(x, y) + np.where(np.abs(edge - 2.0) < 0.1, 1.0, 0.0)
+    return waves(x, y) + np.where(np.abs(edge - 1.3) < 0.1, 1.0, 0.0)
 
 
 def test_where_all_candidates_are_refused_a_path_around_is_the_plan_which_passes(
     start_server, client
 ):
-    server = start_server(**LONG)
+    server = start_server(waypoint_spacing=0.05, candidate_count=3, **LONG)
     client.send_terrain(make_terrain(wall_with_gap))
     plan, verdict, results = ask(client, start=START, goal=GOAL)
     assert verdict["traversable"] == "true" and verdict["code"] == ""
@@ -49,7 +49,7 @@ def test_where_all_candidates_are_refused_a_path_around_is_the_plan_which_passes
 
 
 def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_server, client):
-    start_server(lattice_cell=0.4, **LONG)
+    start_server(lattice_cell=0.4, waypoint_spacing=0.05, candidate_count=1, **LONG)
     client.send_terrain(make_terrain(pen))
     assert client.set_parameter("search_budget", 0.05) == (True, "")
     _, verdict, _ = ask(client, start=INSIDE, goal=BEYOND)
@@ -65,10 +65,10 @@ def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_ser
     assert len(rows) > 0 and set(np.unique(values)) == {REACHED, NOT_REACHED}
     resolution, origin = grid.info.resolution, grid.info.origin.position
     for values, first in ((columns, origin.x), (rows, origin.y)):
-        assert np.abs(first + resolution * (values + 0.5)).max() < 2.1
+        assert np.abs(first + resolution * (values + 0.5)).max() < 1.4
 
 
-@pytest.mark.slow
+@pytest.mark.long  # the search alone is held by test/planning/answering
 def test_a_search_tells_of_its_progress_and_goes_on_with_a_newer_map(start_server, client):
     start_server(lattice_cell=0.06, **LONG)  # so that it takes long
     reports, plans = [], []

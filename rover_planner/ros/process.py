@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts ROS where no log file can be written, and says what a node has to do without a disk."""
+"""What a node's process asks of the system: a log file, cached kernels, real-time priority."""
 
+import ctypes
 import os
 import sys
 import tempfile
@@ -11,21 +12,22 @@ from typing import Any
 import rclpy
 
 from rover_physics.numerics.kernel_cache import kernel_cache_note
-from rover_planner.ros.realtime import avoid_huge_pages
 
+THREADS = Path("/proc/self/task")
+_PR_SET_THP_DISABLE = 41
 NO_LOG_FILE = ["--ros-args", "--disable-external-lib-logs"]
 """Arguments that keep ROS from writing a log file, without which it does not start."""
 
 
-def init_ros(words: Sequence[str] | None, **options: Any) -> None:
+def init_ros(argv: Sequence[str] | None, **options: Any) -> None:
     """Initialise ROS; on a full or read-only disk without a log file.
 
     Args:
-        words: Arguments of the program; None takes those of the process.
+        argv: Arguments of the program; None takes those of the process.
         options: Further arguments of `rclpy.init`.
     """
     avoid_huge_pages()
-    arguments = sys.argv if words is None else list(words)
+    arguments = sys.argv if argv is None else list(argv)
     rclpy.init(args=[*arguments, *(NO_LOG_FILE if log_fault() else [])], **options)
 
 
@@ -58,3 +60,36 @@ def log_folder() -> Path:
         return Path(told).expanduser()
     home = os.environ.get("ROS_HOME") or str(Path(os.environ.get("HOME") or "/", ".ros"))
     return Path(home).expanduser() / "log"
+
+
+def avoid_huge_pages() -> None:
+    """Keep Linux from collecting the memory of this process into huge pages.
+
+    Its thread khugepaged looks through the processes that want huge pages, as large NumPy arrays
+    do. It keeps a processor for 5 to 6 ms at a time, and no real-time priority ends that.
+    """
+    prctl = getattr(ctypes.CDLL(None), "prctl", None)
+    if prctl is not None:
+        prctl(_PR_SET_THP_DISABLE, 1, 0, 0, 0)
+
+
+def take_priority(priority: int) -> str:
+    """Set the real-time priority (SCHED_FIFO) of all threads of this process.
+
+    Args:
+        priority: 1 to 99 as in sched(7); 0 changes nothing.
+
+    Returns:
+        The reason why it was not granted, empty if it was granted.
+    """
+    if priority == 0:
+        return ""
+    try:
+        for thread in THREADS.iterdir():
+            os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))
+    except (OSError, AttributeError) as error:
+        return (
+            f"realtime_priority {priority} is not granted ({error}); it needs CAP_SYS_NICE or an "
+            "rtprio of that much in /etc/security/limits.conf"
+        )
+    return ""

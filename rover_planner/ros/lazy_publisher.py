@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A publisher whose last message reaches late subscribers, and no message that is out of date."""
+"""A publisher that makes messages only for subscribers, and of which nobody hears an old one."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -12,11 +13,12 @@ from rclpy.qos import QoSProfile
 from rover_planner.ros.qos import latched_qos
 
 
-class LatchedPublisher:
-    """Publishes messages that late subscribers get, until they are withdrawn.
+class LazyPublisher:
+    """Publishes messages to subscribers; without any, keeps the function that makes the latest.
 
-    DDS keeps what was published. Where a newer message is not published because nobody listens,
-    the old one must go, or `ros2 topic echo --once` shows an answer to an earlier question.
+    DDS keeps what was published for late subscribers. Where a newer message is not published
+    because nobody listens, the old one must go, or `ros2 topic echo --once` shows an answer to an
+    earlier question.
     """
 
     def __init__(self, node: Node, kind: type, name: str, qos: QoSProfile | None = None):
@@ -28,6 +30,7 @@ class LatchedPublisher:
             node.create_publisher, kind, name, qos or latched_qos(), event_callbacks=silent
         )
         self._publisher: Publisher = self._create()
+        self._make: Callable[[], Any] | None = None
         self._holds = False
 
     @property
@@ -35,8 +38,27 @@ class LatchedPublisher:
         """Whether there is a subscriber."""
         return self._publisher.get_subscription_count() > 0
 
-    def publish(self, message: Any) -> None:
-        """Publish a message."""
+    @property
+    def is_awaited(self) -> bool:
+        """Whether a subscriber has not received the latest message."""
+        return self._make is not None and self.has_listeners
+
+    def publish(self, make: Callable[[], Any]) -> None:
+        """Publish the message that `make` returns, now or when the first subscriber arrives."""
+        self._make = make
+        self.catch_up()
+        if self._make is not None:
+            self.withdraw()
+
+    def catch_up(self) -> None:
+        """Publish the latest message if a subscriber waits for it."""
+        make = self._make
+        if make is not None and self.has_listeners:
+            self._make = None
+            self.send(make())
+
+    def send(self, message: Any) -> None:
+        """Publish a message that is made, whether or not there is a subscriber."""
         self._holds = True
         self._publisher.publish(message)
 

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Logs when a condition begins and when it ends, never each time that it is looked at."""
+"""Decides what is worth a line in the log: changes that last, and refusals that come again."""
 
 import math
+import re
 from dataclasses import dataclass
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 QUIET_TIME = 1.0
 """Shortest time between two lines about the same condition [s]."""
+REPEAT_PERIOD = 10.0
+"""Time between two log lines about refusals of one kind [s]."""
+NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 @dataclass
@@ -57,3 +61,25 @@ class TransitionLog:
             self._logger.info(end)
         else:
             self._logger.info(f"{end}; it was for less than {QUIET_TIME:g} s: {condition.passed}")
+
+
+class RepeatLog:
+    """Knows when each kind of text was logged last; texts that differ in numbers are one kind."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, float] = {}
+        self._left_out: dict[str, int] = {}
+
+    def line(self, text: str, now: float) -> str:
+        """Return what to log for a text at a monotonic time [s]; empty for nothing.
+
+        The line also counts the texts of its kind that were left out since the one before.
+        """
+        kind = NUMBER.sub("#", text)
+        if now - self._told.get(kind, -REPEAT_PERIOD) < REPEAT_PERIOD:
+            self._left_out[kind] = self._left_out.get(kind, 0) + 1
+            return ""
+        self._told = {one: at for one, at in self._told.items() if now - at < REPEAT_PERIOD}
+        self._told[kind] = now
+        count = self._left_out.pop(kind, 0)
+        return f"{text} ({count} more since the last line)" if count else text

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes values of cells as occupancy grids: known ground, classes, areas that were reached."""
+
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import OccupancyGrid
+from numpy.typing import NDArray
+
+from rover_physics.terrain.grid import Terrain
+
+REACHED, NOT_REACHED = 0, 100
+"""Values of places inside and outside of an area."""
+VALUES = (0, 33, 66, 100)
+"""Values of the classes 0 to 3: passable, with speed servos, with traction control, impassable."""
+UNKNOWN = -1
+"""Value of cells whose class, a negative number, is unknown, and of unknown ground."""
+_TABLE = np.array([*VALUES, UNKNOWN], np.int8)
+
+
+def occupancy_grid(
+    values: NDArray[np.int8], cell: float, first: tuple[float, float], frame: str, stamp: Any
+) -> OccupancyGrid:
+    """Return values (rows, columns), row 0 at the smallest y, as an occupancy grid.
+
+    Args:
+        values: -1 to 100.
+        cell: Cell size [m].
+        first: x, y of the centre of cell [0, 0] [m], map frame; the grid has that of its corner.
+        frame: Frame of the map.
+        stamp: builtin_interfaces/Time.
+    """
+    message = empty_grid(frame, stamp)
+    message.info.map_load_time = stamp
+    message.info.resolution = float(cell)
+    message.info.height, message.info.width = values.shape
+    message.info.origin.position.x = first[0] - 0.5 * cell
+    message.info.origin.position.y = first[1] - 0.5 * cell
+    message.info.origin.orientation.w = 1.0
+    message.data.frombytes(np.ascontiguousarray(values, np.int8).tobytes())
+    return message
+
+
+def empty_grid(frame: str, stamp: Any) -> OccupancyGrid:
+    """Return a grid without cells, such as that of an area that was not searched."""
+    message = OccupancyGrid()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    return message
+
+
+def area_to_grid(
+    places: NDArray[np.bool_], cell: float, first: tuple[float, float], frame: str, stamp: Any
+) -> OccupancyGrid:
+    """Return an area as a grid: REACHED where `places` (rows, columns) is True, else NOT_REACHED.
+
+    The rest is as for `occupancy_grid`; a cell is a place.
+    """
+    values = np.where(places, REACHED, NOT_REACHED).astype(np.int8)
+    return occupancy_grid(values, cell, first, frame, stamp)
+
+
+def classes_to_grid(
+    classes: NDArray[np.int8], cell: float, first: tuple[float, float], frame: str, stamp: Any
+) -> OccupancyGrid:
+    """Return traversability classes (ny, nx), -1 where unknown, as a grid of VALUES and UNKNOWN.
+
+    The rest is as for `occupancy_grid`.
+    """
+    values = _TABLE[classes]  # -1 is the last of the table
+    return occupancy_grid(values, cell, first, frame, stamp)
+
+
+def terrain_to_occupancy_grid(terrain: Terrain, frame_id: str, stamp: Any) -> OccupancyGrid:
+    """Convert a terrain into a grid of known (0) and unknown (-1) cells."""
+    values = np.where(np.isnan(terrain.elevation), UNKNOWN, 0).astype(np.int8)
+    return occupancy_grid(values, terrain.resolution, terrain.origin, frame_id, stamp)

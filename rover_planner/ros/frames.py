@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Brings poses of messages to the map frame and to the body, and knows where sensors were."""
+
+import copy
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from geometry_msgs.msg import Pose, PoseStamped, TransformStamped
+from nav_msgs.msg import Odometry, Path
+from numpy.typing import NDArray
+
+from msg_adapters.frames import check_frame, read_transform
+from msg_adapters.paths import pose_to_array
+from msg_adapters.stamps import stamp_to_ns
+from rover_planner.planning.navigation.rigid_poses import move_path, read_pose, write_pose
+from rover_planner.planning.navigation.sensor_mounts import SensorPoses
+from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
+
+
+class FrameParameters(Protocol):
+    """What those who know frames have as parameters."""
+
+    @property
+    def map_frame(self) -> str:
+        """Frame of the map."""
+
+    @property
+    def base_frame(self) -> str:
+        """Frame of the robot."""
+
+    @property
+    def base_offset(self) -> tuple[float, ...]:
+        """(6,) x, y, z [m], roll, pitch, yaw [rad] of the body in the frame of the robot."""
+
+    @property
+    def transform_timeout(self) -> float:
+        """Age from which a transform is refused [s]."""
+
+
+class Frames:
+    """Knows frames by transforms, and sensors by mounts and odometry too; any thread may ask.
+
+    Messages in the map frame, about a body without offset, are passed on as they are.
+    """
+
+    silence = ""
+    """Why transforms are not heard, to be added to a refusal."""
+
+    def __init__(
+        self,
+        parameters: FrameParameters,
+        now: Callable[[], int],
+        sensors: SensorPoses | None = None,
+    ):
+        """Know only the frame of the map.
+
+        Args:
+            parameters: Names of frames, offset and timeout.
+            now: Returns the present time [ns].
+            sensors: The mounts; None knows where sensors are by transforms alone.
+        """
+        self._map, self._base = parameters.map_frame, parameters.base_frame
+        self._now, self._sensors = now, sensors
+        self._tree = TransformTree(parameters.transform_timeout)
+        offset = parameters.base_offset
+        self._offset = Rigid.from_rpy(*offset) if any(offset) else None
+
+    def apply_timeout(self, timeout: float) -> None:
+        """Take the age from which transforms, and odometry for clouds, are refused [s]."""
+        self._tree.timeout = timeout
+        if self._sensors is not None:
+            self._sensors.timeout = timeout
+
+    def take_transform(self, transform: TransformStamped, *, is_static: bool) -> None:
+        """Take a transform of /tf or /tf_static.
+
+        Raises:
+            MessageError: It is none.
+        """
+        at = read_transform(transform)
+        self._tree.take(at.parent, at.child, at.stamp, Rigid.of(at), is_static=is_static)
+
+    def take_odometry(self, odometry: Odometry) -> None:
+        """Keep the pose of the body that odometry in the map frame tells, for the sensors."""
+        assert self._sensors is not None
+        stamp, robot = stamp_to_ns(odometry.header.stamp), read_pose(odometry.pose.pose)
+        if self._offset is not None:
+            robot = robot.then(self._offset.inverse())
+        self._sensors.take(robot, self._now() if stamp is None else stamp)
+
+    def find(self, frame: str, stamp: int | None) -> Rigid:
+        """Return where a frame is in the map frame at a time [ns]; None is the newest.
+
+        Raises:
+            TransformError: As `SensorPoses.find`, else as `TransformTree.find`, with `silence`.
+        """
+        try:
+            if self._sensors is not None:
+                return self._sensors.find(frame, stamp, self._now(), self._tree)
+            return self._tree.find(self._map, frame, stamp, self._now())
+        except TransformError as error:
+            raise TransformError(f"{error}{self.silence}") from None
+
+    def find_source(self, frame: str, stamp: int | None, what: str) -> Rigid | None:
+        """Return where the frame of a message is in that of the map; None if it is that.
+
+        Raises:
+            MessageError: The message, `what` in the text, names no frame.
+            TransformError: As `find`.
+        """
+        if frame in ("", self._map):
+            check_frame(frame, self._map, what)
+            return None
+        return self.find(frame, stamp)
+
+    def find_here(self) -> NDArray[np.float64] | None:
+        """Return (3,) x, y [m], yaw [rad] of the body on the map by /tf; None without /tf.
+
+        Raises:
+            TransformError: The transform is stale, or does not lead to the map frame.
+        """
+        if not self._tree.has_parent(self._base):
+            return None
+        robot = self._tree.find(self._map, self._base, None, self._now())
+        return self._to_body(robot).xyyaw
+
+    def place_level(self, pose: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return x, y [m], yaw [rad] of the body where the robot is level at such a pose."""
+        if self._offset is None:
+            return pose
+        x, y, yaw = pose
+        found = self._to_body(Rigid.from_rpy(x, y, 0.0, 0.0, 0.0, yaw)).xyyaw.tolist()
+        return found[0], found[1], found[2]
+
+    def localise(self, stamped: PoseStamped, what: str) -> PoseStamped:
+        """Return a pose of the robot as one of the body in the map frame.
+
+        A pose in a frame that no transform has is returned as it is, for others to refuse.
+
+        Raises:
+            MessageError: The pose is not finite, or no unit quaternion.
+            TransformError: As `TransformTree.find`.
+        """
+        frame = stamped.header.frame_id
+        is_here = frame == self._map or not self._tree.knows(frame)
+        if is_here and self._offset is None:
+            return stamped
+        pose_to_array(stamped.pose, what)  # refuses what is no pose
+        rigid = read_pose(stamped.pose)
+        if not is_here:
+            stamp = stamp_to_ns(stamped.header.stamp)
+            rigid = self._tree.find(self._map, frame, stamp, self._now()).then(rigid)
+        moved = PoseStamped(pose=Pose())
+        write_pose(self._to_body(rigid), moved.pose)
+        moved.header.stamp = stamped.header.stamp
+        moved.header.frame_id = frame if is_here else self._map
+        return moved
+
+    def localise_path(self, path: Path) -> Path:
+        """Return a path of the robot as one of the body in the map frame; see `localise`."""
+        frame = path.header.frame_id
+        if self._offset is None and (frame == self._map or not self._tree.knows(frame)):
+            return path
+        moved = Path(header=copy.deepcopy(path.header))
+        for index, pose in enumerate(path.poses):
+            own = PoseStamped(header=pose.header, pose=pose.pose)
+            if not own.header.frame_id:
+                own.header = path.header
+            moved.poses.append(self.localise(own, f"path pose {index}"))
+        if moved.poses:
+            moved.header.frame_id = moved.poses[0].header.frame_id
+        return moved
+
+    def localise_odometry(self, odometry: Odometry) -> Odometry:
+        """Return odometry of the body in the map frame; see `localise`."""
+        here = PoseStamped(header=odometry.header, pose=odometry.pose.pose)
+        moved = self.localise(here, "odometry")
+        if moved is here:
+            return odometry
+        result = Odometry(header=moved.header, child_frame_id=odometry.child_frame_id)
+        result.pose.pose, result.pose.covariance = moved.pose, odometry.pose.covariance
+        return result
+
+    def to_base(self, path: Path) -> Path:
+        """Change a path of the body into one of the robot, in place, and return it."""
+        moved: Path = move_path(path, None if self._offset is None else self._offset.inverse())
+        return moved
+
+    def _to_body(self, robot: Rigid) -> Rigid:
+        return robot if self._offset is None else robot.then(self._offset)
+
+
+def is_empty(stamped: PoseStamped) -> bool:
+    """Return whether a pose was left empty: no frame, all zero, which means "where I am"."""
+    place, turn = stamped.pose.position, stamped.pose.orientation
+    rest = place.x, place.y, place.z, turn.x, turn.y, turn.z
+    return not stamped.header.frame_id and not any(rest) and turn.w in (0.0, 1.0)

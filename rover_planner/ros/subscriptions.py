@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions that tell of publishers they cannot hear, with the parameter that mends it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import QoSPolicyKind, QoSProfile
+
+from rover_planner.ros.qos import (
+    HEAR_BEST_EFFORT,
+    map_subscriptions,
+    replace_reliability,
+    topic_qos,
+)
+
+PERIOD = 1.0
+"""Time between two looks at the types of publishers [s]."""
+
+
+def subscribe_to_requests(
+    node: Node, kind: type, name: str, take: Callable[[Any], None], reliability: str
+) -> None:
+    """Subscribe to a topic of requests, such as paths.
+
+    Args:
+        node: The node.
+        kind: Type of the messages.
+        name: Name of the topic.
+        take: Called with each message; it must not raise.
+        reliability: One of `RELIABILITIES`.
+    """
+    qos = replace_reliability(topic_qos(), reliability)
+    _subscribe(node, kind, name, take, qos, HEAR_BEST_EFFORT)
+
+
+def subscribe_to_map(
+    node: Node,
+    kind: type,
+    name: str,
+    take: Callable[[bytes], object],
+    durability: str,
+    reliability: str,
+) -> None:
+    """Subscribe to a topic of maps, whose messages `take` gets as bytes, perhaps twice.
+
+    The rest is as for `subscribe_to_requests`; `durability` is one of `MAP_DURABILITIES`.
+    """
+    for qos, mends in map_subscriptions(durability, reliability):
+        _subscribe(node, kind, name, take, qos, mends, raw=True)
+
+
+def _subscribe(
+    node: Node,
+    kind: type,
+    name: str,
+    take: Callable[[Any], object],
+    qos: QoSProfile,
+    mends: Mapping[QoSPolicyKind, str],
+    *,
+    raw: bool = False,
+) -> None:
+    """Subscribe, and warn of mismatches of the kinds in `mends`; others are expected."""
+
+    def warn(event) -> None:
+        mismatch = QoSPolicyKind(event.last_policy_kind)
+        if mismatch in mends:
+            node.get_logger().warning(
+                f"a publisher of {name} is not heard: its {mismatch.name.lower()} does not match; "
+                f"{mends[mismatch]}"
+            )
+
+    events = SubscriptionEventCallbacks(incompatible_qos=warn, use_default_callbacks=False)
+    node.create_subscription(kind, name, take, qos, event_callbacks=events, raw=raw)
+
+
+class PublisherCheck:
+    """Looks for publishers of other types once a second; each problem is logged once."""
+
+    def __init__(self, node: Node, types: Mapping[str, str], advice: Mapping[str, str]):
+        """Check topics of a node.
+
+        Args:
+            node: The node.
+            types: Type of the messages of each topic, such as geometry_msgs/msg/Twist.
+            advice: What to do about publishers of other types, by type.
+        """
+        self._node, self._types, self._advice = node, types, advice
+        self._told: set[str] = set()
+        self.problems: tuple[str, ...] = ()
+        """The problems found last."""
+        node.create_timer(PERIOD, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _check(self) -> None:
+        self.problems = tuple(
+            problem for topic in self._types for problem in self._find_problems(topic)
+        )
+        for problem in self.problems:
+            if problem not in self._told:
+                self._node.get_logger().warning(problem)
+        self._told = set(self.problems)
+
+    def _find_problems(self, topic: str) -> list[str]:
+        """Return the problems of a topic's publishers, each once."""
+        wanted, found = self._types[topic], []
+        for publisher in self._node.get_publishers_info_by_topic(topic):
+            kind = publisher.topic_type
+            if kind == wanted:
+                continue
+            name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+            advice = self._advice.get(kind, f"it must be {wanted}")
+            found.append(f"{topic} of {name} is not heard: its type is {kind}; {advice}")
+        return list(dict.fromkeys(found))
