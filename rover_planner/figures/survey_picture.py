@@ -20,14 +20,16 @@ from rover_planner.figures.pictures import (
     find_extent,
 )
 from rover_planner.survey.chunk_survey import open_map
-from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED, number_limits
-from rover_planner.survey.palette import (
+from rover_planner.survey.layers import (
     CLASS_COLOURS,
     CLASS_LABELS,
+    CLASS_NUMBERS,
+    NOT_SURVEYED,
     SOME_HEADINGS,
     UNKNOWN_LABEL,
+    number_limits,
 )
-from rover_planner.survey.reach.kept_area import ReachableArea
+from rover_planner.survey.reachable_area import ReachableArea
 from rover_planner.survey.store import SurveyStore
 
 _IMPASSABLE = CLASS_NUMBERS[IMPASSABLE]
