@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small maps and surveys for tests of surveys."""
 
-import json
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,14 +11,11 @@ import numpy as np
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
-from rover_planner.shell.end_signals import END_SIGNALS
 from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk, survey_chunk
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.survey import PreparedSurvey, prepare_survey
-from support.waiting import wait_until
 
-REPOSITORY = Path(__file__).resolve().parents[1]
 RESOLUTION = 0.1
 """Cell size of the maps [m]."""
 
@@ -79,46 +74,21 @@ def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -
         assert values.tobytes() == other[name].tobytes(), name
 
 
-def start_command(*words, **environment) -> subprocess.Popen:
-    """Start `rover_planner` with words in a process of its own, as from a terminal."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "rover_planner", *map(str, words)],
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=_heed_signals,
-    )
-
-
-def _heed_signals() -> None:
-    """Undo what tests under nohup would pass on: a signal that is ignored."""
-    for one in END_SIGNALS:
-        signal.signal(one, signal.SIG_DFL)
-
-
-def finish(process: subprocess.Popen, seconds=200.0) -> tuple[int, dict, str]:
-    """Wait for a command; return its exit code, the JSON it printed and its stderr."""
-    out, err = process.communicate(timeout=seconds)
-    return process.returncode, json.loads(out) if out else {}, err
-
-
-def count_chunks(out: Path) -> int:
-    """Return the number of finished chunks, while a survey runs."""
-    files = Path(out, "seconds", "c").rglob("*")
-    return sum(path.is_file() and not path.name.endswith("partial") for path in files)
-
-
-def wait_for_chunks(out: Path, count: int) -> None:
-    """Wait until so many chunks are finished."""
-    wait_until(lambda: count_chunks(out) >= count, f"{count} chunks", 300.0)
+_attempts = 0
 
 
 def fail_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:
     """Survey a chunk as a task does, but fail on one; here, as workers import it."""
+    global _attempts
     if chunk == (0, 1):
-        raise RuntimeError("this chunk is cursed")
+        _attempts += 1
+        raise RuntimeError(f"this chunk is cursed after {_attempts} attempts")
     return survey_chunk(job, chunk)
+
+
+def refuse_one(job: SurveyJob, chunk: Index) -> ChunkReport:
+    """Report of any chunk what a task reports on a full disk."""
+    return ChunkReport(chunk, refusal="No room")
 
 
 def die_on_one(job: SurveyJob, chunk: Index) -> ChunkReport:

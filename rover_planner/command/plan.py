@@ -141,9 +141,9 @@ def _ask(
             assumptions=assumed,
         )
     if picture is not None:
-        from rover_planner.figures.way_picture import draw_way
+        from rover_planner.figures.path_picture import draw_path
 
-        draw_way(picture, question, answer)
+        draw_path(picture, question, answer)
     if answer.warning:
         typer.echo(f"warning: {answer.warning}", err=True)
     typer.echo(json.dumps(report_way(answer), allow_nan=False))

@@ -13,7 +13,7 @@ from rover_planner.shell.extras import need
 from rover_planner.shell.poses import read_numbers
 
 if TYPE_CHECKING:
-    from rover_planner.survey.reach.kept_area import ReachableArea
+    from rover_planner.survey.reachable_area import ReachableArea
     from rover_planner.survey.store import SurveyStore
 
 
@@ -45,7 +45,7 @@ def reachable(
 
         check_picture(picture)
     from rover_planner.shell.progress import show_progress
-    from rover_planner.survey.reach.reachable import find_reachable
+    from rover_planner.survey.reachable import find_reachable
     from rover_planner.survey.store import SurveyStore
 
     opened = SurveyStore(store)
@@ -53,7 +53,7 @@ def reachable(
         progress("load the survey")
         area = find_reachable(opened, x, y, report=progress)
     if geotiff is not None:
-        from rover_planner.survey.geotiff import write_cog
+        from rover_planner.survey.cog import write_cog
 
         write_cog(geotiff, area.distance, opened.notes.frame, opened.notes.layout.step)
     if picture is not None:
@@ -65,7 +65,7 @@ def reachable(
 
 def _report(store: "SurveyStore", area: "ReachableArea") -> dict[str, Any]:
     """Return what is printed."""
-    from rover_planner.survey.reach.reachable import say_why_none
+    from rover_planner.survey.reachable import say_why_none
 
     notes = store.notes
     farthest = area.farthest

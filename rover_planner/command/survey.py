@@ -23,7 +23,7 @@ from rover_planner.shell.extras import need
 from rover_planner.shell.one_line import MAX_LINE, one_line
 
 if TYPE_CHECKING:
-    from rover_planner.survey.cluster.runner import SurveyOutcome
+    from rover_planner.survey.runner import SurveyOutcome
     from rover_planner.survey.survey import PreparedSurvey
 
 
@@ -87,8 +87,7 @@ def survey(
         need("matplotlib", "the picture of a survey")
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
-    from rover_planner.survey.cluster.checks import check_machine
-    from rover_planner.survey.cluster.client import ClusterSettings, check_settings
+    from rover_planner.survey.dask_cluster import ClusterSettings, check_settings
     from rover_planner.survey.request import SurveyRequest
     from rover_planner.survey.survey import prepare_survey
 
@@ -104,17 +103,14 @@ def survey(
     )
     _check_places(geotiff, picture)
     with end_as_by_ctrl_c():
-        prepared = prepare_survey(
-            request, map_name, out, chunk, max_cells, max_gap,
-            check=lambda job: check_machine(job, settings),
-        )  # fmt: skip
+        prepared = prepare_survey(request, map_name, out, chunk, max_cells, max_gap, settings)
         began = time.monotonic()
         outcome = None
         if prepared.chunks:  # what is finished may be read-only
             with prepared.store.locked():
                 outcome = _run(prepared, settings)
     if geotiff is not None:
-        from rover_planner.survey.geotiff import write_layers
+        from rover_planner.survey.cog import write_layers
 
         write_layers(prepared.store, geotiff)
     if picture is not None:
@@ -131,7 +127,7 @@ def survey(
 def _check_places(geotiff: Path | None, picture: Path | None) -> None:
     """Check that the results have places, before hours of work."""
     if geotiff is not None:
-        from rover_planner.survey.geotiff import make_folder
+        from rover_planner.survey.cog import make_folder
 
         make_folder(geotiff)
     if picture is not None:
@@ -143,8 +139,8 @@ def _check_places(geotiff: Path | None, picture: Path | None) -> None:
 def _run(prepared: "PreparedSurvey", settings: Any) -> "SurveyOutcome":
     """Survey what is not finished."""
     from rover_planner.shell.progress import show_progress, show_rate
-    from rover_planner.survey.cluster.runner import run_survey
-    from rover_planner.survey.warm_up import warm_up_survey
+    from rover_planner.survey.runner import run_survey
+    from rover_planner.survey.tile_survey import warm_up_survey
 
     job = prepared.job
     with show_progress() as progress:
@@ -165,7 +161,7 @@ def _report(
     prepared: "PreparedSurvey", outcome: "SurveyOutcome | None", seconds: float
 ) -> dict[str, Any]:
     """Return what is printed at the end."""
-    from rover_planner.survey.summary import summarise
+    from rover_planner.survey.survey import summarise
 
     poses = 0 if outcome is None else outcome.poses
     return {

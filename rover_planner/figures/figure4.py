@@ -12,17 +12,14 @@ depend on the force that balances the thrust of that wheel. Two cases are drawn:
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_poses
-from rover_planner.figures.pictures import STYLE, save_figure
+from rover_planner.figures.pictures import drawing
 
 AXLES = ("rear", "middle", "front")
 MAX_TORQUE = 0.2
@@ -102,10 +99,9 @@ def draw_figure4(path: Path, rover: Rover) -> None:
         for case in (ALONE, HELD)
     }
     centre = loads_at_rest(rover)
-    reach = 1.15 * max(np.abs(values - centre).max() for values in loads.values())
-    with matplotlib.rc_context(STYLE | {"axes.titlesize": 11, "axes.titleweight": "bold"}):
-        figure = Figure(figsize=(10.5, 9.0), layout="constrained")
-        FigureCanvasAgg(figure)
+    largest = 1.15 * max(np.abs(values - centre).max() for values in loads.values())
+    bold = {"axes.titlesize": 11, "axes.titleweight": "bold"}
+    with drawing(path, (10.5, 9.0), bold) as figure:
         panels = figure.subplots(3, 3, sharex=True, sharey="col")
         for row in range(3):
             for column in range(3):
@@ -113,7 +109,7 @@ def draw_figure4(path: Path, rover: Rover) -> None:
                 axes.axhline(centre[column], color="#999999", linewidth=0.8)
                 for case in (ALONE, HELD):
                     _draw_line(axes, torques, loads[row, case][:, column], case)
-                axes.set_ylim(centre[column] - reach, centre[column] + _HEADROOM * reach)
+                axes.set_ylim(centre[column] - largest, centre[column] + _HEADROOM * largest)
                 axes.set_xlabel(f"{AXLES[row]} wheel torque [mN·m]")
                 axes.set_ylabel(f"{AXLES[column]} load [N]")
         for column in range(3):
@@ -125,7 +121,6 @@ def draw_figure4(path: Path, rover: Rover) -> None:
             fontweight="bold",
         )
         figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
-        save_figure(path, figure)
 
 
 def _draw_line(axes: Axes, torques: np.ndarray, loads: np.ndarray, case: str) -> None:

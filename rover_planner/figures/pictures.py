@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The common style of all pictures, and writing a picture to a file."""
+"""What all pictures share: style, writing to a file, and the shaded ground below a map."""
 
 import io
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from rover_physics.errors import RoverFileError
 from rover_physics.files.user_file import write_file
@@ -28,6 +35,13 @@ STYLE: dict[str, Any] = {
     "grid.linewidth": 0.6,
 }
 """Settings of matplotlib (rcParams)."""
+# The palette of Okabe and Ito, which is safe for colour-blind readers.
+PASSABLE, REFUSED = "#0072B2", "#D55E00"
+INK, UNKNOWN = "#222222", "#CCD6E6"
+"""Colours of lines and texts, and of unknown ground."""
+
+Extent = tuple[float, float, float, float]
+"""Left, right, lower and upper edge [m]."""
 
 
 def check_picture(path: Path) -> None:
@@ -44,6 +58,33 @@ def check_picture(path: Path) -> None:
         )
 
 
+@contextmanager
+def drawing(
+    path: Path, size: tuple[float, float], style: Mapping[str, Any] | None = None
+) -> Iterator[Figure]:
+    """Yield a figure to draw in; write it to a file at the end.
+
+    Args:
+        path: Picture to write; its suffix sets the format, such as .png.
+        size: Width and height [inch].
+        style: Settings of matplotlib that differ from STYLE.
+
+    Raises:
+        PlanningError: The suffix names no format, or the file cannot be written.
+    """
+    with matplotlib.rc_context(STYLE | dict(style or {})):
+        figure = new_figure(size)
+        yield figure
+        save_figure(path, figure)
+
+
+def new_figure(size: tuple[float, float]) -> Figure:
+    """Return an empty figure of a width and height [inch]."""
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
 def save_figure(path: Path, figure: Figure) -> None:
     """Write a picture to a file; the suffix sets the format.
 
@@ -58,3 +99,36 @@ def save_figure(path: Path, figure: Figure) -> None:
             write_file(path, picture.getvalue())
     except RoverFileError as error:
         raise PlanningError(str(error)) from None
+
+
+def hill_shade(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
+    """Return the brightness (ny, nx) of the cells, 0 to 1, with light from the north-west.
+
+    Cells with unknown height stay NaN.
+    """
+    dy, dx = np.gradient(elevation, resolution)
+    azimuth, altitude = np.deg2rad(135.0), np.deg2rad(40.0)
+    sun = np.array(
+        [np.cos(altitude) * np.cos(azimuth), np.cos(altitude) * np.sin(azimuth), np.sin(altitude)]
+    )
+    cosine = (-dx * sun[0] - dy * sun[1] + sun[2]) / np.sqrt(1 + dx**2 + dy**2)
+    # level ground has a brightness of two thirds, so that both sides of a rock are visible
+    return np.clip(2 / 3 + 0.9 * (cosine - sun[2]), 0.0, 1.0)
+
+
+def find_extent(origin: tuple[float, float], shape: tuple[int, ...], resolution: float) -> Extent:
+    """Return the edges of cells (rows, columns), the first of which has its centre at `origin`."""
+    x, y = (start - 0.5 * resolution for start in origin)
+    return x, x + shape[1] * resolution, y, y + shape[0] * resolution
+
+
+def draw_ground(
+    axes: Axes, elevation: NDArray[np.float64], resolution: float, extent: Extent
+) -> None:
+    """Prepare axes for a map and draw the shaded ground (ny, nx) [m]; unknown cells are bluish."""
+    axes.grid(False)
+    axes.set_facecolor(UNKNOWN)
+    axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    if min(elevation.shape) >= 2:
+        shade = hill_shade(elevation, resolution)
+        axes.imshow(shade, origin="lower", extent=extent, cmap="gray", vmin=0.0, vmax=1.1)

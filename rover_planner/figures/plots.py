@@ -4,13 +4,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
+from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
@@ -20,21 +18,24 @@ from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.figures.pictures import STYLE, save_figure
+from rover_planner.figures.pictures import (
+    INK,
+    PASSABLE,
+    REFUSED,
+    UNKNOWN,
+    drawing,
+    find_extent,
+    hill_shade,
+)
 from rover_planner.figures.wheel_colours import WHEEL_COLOURS
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
-# The palette of Okabe and Ito, which is safe for colour-blind readers.
-PASSABLE = "#0072B2"
-REFUSED = "#D55E00"
 CHOSEN = "#F0E442"
 SIDE_STYLES = {"right": "-", "left": (0, (3, 1.5))}
 
 # Ground is drawn in warm greys, so that the coloured paths stand out.
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#6E6259", "#B5A99C", "#F1EAE0"])
 _COLUMNS = 3
-_UNKNOWN = (0.80, 0.84, 0.90)
-_INK = "#222222"
 _FALL = "#E4E1DC"
 
 
@@ -73,55 +74,25 @@ def draw_answers(
         raise PlanningError("no answers to draw; there must be at least one")
     passable = [a for a in answers if a.answer.traversable]
     shown = (passable or list(answers))[:_COLUMNS]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(12.5, 15.5), layout="constrained")
-        FigureCanvasAgg(figure)
+    with drawing(path, (12.5, 15.5)) as figure:
         grid = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.05))
         above, below = (figure.add_subfigure(grid[row]) for row in (0, 1))
         if title:
             figure.suptitle(title, fontsize=14, fontweight="bold")
         _draw_map(above.subplots(), terrain, answers)
         _draw_panels(below, rover, shown)
-        save_figure(path, figure)
-
-
-def hill_shade(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
-    """Return the brightness (ny, nx) of the cells, 0 to 1, with light from the north-west.
-
-    Cells with unknown height stay NaN.
-    """
-    dy, dx = np.gradient(elevation, resolution)
-    azimuth, altitude = np.deg2rad(135.0), np.deg2rad(40.0)
-    sun = np.array(
-        [np.cos(altitude) * np.cos(azimuth), np.cos(altitude) * np.sin(azimuth), np.sin(altitude)]
-    )
-    cosine = (-dx * sun[0] - dy * sun[1] + sun[2]) / np.sqrt(1 + dx**2 + dy**2)
-    # level ground has a brightness of two thirds, so that both sides of a rock are visible
-    return np.clip(2 / 3 + 0.9 * (cosine - sun[2]), 0.0, 1.0)
 
 
 def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[LabelledAnswer]) -> None:
     """Draw the terrain with the candidate paths of all answers."""
-    xmin, xmax, ymin, ymax = terrain.bounds
-    half = 0.5 * terrain.resolution
-    extent = (xmin - half, xmax + half, ymin - half, ymax + half)
+    extent = find_extent(terrain.origin, terrain.elevation.shape, terrain.resolution)
     view = _view(terrain, answers)
     lowest, highest = _elevation_range(terrain, view)
-    axes.set_facecolor("white")
     axes.set_axisbelow(False)
     axes.grid(False)
-    image = axes.imshow(
-        terrain.elevation,
-        extent=extent,
-        origin="lower",
-        cmap=_GROUND,
-        alpha=1.0,
-        vmin=lowest,
-        vmax=highest,
-    )
-    axes.imshow(
-        _shade_layer(terrain), extent=extent, origin="lower", interpolation="bilinear", zorder=1
-    )
+    placed = {"extent": extent, "origin": "lower"}
+    image = axes.imshow(terrain.elevation, cmap=_GROUND, vmin=lowest, vmax=highest, **placed)
+    axes.imshow(_shade_layer(terrain), interpolation="bilinear", zorder=1, **placed)
     bar = axes.inset_axes((1.015, 0.12, 0.015, 0.76))
     axes.figure.colorbar(image, cax=bar, label="elevation [m]")
     for labelled in answers:
@@ -129,15 +100,7 @@ def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[LabelledAnswer]) -
     for labelled in answers:
         _draw_goal(axes, labelled)
     start = answers[0].answer.chosen.poses[0]
-    axes.plot(
-        start[0],
-        start[1],
-        marker=_arrow(start[2]),
-        markersize=17,
-        color="white",
-        markeredgecolor=_INK,
-        zorder=9,
-    )
+    axes.plot(*start[:2], **_start_style(start[2], 17), zorder=9)
     axes.set(xlim=view[:2], ylim=view[2:], xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal")
     axes.legend(
@@ -152,44 +115,34 @@ def _arrow(yaw: float) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in outline @ turn]
 
 
+def _start_style(yaw: float, size: float) -> dict[str, Any]:
+    """Return how a start with a heading [rad] is drawn."""
+    edge = {"color": "white", "markeredgecolor": INK}
+    return {"marker": _arrow(yaw), "ls": "", "markersize": size, **edge}
+
+
+def _around(colour: str, width: float) -> dict[str, Any]:
+    """Return the style of a line with another colour around it."""
+    return {"path_effects": [withStroke(linewidth=width, foreground=colour)]}
+
+
+def _key(label: str, **style: Any) -> Line2D:
+    """Return an entry of a legend."""
+    return Line2D([], [], label=label, **style)
+
+
 def _map_legend(terrain: Terrain) -> list[Line2D]:
     """Return the handles of the map's legend."""
     handles = [
-        Line2D(
-            [],
-            [],
-            color=CHOSEN,
-            lw=3,
-            label="chosen path",
-            path_effects=[withStroke(linewidth=5, foreground=_INK)],
-        ),
-        Line2D([], [], color=PASSABLE, lw=1.6, label="traversable candidate"),
-        Line2D([], [], color=REFUSED, lw=1.6, label="refused candidate"),
-        Line2D([], [], color=REFUSED, marker="x", ls="", mew=2, label="where it fails first"),
-        Line2D(
-            [],
-            [],
-            color="white",
-            marker=_arrow(0.5 * np.pi),
-            ls="",
-            markersize=10,
-            markeredgecolor=_INK,
-            label="start",
-        ),
+        _key("chosen path", color=CHOSEN, lw=3, **_around(INK, 5)),
+        _key("traversable candidate", color=PASSABLE, lw=1.6),
+        _key("refused candidate", color=REFUSED, lw=1.6),
+        _key("where it fails first", color=REFUSED, marker="x", ls="", mew=2),
+        _key("start", **_start_style(0.5 * np.pi, 10)),
     ]
     if not np.isfinite(terrain.elevation).all():
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=_UNKNOWN,
-                marker="s",
-                ls="",
-                markersize=9,
-                markeredgecolor="#888888",
-                label="unknown ground",
-            )
-        )
+        square = {"marker": "s", "ls": "", "markersize": 9, "markeredgecolor": "#888888"}
+        handles.append(_key("unknown ground", color=UNKNOWN, **square))
     return handles
 
 
@@ -204,45 +157,24 @@ def _shade_layer(terrain: Terrain) -> NDArray[np.float64]:
     depth = np.abs(shade - 2 / 3)
     layer = np.repeat(light[:, :, None], 4, axis=2)
     layer[:, :, 3] = np.clip(np.where(light > 0, 1.8, 1.35) * depth, 0, 0.9)
-    layer[np.isnan(terrain.elevation)] = (*_UNKNOWN, 1.0)
+    layer[np.isnan(terrain.elevation)] = (*to_rgb(UNKNOWN), 1.0)
     return layer
 
 
 def _draw_candidates(axes: Axes, answer: PathAnswer) -> None:
     """Draw all candidates of an answer, the chosen one last and thick."""
     for candidate in answer.candidates:
-        passable = candidate.verdict.traversable
-        axes.plot(
-            *candidate.poses[:, :2].T,
-            color=PASSABLE if passable else REFUSED,
-            lw=1.2,
-            alpha=0.95,
-            zorder=3,
-            solid_capstyle="round",
-        )
-    failures = [
-        c.poses[c.verdict.first_failure] for c in answer.candidates if not c.verdict.traversable
-    ]
-    if failures:
-        spots = np.array(failures)
-        axes.plot(
-            spots[:, 0],
-            spots[:, 1],
-            "x",
-            color=REFUSED,
-            mew=2,
-            ms=6,
-            zorder=6,
-            path_effects=[withStroke(linewidth=3.5, foreground="white")],
-        )
+        colour = PASSABLE if candidate.verdict.traversable else REFUSED
+        thin = {"lw": 1.2, "alpha": 0.95, "zorder": 3, "solid_capstyle": "round"}
+        axes.plot(*candidate.poses[:, :2].T, color=colour, **thin)
+    refused = [one for one in answer.candidates if not one.verdict.traversable]
+    if refused:
+        spots = np.array([one.poses[one.verdict.first_failure, :2] for one in refused])
+        cross = {"color": REFUSED, "mew": 2, "ms": 6, "zorder": 6}
+        axes.plot(*spots.T, "x", **cross, **_around("white", 3.5))
     if answer.traversable:
-        axes.plot(
-            *answer.chosen.poses[:, :2].T,
-            color=CHOSEN,
-            lw=2.4,
-            zorder=5,
-            path_effects=[withStroke(linewidth=4.6, foreground=_INK)],
-        )
+        thick = {"color": CHOSEN, "lw": 2.4, "zorder": 5}
+        axes.plot(*answer.chosen.poses[:, :2].T, **thick, **_around(INK, 4.6))
 
 
 def _draw_goal(axes: Axes, labelled: LabelledAnswer) -> None:
@@ -250,17 +182,9 @@ def _draw_goal(axes: Axes, labelled: LabelledAnswer) -> None:
     x, y = labelled.answer.chosen.poses[-1, :2]
     colour = PASSABLE if labelled.answer.traversable else REFUSED
     axes.plot(x, y, "o", ms=17, color=colour, markeredgecolor="white", mew=1.5, zorder=8)
-    axes.text(
-        x,
-        y,
-        labelled.name,
-        color="white",
-        fontweight="bold",
-        ha="center",
-        va="center_baseline",
-        zorder=10,
-        clip_on=True,
-    )
+    middle = {"ha": "center", "va": "center_baseline"}
+    axes.text(x, y, labelled.name, color="white", fontweight="bold", zorder=10, clip_on=True,
+              **middle)  # fmt: skip
 
 
 def _view(terrain: Terrain, answers: Sequence[LabelledAnswer]) -> tuple[float, ...]:
@@ -315,7 +239,7 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
             if name != "tip_over_ratio":
                 _shade_falls(axes, candidate)
             if limit is not None:
-                axes.axhline(limit, color=_INK, lw=1.0, ls=":")
+                axes.axhline(limit, color=INK, lw=1.0, ls=":")
             if column == 0:
                 axes.set_ylabel(label)
         panels[-1, column].set_xlabel("distance along the path [m]")
@@ -348,7 +272,7 @@ def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     whole = _measure_distance(candidate)
     distance, columns = whole[: len(values)], values.reshape(len(values), -1)
     if np.allclose(columns, columns[:, :1], equal_nan=True):
-        axes.plot(distance, columns[:, 0], color=_INK, lw=1.3)
+        axes.plot(distance, columns[:, 0], color=INK, lw=1.3)
     else:
         for wheel, series in zip(WHEELS, values.T, strict=True):
             position, side = wheel.split("_")
@@ -378,19 +302,13 @@ def _shade_falls(axes: Axes, candidate: Candidate) -> None:
 
 def _wheel_legend() -> list[Line2D | Patch]:
     """Return the legend handles of the wheels."""
-    handles: list[Line2D | Patch] = [
-        Line2D(
-            [],
-            [],
-            color=WHEEL_COLOURS[position],
-            ls=SIDE_STYLES[side],
-            lw=1.6,
-            label=f"{position} {side}",
-        )
-        for position in ("front", "middle", "rear")
-        for side in ("left", "right")
+    return [
+        *(
+            _key(f"{position} {side}", color=WHEEL_COLOURS[position], ls=SIDE_STYLES[side], lw=1.6)
+            for position in ("front", "middle", "rear")
+            for side in ("left", "right")
+        ),
+        _key("rover, or all wheels alike", color=INK, lw=1.3),
+        _key("safety limit", color=INK, lw=1.0, ls=":"),
+        Patch(color=_FALL, label="a wheel rolls off an edge: not asked"),
     ]
-    handles.append(Line2D([], [], color=_INK, lw=1.3, label="rover, or all wheels alike"))
-    handles.append(Line2D([], [], color=_INK, lw=1.0, ls=":", label="safety limit"))
-    handles.append(Patch(color=_FALL, label="a wheel rolls off an edge: not asked"))
-    return handles

@@ -7,31 +7,35 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from rover_physics.traversability.classification import IMPASSABLE
-from rover_planner.figures.pictures import STYLE, save_figure
-from rover_planner.figures.plots import hill_shade
+from rover_planner.figures.pictures import (
+    INK,
+    UNKNOWN,
+    Extent,
+    draw_ground,
+    drawing,
+    find_extent,
+)
 from rover_planner.survey.chunk_survey import open_map
-from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED, number_limits
-from rover_planner.survey.palette import (
+from rover_planner.survey.layers import (
     CLASS_COLOURS,
     CLASS_LABELS,
+    CLASS_NUMBERS,
+    NOT_SURVEYED,
     SOME_HEADINGS,
     UNKNOWN_LABEL,
+    number_limits,
 )
-from rover_planner.survey.reach.kept_area import ReachableArea
+from rover_planner.survey.reachable_area import ReachableArea
 from rover_planner.survey.store import SurveyStore
 
 _IMPASSABLE = CLASS_NUMBERS[IMPASSABLE]
 _OFF_GROUND = [number_limits()[code] for code in ("off_map", "unknown_ground")]
-_UNKNOWN, _INK = "#CCD6E6", "#222222"
 _MAX_CELLS = 1200
 _STRENGTH = 0.55
-_Extent = tuple[float, float, float, float]
 
 
 def draw_survey(path: Path, store: SurveyStore) -> None:
@@ -52,10 +56,10 @@ def draw_survey(path: Path, store: SurveyStore) -> None:
     shown[(worst == NOT_SURVEYED) | ((best == _IMPASSABLE) & np.isin(limits, _OFF_GROUND))] = (
         np.nan
     )
-    labels = [*zip(CLASS_LABELS, CLASS_COLOURS, strict=True), (UNKNOWN_LABEL, _UNKNOWN)]
+    labels = [*zip(CLASS_LABELS, CLASS_COLOURS, strict=True), (UNKNOWN_LABEL, UNKNOWN)]
     rover = store.notes.description["rover"]["name"]
     title = f"{rover}: worst class over {store.notes.headings} headings"
-    colours = ListedColormap(CLASS_COLOURS).with_extremes(bad=_UNKNOWN)
+    colours = ListedColormap(CLASS_COLOURS).with_extremes(bad=UNKNOWN)
     _draw(path, store, shown, (colours, 0.0, SOME_HEADINGS), labels, title)
 
 
@@ -97,50 +101,37 @@ def _draw(path, store, shown, scale, labels, title, start=None) -> None:
         start: x, y of the start [m] (default: none).
     """
     colours, least, most = scale
-    frame, (rows, columns) = store.notes.frame, store.notes.layout.map_shape
-    half = 0.5 * frame.resolution
-    x, y = frame.origin[0] - half, frame.origin[1] - half
-    extent = x, x + columns * frame.resolution, y, y + rows * frame.resolution
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.5, 7.5), layout="constrained")
-        FigureCanvasAgg(figure)
+    notes = store.notes
+    frame, (rows, columns) = notes.frame, notes.layout.map_shape
+    extent = find_extent(frame.origin, (rows, columns), frame.resolution)
+    every = max(1, -(-max(rows, columns) // _MAX_CELLS))
+    source = open_map(store.path, notes.map_file)
+    heights = source.read((slice(0, rows), slice(0, columns)), every)["elevation"]
+    cell = notes.cell * _thinning(store)
+    with drawing(path, (8.5, 7.5)) as figure:
         axes = figure.subplots()
-        axes.grid(False)
-        axes.set_facecolor(_UNKNOWN)
-        _draw_ground(axes, store, extent)
-        axes.imshow(shown, origin="lower", extent=_extent_of_cells(store, shown.shape),
+        draw_ground(axes, heights, frame.resolution * every, extent)
+        axes.imshow(shown, origin="lower", extent=find_extent(frame.origin, shown.shape, cell),
                     cmap=colours, vmin=least, vmax=most, alpha=_STRENGTH,
                     interpolation="nearest")  # fmt: skip
         if start is not None:
-            axes.plot(*start, "o", color=_INK, markersize=7, markeredgecolor="white")
-        axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=extent[:2], ylim=extent[2:])
+            axes.plot(*start, "o", color=INK, markersize=7, markeredgecolor="white")
+        axes.set(xlim=extent[:2], ylim=extent[2:])
         axes.set_title(title, loc="left")
         handles = [Patch(color=colour, label=text) for text, colour in labels]
         figure.legend(handles=handles, loc="outside lower center", ncols=3)  # hides no ground
         _draw_scale_bar(axes, extent)
-        save_figure(path, figure)
 
 
-def _draw_ground(axes: Axes, store: SurveyStore, extent: _Extent) -> None:
-    rows, columns = store.notes.layout.map_shape
-    every = max(1, -(-max(rows, columns) // _MAX_CELLS))
-    box = slice(0, rows), slice(0, columns)
-    heights = open_map(store.path, store.notes.map_file).read(box, every)["elevation"]
-    if min(heights.shape) < 2:
-        return
-    shade = hill_shade(heights, store.notes.frame.resolution * every)
-    axes.imshow(shade, origin="lower", extent=extent, cmap="gray", vmin=0.0, vmax=1.1)
-
-
-def _draw_scale_bar(axes: Axes, extent: _Extent) -> None:
+def _draw_scale_bar(axes: Axes, extent: Extent) -> None:
     """Draw a bar of a round length, about a fifth of the map's width."""
     width, height = extent[1] - extent[0], extent[3] - extent[2]
     length = choose_bar(width)
     x, y = extent[1] - 0.05 * width - length, extent[2] + 0.04 * height
-    axes.add_patch(Rectangle((x, y), length, 0.012 * height, color=_INK))
+    axes.add_patch(Rectangle((x, y), length, 0.012 * height, color=INK))
     plate = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
     middle, above = x + 0.5 * length, y + 0.02 * height
-    axes.text(middle, above, f"{length:g} m", ha="center", color=_INK, bbox=plate)
+    axes.text(middle, above, f"{length:g} m", ha="center", color=INK, bbox=plate)
 
 
 def choose_bar(width: float) -> float:
@@ -153,10 +144,3 @@ def choose_bar(width: float) -> float:
 def _thinning(store: SurveyStore) -> int:
     """Return every how many cells are drawn."""
     return max(1, -(-max(store.notes.layout.shape) // _MAX_CELLS))
-
-
-def _extent_of_cells(store: SurveyStore, shape: tuple[int, ...]) -> _Extent:
-    """Return the edges of the drawn cells [m]."""
-    notes, size = store.notes, store.notes.cell * _thinning(store)
-    x, y = (start - 0.5 * size for start in notes.frame.origin)
-    return x, x + shape[1] * size, y, y + shape[0] * size

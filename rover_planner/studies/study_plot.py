@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_planner.figures.pictures import STYLE, save_figure
+from rover_planner.figures.pictures import STYLE, drawing, new_figure
 from rover_planner.figures.wheel_colours import WHEEL_COLOURS
 from rover_planner.studies.runner import StudyResult
 from rover_planner.studies.study_file import OBJECTIVES
@@ -20,6 +20,8 @@ from rover_planner.studies.summary import describe_ties
 
 POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
 """Colours that are safe for colour-blind readers (Okabe and Ito); each has its own marker."""
+SIZE = (6.0, 4.0)
+"""Width and height of the picture [inch]."""
 EQUAL = 1.0 / 6.0
 """Load share of a wheel if all carry alike."""
 
@@ -30,8 +32,8 @@ def draw_study(result: StudyResult, path: Path) -> None:
     Raises:
         PlanningError: The file cannot be written, or no trial could be judged.
     """
-    with matplotlib.rc_context(STYLE):
-        save_figure(path, _draw(result))
+    with drawing(path, SIZE) as figure:
+        _draw(figure, result)
 
 
 def draw_pixels(result: StudyResult) -> NDArray[np.uint8]:
@@ -41,14 +43,14 @@ def draw_pixels(result: StudyResult) -> NDArray[np.uint8]:
         PlanningError: No trial could be judged.
     """
     with matplotlib.rc_context({**STYLE, "figure.dpi": 130}):
-        canvas = FigureCanvasAgg(_draw(result))
+        figure = new_figure(SIZE)
+        _draw(figure, result)
+        canvas = FigureCanvasAgg(figure)
         canvas.draw()
         return np.array(canvas.buffer_rgba(), dtype=np.uint8)
 
 
-def _draw(result: StudyResult) -> Figure:
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
+def _draw(figure: Figure, result: StudyResult) -> None:
     axes = _draw_shares(figure, result)
     if len(result.study.parameters) == 1:
         _draw_curve(axes, result)
@@ -64,7 +66,6 @@ def _draw(result: StudyResult) -> Figure:
     )
     lines = [f"{what}: best {best.objective:.4g} {unit}", f"at {at}", describe_ties(result)]
     axes.set_title("\n".join(filter(None, lines)), fontsize=9)
-    return figure
 
 
 def _label(name: str, unit: str) -> str:

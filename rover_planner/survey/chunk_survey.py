@@ -12,12 +12,13 @@ import numpy as np
 
 import rover_physics
 from rover_physics.results.record import RESULT
+from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.errors import PlanningError
 from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import types_of_layers
 from rover_planner.survey.layout import Box, Index, SurveyLayout
-from rover_planner.survey.map_source import Grids, MapSource, StoredMap, make_tile_terrain
+from rover_planner.survey.map_source import StoredMap
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import SurveyStore, is_refusal
 from rover_planner.survey.tile_survey import BATCH, survey_tile
@@ -36,6 +37,8 @@ class SurveyJob:
     """What is asked."""
     layout: SurveyLayout
     """Cells and chunks."""
+    resolution: float
+    """Size of a map cell [m]."""
     store: Path
     """Folder of the store, seen by all workers."""
     map_file: str
@@ -44,10 +47,6 @@ class SurveyJob:
     """Version of the model."""
     run: str = field(default_factory=lambda: uuid.uuid4().hex)
     """Name of this run of the command; a worker opens the store once in it."""
-
-    def open_map(self) -> MapSource:
-        """Open the map."""
-        return open_map(self.store, self.map_file)
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class ChunkReport:
     """Why the system refuses to write, empty if it does not."""
 
 
-def open_map(store: Path, map_file: str) -> MapSource:
+def open_map(store: Path, map_file: str) -> GeoTiffMap | StoredMap:
     """Return the map of a store: the GeoTIFF it names, or, if it names none, what it keeps."""
     return GeoTiffMap(Path(map_file)) if map_file else StoredMap(store)
 
@@ -112,12 +111,11 @@ def open_store(store: Path, run: str) -> SurveyStore:
 
 def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
     """Return the layers of a chunk."""
-    layout, request = job.layout, job.request
-    source = job.open_map()
-    resolution, soils = source.frame.resolution, source.soil_names
+    layout, request, resolution = job.layout, job.request, job.resolution
+    source = open_map(job.store, job.map_file)
     cells = layout.cells_of(chunk)
     window = layout.window_of(cells)
-    grids = source.read(window)
+    grids, soils = source.read(window), source.soil_names
     shape = tuple(span.stop - span.start for span in cells)
     layers = {
         name: np.empty(shape, kind)
@@ -125,20 +123,22 @@ def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
     }
     for tile in layout.tiles_of(chunk):
         part = layout.window_of(tile)
-        first = [span.start * layout.step for span in tile]
-        corner = tuple(
-            (span.start - at) * resolution
-            for span, at in zip(part[::-1], first[::-1], strict=True)
-        )
-        terrain = make_tile_terrain(
-            _cut(grids, window, part), resolution, (corner[0], corner[1]), soils
-        )
+        below = _relative(part, window)
+        ground = {name: np.ascontiguousarray(grid[below]) for name, grid in grids.items()}
+        terrain = None
+        if not np.isnan(ground["elevation"]).all():
+            low, left = (
+                (span.start - own.start * layout.step) * resolution
+                for span, own in zip(part, tile, strict=True)
+            )
+            terrain = Terrain(
+                **ground, resolution=resolution, origin=(left, low), soil_names=soils
+            )
         sizes = [span.stop - span.start for span in tile]
         y, x = (np.arange(size) * (layout.step * resolution) for size in sizes)
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        found = survey_tile(request, terrain, places)
         here = _relative(tile, cells)
-        for name, values in found.items():
+        for name, values in survey_tile(request, terrain, places).items():
             layers[name][here] = values.reshape(sizes)
     return layers
 
@@ -155,12 +155,6 @@ def estimate_memory(job: SurveyJob) -> int:
     kept = 2 * rows * columns * sum(kind.itemsize for kind in kinds)
     poses = 4 * max(BATCH, job.request.headings) * RESULT.itemsize
     return BYTES_OF_PROCESS + BYTES_OF_CELL * sides[0] * sides[1] + kept + poses
-
-
-def _cut(grids: Grids, window: Box, part: Box) -> Grids:
-    """Return a part of the layers of a window."""
-    here = _relative(part, window)
-    return {name: np.ascontiguousarray(grid[here]) for name, grid in grids.items()}
 
 
 def _relative(box: Box, to: Box) -> Box:

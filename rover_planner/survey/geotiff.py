@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""GeoTIFF maps: checked when they are opened, read by windows, written as COG."""
+"""GeoTIFF maps: checked when they are opened, and read by windows."""
 
 import contextlib
 import hashlib
 import importlib.util
 import math
 import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +15,8 @@ import numpy as np
 
 from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
-from rover_planner.shell.extras import need
-from rover_planner.survey.disk.gdal_messages import catch_messages, find_reason
 from rover_planner.survey.layout import Box
 from rover_planner.survey.map_source import Grids, MapFrame
-from rover_planner.survey.store import SurveyStore
 
 SUFFIXES = (".tif", ".tiff")
 """Suffixes of GeoTIFF files."""
@@ -106,7 +102,7 @@ class GeoTiffMap:
 
     @contextlib.contextmanager
     def _open(self) -> Iterator[Any]:
-        rasterio = _import_rasterio()
+        rasterio = import_rasterio()
         try:
             with rasterio.open(self.path) as file:
                 yield file
@@ -144,111 +140,12 @@ class GeoTiffMap:
 
     def _check(self, file: Any) -> None:
         """Check kind, units and completeness of an open file."""
-        wrong = _find_missing(file, self.path) or _find_fault(file)
+        wrong = find_missing_block(file, self.path) or _find_fault(file)
         if wrong:
             raise PlanningError(f"{show_file(self.path)}: {wrong}")
 
 
-def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
-    """Write a layer of a survey as a cloud-optimised GeoTIFF with the map's georeference.
-
-    Its overviews have values of the layer, as there is nothing between classes, bits or limits.
-
-    Args:
-        path: File to write; an existing one is replaced.
-        layer: (rows, columns) array, such as of Zarr; row 0 at the smallest y.
-        frame: Where the cells of the map are.
-        step: Distance of surveyed cells [map cells]; they are the middles of its cells.
-
-    Raises:
-        PlanningError: The file cannot be written.
-    """
-    need("rasterio", "a GeoTIFF")
-    rasterio = _import_rasterio()
-    rows, columns = layer.shape
-    size = step * frame.resolution
-    left, low = (start - 0.5 * size for start in frame.origin)
-    is_float = layer.dtype.kind == "f"
-    profile = {
-        "driver": "GTiff",
-        "width": columns,
-        "height": rows,
-        "count": 1,
-        "dtype": layer.dtype.name,
-        "transform": rasterio.Affine(size, 0.0, left, 0.0, -size, low + rows * size),
-        "nodata": math.nan if is_float else None,
-        "tiled": True,
-        "compress": "deflate",
-        "BIGTIFF": "IF_SAFER",
-    }
-    if frame.crs:
-        profile["crs"] = frame.crs
-    try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-            whole = Path(folder) / "whole.tif"
-            _write_aside(Path(folder) / "plain.tif", whole, layer, profile)
-            whole.replace(path)
-    except OSError as error:
-        why = error.strerror or str(error)
-        raise PlanningError(f"{show_file(path)}: cannot be written: {why}") from None
-
-
-def _write_aside(plain: Path, whole: Path, layer: Any, profile: dict[str, Any]) -> None:
-    """Write a layer as a plain GeoTIFF, and that as a COG which is whole and on the disk.
-
-    Raises:
-        OSError: The system refuses, in the words of GDAL if it gives no others.
-    """
-    rasterio = _import_rasterio()
-    from rasterio.shutil import copy
-
-    rows, columns = layer.shape
-    why = ""
-    with catch_messages() as messages:
-        try:
-            with rasterio.open(plain, "w", **profile) as file:
-                for first in range(0, rows, BAND):
-                    end = min(first + BAND, rows)
-                    window = rasterio.windows.Window(0, rows - end, columns, end - first)
-                    file.write(layer[first:end][::-1], 1, window=window)
-            copy(plain, whole, driver="COG", compress="deflate", overview_resampling="nearest")
-            with rasterio.open(whole) as file:  # GDAL does not tell of all that it could not write
-                why = _find_missing(file, whole)
-        except Exception as error:  # some errors of GDAL have no public name
-            why = str(error)
-    why = find_reason(messages) or why
-    if why:
-        raise OSError(why)
-    with whole.open("rb") as done:
-        os.fsync(done.fileno())
-
-
-def write_layers(store: SurveyStore, folder: Path) -> None:
-    """Write each layer of a survey as LAYER.tif, with the georeference of the map.
-
-    Raises:
-        PlanningError: A file cannot be written.
-    """
-    make_folder(folder)
-    for name in store.layer_names():
-        write_cog(
-            folder / f"{name}.tif", store.layer(name), store.notes.frame, store.notes.layout.step
-        )
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder for layers, if there is none.
-
-    Raises:
-        PlanningError: It cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise PlanningError(f"{show_file(folder)}: cannot be made: {error.strerror}") from None
-
-
-def _import_rasterio() -> Any:
+def import_rasterio() -> Any:
     """Import rasterio so that PROJ finds its database; else it complains on stderr by itself."""
     found = importlib.util.find_spec("rasterio")
     if found is not None and found.origin is not None:
@@ -306,7 +203,7 @@ def _find_fault(file: Any) -> str:
     return ""
 
 
-def _find_missing(file: Any, path: Path) -> str:
+def find_missing_block(file: Any, path: Path) -> str:
     """Return that a file is truncated, empty if all its blocks are there."""
     size = path.stat().st_size
     height, width = file.block_shapes[0]

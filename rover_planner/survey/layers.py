@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a survey keeps of each cell: names, types and meanings of its layers."""
+"""What a survey keeps of each cell: names, types, meanings and colours of its layers."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -16,6 +16,14 @@ NO_LIMIT = 0
 """Value of `first_limit` where no limit fails; 1 + k stands for code k of verdicts."""
 CLASS_NUMBERS = {name: number for number, name in enumerate(TRAVERSABILITY_CLASSES)}
 """Classes as kept, from best to worst."""
+SOME_HEADINGS = len(CLASS_NUMBERS)
+"""Drawn as a class of its own: impassable at some headings, not at others."""
+CLASS_LABELS = (*TRAVERSABILITY_CLASSES, "passable at some headings")
+"""Names of the drawn classes, by number."""
+CLASS_COLOURS = ("#009E73", "#56B4E9", "#E69F00", "#D55E00", "#F0E442")
+"""The palette of Okabe and Ito (2008), by number."""
+UNKNOWN_LABEL = "unknown ground, edge, or not surveyed"
+"""Name of what has no class."""
 
 Layers = Mapping[str, NDArray]
 """Layers by name, all of one shape."""

@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,36 +34,12 @@ class MapFrame(NamedTuple):
     """Coordinate reference system as WKT, empty if unknown."""
 
 
-class MapSource(Protocol):
-    """A map that is read by windows."""
-
-    @property
-    def frame(self) -> MapFrame:
-        """Where its cells are."""
-
-    @property
-    def soil_names(self) -> tuple[str, ...]:
-        """Names of the soils that the layer soil points to."""
-
-    def read(self, box: Box, every: int = 1) -> Grids:
-        """Return the layers in a box of cells, every so many cells of them."""
-
-
 @dataclass(frozen=True)
 class StoredMap:
     """A map that is kept in the store of its survey."""
 
     store: Path
     """Folder of the store."""
-
-    @property
-    def frame(self) -> MapFrame:
-        """Where its cells are."""
-        group = self._group()
-        notes: Any = group.attrs
-        shape = group["elevation"].shape
-        origin = (float(notes["origin"][0]), float(notes["origin"][1]))
-        return MapFrame((shape[0], shape[1]), float(notes["resolution"]), origin, "")
 
     @property
     def soil_names(self) -> tuple[str, ...]:
@@ -74,10 +50,7 @@ class StoredMap:
     def read(self, box: Box, every: int = 1) -> Grids:
         """Return the layers in a box of cells, every so many cells of them."""
         group = self._group()
-        rows, columns = box
-        if every == 1:
-            return {name: group[name][rows, columns] for name in GRIDS if name in group}
-        thin = slice(rows.start, rows.stop, every), slice(columns.start, columns.stop, every)
+        thin = tuple(slice(span.start, span.stop, every) for span in box)
         return {name: group[name][thin] for name in GRIDS if name in group}
 
     def _group(self) -> Any:
@@ -107,22 +80,3 @@ def keep_map(group: Any, terrain: Terrain) -> None:
             "soil_names": list(terrain.soil_names),
         }
     )
-
-
-def make_tile_terrain(
-    grids: Grids, resolution: float, corner: tuple[float, float], soil_names: tuple[str, ...]
-) -> Terrain | None:
-    """Return a part of a map as a Terrain, None if no height is known.
-
-    Args:
-        grids: Layers of the part.
-        resolution: Cell size [m].
-        corner: x, y of its first cell [m].
-        soil_names: Names of the soils.
-
-    Raises:
-        TerrainError: A height that is infinite or implausible.
-    """
-    if np.isnan(grids["elevation"]).all():
-        return None
-    return Terrain(**grids, resolution=resolution, origin=corner, soil_names=soil_names)

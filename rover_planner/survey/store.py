@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.survey.disk.kept_layer import KeptLayer, damaged
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NOT_SURVEYED,
@@ -39,6 +39,8 @@ WRITERS = 8
 """Number of layers that are written at a time."""
 FAILED = -1.0
 """Seconds of a chunk that failed."""
+UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError)
+"""What Zarr and its codecs raise where a file is damaged or gone."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,54 @@ class StoreNotes:
         )
 
 
+class KeptLayer:
+    """A Zarr array (rows, columns), which says in one line if it cannot be read."""
+
+    def __init__(self, array: Any, path: Path):
+        """Keep an array.
+
+        Args:
+            array: The Zarr array.
+            path: The store, for what is said of it.
+        """
+        self._array = array
+        self._path = path
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows and columns."""
+        return tuple(self._array.shape)
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the values."""
+        return np.dtype(self._array.dtype)
+
+    def has_chunk(self, chunk: tuple[int, int]) -> bool:
+        """Return whether the file of a chunk (row, column) is there."""
+        key = self._array.metadata.encode_chunk_key(chunk)
+        return (self._path / self._array.basename / key).is_file()
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        """Read a part.
+
+        Raises:
+            PlanningError: A file of the layer is damaged.
+        """
+        try:
+            return np.asarray(self._array[key])
+        except UNREADABLE as error:
+            raise _damaged(self._path, self._array.basename, error) from None
+
+    def __setitem__(self, key: Any, values: Any) -> None:
+        """Write a part.
+
+        Raises:
+            OSError: The system refuses.
+        """
+        self._array[key] = values
+
+
 class SurveyStore:
     """The store of one survey."""
 
@@ -114,7 +164,7 @@ class SurveyStore:
         """
         import zarr
 
-        from rover_planner.survey.disk.durable_store import DurableStore
+        from rover_planner.survey.durable_store import DurableStore
 
         self.path = path
         if not path.exists():
@@ -147,9 +197,9 @@ class SurveyStore:
         try:
             found = self._group[name].shape
         except KeyError as error:
-            raise damaged(self.path, name, error) from None
+            raise _damaged(self.path, name, error) from None
         if found != shape:
-            raise damaged(self.path, name, ValueError(f"{found} cells, not {shape}"))
+            raise _damaged(self.path, name, ValueError(f"{found} cells, not {shape}"))
 
     def check(self, description: Mapping[str, Any], chunk: int | None) -> None:
         """Check that the store is of the survey that is asked for.
@@ -256,7 +306,7 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     """
     import zarr
 
-    from rover_planner.survey.disk.durable_store import DurableStore, force_folders
+    from rover_planner.survey.durable_store import DurableStore, force_folders
 
     aside = path.with_name(f"{path.name}.{os.getpid()}.new")
     layout = notes.layout
@@ -293,6 +343,15 @@ def is_refusal(error: OSError) -> bool:
     """Return whether the system refuses to write, so that another attempt is of no use."""
     refusals = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EFBIG)
     return error.errno in refusals
+
+
+def _damaged(path: Path, name: str, error: Exception) -> PlanningError:
+    """Return what is said of an array of a store that cannot be read."""
+    why = (str(error).splitlines() or [""])[0]
+    return PlanningError(
+        f"{show_file(path)}: {name} is damaged ({type(error).__name__}: {why:.80}); "
+        "survey again into another folder"
+    )
 
 
 def _show_difference(kept: object, asked: object) -> str:

@@ -1,19 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """A survey from question to store: opens the map, creates the store or goes on with it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
+from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob
+from rover_planner.survey.dask_cluster import ClusterSettings, check_machine
 from rover_planner.survey.geotiff import GeoTiffMap, is_geotiff
+from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
 from rover_planner.survey.map_source import MapFrame, frame_of
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import StoreNotes, SurveyStore, create_store
+
+BAND = 1024
+"""Rows that are read at a time."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +48,9 @@ def prepare_survey(
     map_name: str,
     out: Path,
     chunk: int | None = None,
-    max_cells: int | None = None,
+    max_cells: int = MAX_CELLS,
     max_gap: float = 0.0,
-    check: Callable[[SurveyJob], object] = lambda job: None,
+    settings: ClusterSettings | None = None,
 ) -> PreparedSurvey:
     """Open the map and create the store of a survey, or go on with a store of the same survey.
 
@@ -51,9 +60,9 @@ def prepare_survey(
         out: Folder of the store.
         chunk: Side of a chunk [surveyed cells], rounded up to whole tiles (default: some seconds
             of work).
-        max_cells: Largest terrain file [cells] (default: that of `load_terrain`).
+        max_cells: Largest terrain file [cells].
         max_gap: Widest unknown region of a terrain file that is interpolated [m].
-        check: Called with the work before a store is created for it; it may raise.
+        settings: The cluster, whose memory is checked before a store is created.
 
     Raises:
         PlanningError: A map or a store that cannot be used.
@@ -68,20 +77,42 @@ def prepare_survey(
         source = GeoTiffMap(Path(map_name).absolute())
         frame, map_file, content = source.frame, str(source.path), source.hash_content()
     else:
-        limit = {} if max_cells is None else {"max_cells": max_cells}
-        terrain = load_terrain(map_name, **limit).fill_gaps(max_gap)
+        terrain = load_terrain(map_name, max_cells).fill_gaps(max_gap)
         frame, map_file, content = frame_of(terrain), "", fingerprint(terrain)
     notes = _make_notes(request, frame, map_file, content, chunk)
+
+    def make_job(layout: SurveyLayout) -> SurveyJob:
+        return SurveyJob(request, layout, frame.resolution, out.absolute(), map_file)
+
     if not out.exists():
-        check(SurveyJob(request, notes.layout, out.absolute(), map_file))
+        if settings is not None:
+            check_machine(make_job(notes.layout), settings)
         create_store(out, notes, terrain)
     store = SurveyStore(out)
     store.check(notes.description, None if chunk is None else notes.layout.chunk)
-    job = SurveyJob(request, store.notes.layout, out.absolute(), map_file)
-    finished = store.find_finished()
+    job, finished = make_job(store.notes.layout), store.find_finished()
     return PreparedSurvey(
         job, store, [one for one in job.layout.all_chunks if one not in finished]
     )
+
+
+def summarise(store: SurveyStore) -> dict[str, Any]:
+    """Return the number of surveyed cells and their shares by best and worst class."""
+    counts = {name: np.zeros(256, np.int64) for name in ("best_class", "worst_class")}
+    for name, count in counts.items():
+        layer = store.layer(name)
+        for first in range(0, layer.shape[0], BAND):
+            count += np.bincount(layer[first : first + BAND].ravel(), minlength=256)
+    cells = int(counts["best_class"].sum())
+    surveyed = cells - int(counts["best_class"][NOT_SURVEYED])
+    shares = {
+        name: {
+            which: round(int(count[CLASS_NUMBERS[which]]) / max(surveyed, 1), 6)
+            for which in TRAVERSABILITY_CLASSES
+        }
+        for name, count in counts.items()
+    }
+    return {"cells": cells, "surveyed": surveyed, **shares}
 
 
 def _make_notes(

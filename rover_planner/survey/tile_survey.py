@@ -68,6 +68,19 @@ def survey_tile(
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
+def warm_up_survey(request: SurveyRequest) -> None:
+    """Survey one cell of a small ground, so that kernels are compiled and options are checked.
+
+    Raises:
+        ModelError, SoilError: As `survey_tile`.
+    """
+    span = 4.0 * max(x for x, _, _ in map(np.abs, request.rover.suspension.wheels.values()))
+    ground = np.zeros((41, 41))
+    ground[:, 0] = np.nan
+    terrain = Terrain(ground, span / 20.0, (-span, -span))
+    survey_tile(replace(request, headings=2), terrain, np.zeros((1, 2)))
+
+
 def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     """Return the layers (cells,) of a tile of unknown ground."""
     types = types_of_layers(request.headings, request.turns)

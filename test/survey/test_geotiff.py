@@ -14,7 +14,8 @@ pytest.importorskip("zarr", reason="install the extra survey")
 from rover_physics.terrain.grid import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.survey.geotiff import GeoTiffMap, write_cog, write_layers
+from rover_planner.survey.cog import write_cog, write_layers
+from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import unpack_bits
 from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.survey import prepare_survey

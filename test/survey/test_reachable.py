@@ -18,9 +18,9 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import pack_bits, unpack_bits
-from rover_planner.survey.reach.kept_area import open_area
-from rover_planner.survey.reach.moves import find_moves
-from rover_planner.survey.reach.reachable import HeadingGrid, find_reachable, search_area
+from rover_planner.survey.moves import find_moves
+from rover_planner.survey.reachable import HeadingGrid, find_reachable, search_area
+from rover_planner.survey.reachable_area import open_area
 from rover_planner.survey.store import NOTES
 from support.survey_maps import make_request, make_rough_map, survey_here
 
@@ -142,8 +142,9 @@ def test_the_area_is_kept_in_the_store_until_more_is_surveyed(tmp_path):
 
 
 def test_moves_lead_along_their_headings():
-    for headings, k in ((count, k) for count in range(1, 65) for k in range(count)):
-        moves = find_moves(headings, CELL)
+    found = {count: find_moves(count, CELL) for count in (1, 3, 8, 16, 24, 37, 64)}
+    for headings, k in ((count, k) for count in found for k in range(count)):
+        moves = found[headings]
         row, column = moves.steps[k, moves.counts[k] - 1]
         yaw = 2 * np.pi * k / headings
         off = (np.arctan2(row, column) - yaw + np.pi) % (2 * np.pi) - np.pi
@@ -151,7 +152,7 @@ def test_moves_lead_along_their_headings():
         assert moves.lengths[k] == pytest.approx(CELL * np.hypot(row, column))
         steps = np.vstack([[0, 0], moves.steps[k, : moves.counts[k]]])
         assert np.abs(np.diff(steps, axis=0)).max() == 1
-    assert (find_moves(8, CELL).counts == 1).all()
+    assert (found[8].counts == 1).all()
 
 
 def test_a_wall_bounds_what_can_be_reached_and_a_step_has_no_return(tmp_path):

@@ -15,8 +15,8 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.survey.chunk_survey import compute_chunk
-from rover_planner.survey.disk.durable_store import write_durably
+from rover_planner.survey.chunk_survey import compute_chunk, open_map
+from rover_planner.survey.durable_store import write_durably
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
 from support.survey_maps import (
@@ -166,10 +166,9 @@ def test_impossible_numbers_are_refused(changes, said):
 
 
 def test_filled_gaps_are_another_map(files):
-    filled = prepare(files, max_gap=0.3)
-    assert not np.isnan(
-        filled.job.open_map().read((slice(0, 70), slice(0, 70)))["elevation"]
-    ).any()
+    job = prepare(files, max_gap=0.3).job
+    box = slice(0, 70), slice(0, 70)
+    assert not np.isnan(open_map(job.store, job.map_file).read(box)["elevation"]).any()
     with pytest.raises(PlanningError, match="another map"):
         prepare(files)
 

@@ -14,9 +14,8 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import CLASS_NUMBERS
-from rover_planner.survey.palette import CLASS_COLOURS
-from rover_planner.survey.reach.reachable import find_reachable
+from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
+from rover_planner.survey.reachable import find_reachable
 from rover_planner.viewer.panel.survey_legend import draw_survey_legend
 from rover_planner.viewer.scene.survey_mesh import build_survey_mesh
 from rover_planner.viewer.state.colours import UNKNOWN, from_css

@@ -23,14 +23,17 @@ from rover_planner.shell.extras import need
 from rover_planner.survey.chunk_survey import open_map
 from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
+    CLASS_COLOURS,
+    CLASS_LABELS,
     CLASS_NUMBERS,
     NOT_SURVEYED,
     QUANTITIES,
+    SOME_HEADINGS,
+    UNKNOWN_LABEL,
     number_limits,
     unpack_bits,
 )
-from rover_planner.survey.palette import CLASS_COLOURS, CLASS_LABELS, SOME_HEADINGS, UNKNOWN_LABEL
-from rover_planner.survey.reach.kept_area import open_area
+from rover_planner.survey.reachable_area import open_area
 from rover_planner.survey.store import SurveyStore
 from rover_planner.viewer.state.colours import (
     UNKNOWN,
@@ -251,7 +254,7 @@ def load_map(path: Path, max_cells: int) -> Terrain:
             f"{show_file(notes.map_file)} has changed since {show_file(path)} was made"
         )
     grids: Any = source.read((slice(0, rows), slice(0, columns)))
-    frame = source.frame
+    frame = notes.frame
     return Terrain(
         **grids, resolution=frame.resolution, origin=frame.origin, soil_names=source.soil_names
     )

@@ -69,7 +69,7 @@ def test_a_far_map_looks_like_a_near_one_and_a_click_lands_where_it_is_aimed(bro
 
 def test_a_survey_is_shown_and_said_to_be_of_another_policy(browser, tmp_path):
     pytest.importorskip("zarr", reason="install the extra survey")
-    from rover_planner.survey.reach.reachable import find_reachable
+    from rover_planner.survey.reachable import find_reachable
     from rover_planner.viewer.state.survey_layers import REACHABLE, load_map, open_survey
     from support.survey_maps import make_request, survey_here
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reachable area of a survey, as it is kept in the survey's store."""
+"""The reachable area of a survey, kept in the survey's store."""
 
 import contextlib
 import os
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,25 @@ from rover_planner.survey.store import SurveyStore
 GROUP = "reachable"
 """Group of the store that holds the last area."""
 DISTANCE = "distance"
-"""Array of the group: (ny, nx) length of the shortest way [m]."""
+"""Array of the group: (ny, nx) length of the shortest path [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class ReachableArea:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AreaNumbers:
+    """The numbers of the cells that can be reached from a start and returned from."""
+
+    cells: int
+    """Number of cells that can be reached and returned from."""
+    reached: int
+    """Number of cells that can be reached, returned from or not."""
+    longest: float | None
+    """Longest of the shortest paths [m]; None if there is none."""
+    farthest: Index | None
+    """Row and column of its end; None if there is none."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReachableArea(AreaNumbers):
     """The cells that can be reached from a start and returned from."""
 
     start: Index
@@ -29,18 +43,10 @@ class ReachableArea:
     from_place: tuple[float, float]
     """x, y of the start as it was asked [m]."""
     distance: Any
-    """(ny, nx) Zarr array, length of the shortest way [m], infinite where the rover cannot go or
+    """(ny, nx) Zarr array, length of the shortest path [m], infinite where the rover cannot go or
     return."""
     cell: float
     """Distance of surveyed cells [m]."""
-    cells: int
-    """Number of cells that can be reached and returned from."""
-    reached: int
-    """Number of cells that can be reached, returned from or not."""
-    longest: float | None
-    """Longest of the shortest ways [m]; None if there is none."""
-    farthest: Index | None
-    """Row and column of its end; None if there is none."""
 
     @property
     def area(self) -> float:
@@ -83,18 +89,17 @@ def new_area(store: SurveyStore) -> Iterator[tuple[Path, Any]]:
         ) from None
 
 
-def note_area(store: SurveyStore, group: Any, area: ReachableArea) -> None:
-    """Note the numbers of an area beside its distances."""
+def note_area(
+    store: SurveyStore,
+    group: Any,
+    start: Index,
+    place: tuple[float, float],
+    numbers: AreaNumbers,
+) -> None:
+    """Note beside the distances of an area its start, as a cell and as asked, and its numbers."""
+    finished = len(store.find_finished())
     group.attrs.update(
-        {
-            "start": list(area.start),
-            "from": list(area.from_place),
-            "cells": area.cells,
-            "reached": area.reached,
-            "longest": area.longest,
-            "farthest": None if area.farthest is None else list(area.farthest),
-            "chunks_finished": len(store.find_finished()),
-        }
+        {"start": start, "from": place, **asdict(numbers), "chunks_finished": finished}
     )
 
 
@@ -107,18 +112,16 @@ def open_area(store: SurveyStore) -> ReachableArea | None:
     try:
         group: Any = zarr.open_group(store.path, mode="r", path=GROUP)
         notes = dict(group.attrs)
-        if notes["chunks_finished"] != len(store.find_finished()):
+        if notes.pop("chunks_finished") != len(store.find_finished()):
             return None
-        (row, column), (x, y), farthest = notes["start"], notes["from"], notes["farthest"]
+        farthest = notes.pop("farthest")
         return ReachableArea(
-            (row, column),
-            (x, y),
-            group[DISTANCE],
-            store.notes.cell,
-            notes["cells"],
-            notes["reached"],
-            notes["longest"],
-            None if farthest is None else (farthest[0], farthest[1]),
+            start=tuple(notes.pop("start")),
+            from_place=tuple(notes.pop("from")),
+            distance=group[DISTANCE],
+            cell=store.notes.cell,
+            farthest=None if farthest is None else tuple(farthest),
+            **notes,
         )
     except (OSError, KeyError, ValueError, TypeError):
         return None

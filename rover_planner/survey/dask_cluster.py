@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cluster of a survey: a Dask scheduler that runs, or processes of this machine."""
+"""The cluster of a survey, of Dask: how it is opened, and what is checked of it beforehand."""
 
 import contextlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rover_planner.errors import PlanningError
+from rover_planner.survey.chunk_survey import SurveyJob, estimate_memory
 
 ATTEMPTS = 3
 """Number of times that a chunk is tried."""
 CONNECT_TIME = 10.0
 """Longest time to reach a scheduler [s]."""
+WORKERS_TIME = 300.0
+"""Longest time to wait for the first worker of a scheduler [s]."""
 SETTINGS = {
     "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
     "distributed.logging.distributed": "critical",
@@ -60,23 +63,20 @@ def check_settings(settings: ClusterSettings) -> None:
         raise PlanningError(
             f"memory limit is {settings.memory_limit!r}; it must be a size such as 1GiB"
         )
-    if settings.scheduler is not None:
-        for name, value in (
-            ("workers", settings.workers),
-            ("memory-limit", settings.memory_limit),
-        ):
-            if value is not None:
-                raise PlanningError(
-                    f"--{name} is {value}; leave it out, as workers of --scheduler are its own"
-                )
-    if settings.scheduler is not None and "://" not in settings.scheduler:
+    if settings.scheduler is None:
+        return
+    for name, value in (("workers", settings.workers), ("memory-limit", settings.memory_limit)):
+        if value is not None:
+            raise PlanningError(
+                f"--{name} is {value}; leave it out, as workers of --scheduler are its own"
+            )
+    if "://" not in settings.scheduler:
         raise PlanningError(
             f"scheduler is {settings.scheduler!r}; it must be an address such as "
             "tcp://10.0.0.1:8786"
         )
-    if settings.scheduler is not None:
-        with open_client(settings):
-            pass
+    with open_client(settings):
+        pass
 
 
 @contextlib.contextmanager
@@ -130,3 +130,90 @@ def _silent_logs() -> Iterator[None]:
     finally:
         for name, level in levels.items():
             logging.getLogger(name).setLevel(level)
+
+
+def check_machine(job: SurveyJob, settings: ClusterSettings) -> None:
+    """Check that workers have the memory for the largest chunk, before a store is made for it.
+
+    Those of a scheduler are asked if there are some by now.
+
+    Raises:
+        PlanningError: They do not have it, or there is no such scheduler.
+    """
+    from dask.system import CPU_COUNT
+    from distributed.system import MEMORY_LIMIT
+
+    if settings.scheduler is not None:
+        with open_client(settings) as client:
+            _check_memory(job, client)
+        return
+    share = MEMORY_LIMIT // CPU_COUNT  # of a worker, by Dask's default
+    _compare(job, settings.memory_size or share)
+    workers, needed = settings.workers or CPU_COUNT, estimate_memory(job)
+    if workers * needed > MEMORY_LIMIT:
+        raise PlanningError(
+            f"{workers} workers need {workers * needed / 1e6:.0f} MB; this machine has "
+            f"{MEMORY_LIMIT / 1e6:.0f} MB: give fewer --workers or a smaller --chunk"
+        )
+
+
+def wait_for_workers(client: Any) -> None:
+    """Wait for the first worker of a cluster.
+
+    Raises:
+        PlanningError: None comes.
+    """
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_TIME)
+    except TimeoutError:
+        raise PlanningError(
+            f"the scheduler has had no worker for {WORKERS_TIME:g} s; start some, the same "
+            "command goes on"
+        ) from None
+
+
+def check_workers(job: SurveyJob, client: Any, workers: Sequence[str]) -> None:
+    """Check that workers, by address, have this version, see the store and have enough memory.
+
+    A worker that cannot import a task would never answer.
+
+    Raises:
+        PlanningError: A worker does not.
+    """
+    store, version, package = str(job.store), job.version, "rover_physics"
+
+    def find_fault() -> str:  # sent by its code: a worker may have no module to import it from
+        import importlib
+        import os
+
+        try:
+            found = importlib.import_module(package).__version__
+            importlib.import_module("rover_planner.survey.chunk_survey")
+        except ImportError as error:
+            return f"cannot import rover_planner: {error}"
+        if found != version:
+            return f"has version {found}, not {version}"
+        return "" if os.path.isdir(store) else f"does not see {store}"
+
+    answers = client.run(find_fault, on_error="return", workers=list(workers))
+    for worker, fault in answers.items():
+        if fault and not isinstance(fault, OSError):  # that of one which went away
+            raise PlanningError(f"worker {worker} {fault}")
+    _check_memory(job, client)
+
+
+def _check_memory(job: SurveyJob, client: Any) -> None:
+    """Check that the largest chunk fits into the memory of each worker there is."""
+    workers = client.scheduler_info(n_workers=-1)["workers"].values()
+    limits = [worker["memory_limit"] // worker["nthreads"] for worker in workers]
+    _compare(job, min((limit for limit in limits if limit), default=0))
+
+
+def _compare(job: SurveyJob, least: int) -> None:
+    """Compare the memory of the largest chunk with that of a worker [bytes], 0: no limit."""
+    needed = estimate_memory(job)
+    if least and needed > least:
+        raise PlanningError(
+            f"a chunk of {job.layout.chunk} x {job.layout.chunk} cells needs {needed / 1e6:.0f} MB"
+            f"; a worker has {least / 1e6:.0f} MB: give a smaller --chunk or more memory"
+        )

@@ -1,26 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws the answer to a question for a way: the way, or the closed area, on the shaded map."""
+"""Draws the answer to a question for a path: the path, or the closed area, on the shaded map."""
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from rover_planner.figures.pictures import STYLE, save_figure
-from rover_planner.figures.plots import PASSABLE, REFUSED, hill_shade
+from rover_planner.figures.pictures import (
+    INK,
+    PASSABLE,
+    REFUSED,
+    draw_ground,
+    drawing,
+    find_extent,
+)
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import WayAnswer
 
-_INK = "#222222"
 
-
-def draw_way(path: Path, question: WayQuestion, answer: WayAnswer) -> None:
-    """Draw the map with start and goal, and the way or the area that is closed in.
+def draw_path(path: Path, question: WayQuestion, answer: WayAnswer) -> None:
+    """Draw the map with start and goal, and the path or the area that is closed in.
 
     Args:
         path: Picture to write; its suffix sets the format, such as .png.
@@ -30,53 +31,32 @@ def draw_way(path: Path, question: WayQuestion, answer: WayAnswer) -> None:
     Raises:
         PlanningError: The file cannot be written.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.5, 7.0), layout="constrained")
-        FigureCanvasAgg(figure)
+    terrain = question.terrain
+    elevation = np.asarray(terrain.elevation)
+    with drawing(path, (8.5, 7.0)) as figure:
         axes = figure.subplots()
-        _draw_ground(axes, question)
+        extent = find_extent(terrain.origin, elevation.shape, terrain.resolution)
+        draw_ground(axes, elevation, terrain.resolution, extent)
         if answer.closed is not None:
             _draw_area(axes, answer)
         if answer.path is not None:
             x, y, _ = answer.path.poses.T
             halo = [withStroke(linewidth=4.5, foreground="white")]
             axes.plot(x, y, color=PASSABLE, linewidth=2.2, path_effects=halo, label="way")
-        for name, pose, colour in (
-            ("start", question.start, _INK),
-            ("goal", question.goal, REFUSED),
-        ):
-            _draw_end(axes, name, np.asarray(pose), colour)
-        axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+        _draw_end(axes, "start", np.asarray(question.start), INK)
+        _draw_end(axes, "goal", np.asarray(question.goal), REFUSED)
         axes.set_title(_title(answer), loc="left", wrap=True)
         axes.legend(loc="upper left", frameon=True, framealpha=0.85)
-        save_figure(path, figure)
-
-
-def _draw_ground(axes: Axes, question: WayQuestion) -> None:
-    terrain = question.terrain
-    xmin, xmax, ymin, ymax = terrain.bounds
-    half = 0.5 * terrain.resolution
-    axes.grid(False)
-    axes.set_facecolor("#CCD6E6")
-    axes.imshow(
-        hill_shade(np.asarray(terrain.elevation), terrain.resolution),
-        origin="lower",
-        extent=(xmin - half, xmax + half, ymin - half, ymax + half),
-        cmap="gray",
-        vmin=0.0,
-        vmax=1.1,
-    )
 
 
 def _draw_area(axes: Axes, answer: WayAnswer) -> None:
     assert answer.closed is not None
     nodes = answer.nodes
-    x, y = (nodes.cell * (first - 0.5) for first in nodes.first)
-    rows, columns = nodes.shape
+    left, low = (nodes.cell * first for first in nodes.first)
     axes.imshow(
         np.where(answer.closed.places, 1.0, np.nan),
         origin="lower",
-        extent=(x, x + columns * nodes.cell, y, y + rows * nodes.cell),
+        extent=find_extent((left, low), nodes.shape, nodes.cell),
         cmap=ListedColormap([REFUSED if answer.closed.around_goal else PASSABLE]),
         alpha=0.45,
     )

@@ -12,15 +12,15 @@ from numpy.typing import DTypeLike, NDArray
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import bits_type, number_limits, pack_bits, unpack_bits
 from rover_planner.survey.layout import Index
-from rover_planner.survey.reach.kept_area import (
+from rover_planner.survey.moves import Moves, advance_front, find_moves
+from rover_planner.survey.reachable_area import (
     DISTANCE,
+    AreaNumbers,
     ReachableArea,
     new_area,
     note_area,
     open_area,
 )
-from rover_planner.survey.reach.kernels import advance_front
-from rover_planner.survey.reach.moves import Moves, find_moves
 from rover_planner.survey.store import SurveyStore
 
 CLOSED = -1.0
@@ -40,15 +40,6 @@ class HeadingGrid(NamedTuple):
     """Number of rows that are read at once."""
 
 
-class AreaNumbers(NamedTuple):
-    """The numbers of an area; meanings as in `ReachableArea`."""
-
-    cells: int
-    reached: int
-    longest: float | None
-    farthest: Index | None
-
-
 def find_reachable(
     store: SurveyStore,
     x: float,
@@ -57,9 +48,9 @@ def find_reachable(
 ) -> ReachableArea:
     """Find where the rover can go from a place and return to it, and keep that in the store.
 
-    It drives straight ahead between cells where the heading is passable at all cells on the way.
+    It drives straight ahead between cells where the heading is passable at all cells between.
     It turns by one heading where both are passable, or, if the survey has judged turns, where it
-    may turn on the spot at both. Ways begin at any passable heading and end at any.
+    may turn on the spot at both. Paths begin at any passable heading and end at any.
 
     Args:
         store: The survey.
@@ -81,8 +72,7 @@ def find_reachable(
     )
     with new_area(store) as (folder, group):
         numbers = search_area(grid, start, group[DISTANCE], folder, report)
-        area = ReachableArea(start, (x, y), group[DISTANCE], notes.cell, *numbers)
-        note_area(store, group, area)
+        note_area(store, group, start, (x, y), numbers)
     kept = open_area(store)
     assert kept is not None
     return kept
@@ -132,13 +122,13 @@ def search_area(
         for span in spans:
             for row, bits in enumerate(np.asarray(grid.passable[span]), span.start):
                 distance[row] = np.where(unpack_bits(bits, headings), np.inf, CLOSED)
-        _measure_ways(distance, turnable, moves, start)
+        _measure_paths(distance, turnable, moves, start)
 
     report("find where the rover returns from")
     measure(grid.moves.reversed())
     for row in range(rows):
         returns[row] = pack_bits(distance[row] == 0.0)
-    report("measure the ways")
+    report("measure the paths")
     measure(grid.moves)
     cells, reached, longest, farthest = 0, 0, -1.0, None
     for span in spans:
@@ -155,15 +145,17 @@ def search_area(
         if np.isfinite(nearest).any():
             area[span] = nearest
             cells += int(np.isfinite(nearest).sum())
-    return AreaNumbers(cells, reached, longest if cells else None, farthest)
+    return AreaNumbers(
+        cells=cells, reached=reached, longest=longest if cells else None, farthest=farthest
+    )
 
 
-def _measure_ways(
+def _measure_paths(
     distance: NDArray[np.float32], turnable: NDArray[Any], moves: Moves, start: Index
 ) -> None:
-    """Find the length of the shortest way from any heading at a cell to each node.
+    """Find the length of the shortest path from any heading at a cell to each node.
 
-    Lengths are sums from the start on, rounded after each move, and the least of all ways; so
+    Lengths are sums from the start on, rounded after each move, and the least of all paths; so
     they do not depend on the order of the search. Nodes up to one move ahead of the nearest go
     first, so that few are visited twice.
 
