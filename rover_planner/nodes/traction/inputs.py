@@ -27,7 +27,7 @@ from rover_planner.ros.publisher_check import ExpectedType, PublisherCheck
 from rover_planner.ros.qos import map_subscriptions, sensor_qos
 from rover_planner.ros.qos_warnings import warn_of_mismatch
 from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.traction.stamps import NANOSECONDS, StampCheck, StampError
+from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
     IMU,

@@ -12,17 +12,17 @@ from msg_adapters.elevation import PointMove, terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.rover.model import Rover
+from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.nodes.navigation.frames import Frames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import TransformError
 from rover_planner.ros.logs.repeat_log import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 
 CLOUD = "elevation_cloud"
 
 
-class TractionMaps(MapIntake[PreparedMap]):
+class TractionMaps(MapIntake[MapContactFinder]):
     """Prepares clouds for the controller in a thread of their own."""
 
     def __init__(
@@ -64,11 +64,11 @@ class TractionMaps(MapIntake[PreparedMap]):
             self._unplaced = None
             self.repeat()
 
-    def _make(self, cloud: PointCloud2) -> PreparedMap:
+    def _make(self, cloud: PointCloud2) -> MapContactFinder:
         """Prepare a map from a cloud; called in the thread."""
         values, move = self._parameters, self._find_move(cloud)
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
-        return prepare_map(self._rover(), terrain)
+        return MapContactFinder(self._rover(), terrain)
 
     def _find_move(self, cloud: PointCloud2) -> PointMove | None:
         """Return what moves the points to the map's frame; None if they are in it."""
