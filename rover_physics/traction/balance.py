@@ -8,8 +8,8 @@ then hold the rover against gravity and add the push.
 
 Wheels may be turned. They then roll along the motion of `rolling`: tractions count along the
 wheels' own headings, "equal" ones have the sign with which each wheel rolls in this motion, and a
-push accelerates the rover along it. A push is a generalised force: its work per mean way of the
-wheels.
+push accelerates the rover along it. A push is a generalised force: its work per mean distance that
+the wheels roll.
 """
 
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ from rover_physics.traction.layout import (
     TRACTION_EQUATION,
     TRACTIONS,
 )
-from rover_physics.traction.rolling import ROLLING, Rolling, write_rolling
+from rover_physics.traction.rolling import ROLLING, write_rolling
 
 FORCE_ROW, MOMENT_ROW = 0, 3
 """First row of the forces and of the moments in the equations of `equilibrium`."""
@@ -81,49 +81,30 @@ MEASURED_BALANCE = record_type(
 """The equations of `BalanceRows`, for kernels."""
 
 
-@dataclass(frozen=True, eq=False)
 class BalanceRows:
     """Nine equations A x = b with x = tractions (6), loads (6), s0, s1, all in `force_unit`.
 
-    `layout` names the variables and equations.
+    `layout` names the variables and equations; the arrays are views of MEASURED_BALANCE.
     """
 
-    packed: np.ndarray
-    """Array (1,) of MEASURED_BALANCE."""
-
-    @property
-    def A(self) -> np.ndarray:  # noqa: N802
-        """Coefficients (9, 14), of order 1."""
-        return self.packed["A"][0]
-
-    @property
-    def b(self) -> np.ndarray:
-        """Right-hand sides (9,)."""
-        return self.packed["b"][0]
-
-    @property
-    def lateral_shares(self) -> np.ndarray:
+    def __init__(self, packed: np.ndarray):
+        """Give the fields of `packed`, an array (1,) of MEASURED_BALANCE, their names."""
+        self.packed = packed
+        self.A, self.b = packed["A"][0], packed["b"][0]
+        self.directions = packed["directions"][0]
+        self.lateral_shares = packed["lateral_shares"][0]
         """Shares (6, 2) of the wheels in the lateral terms: S_i = s0 share_i0 + s1 share_i1.
 
         With wheels straight ahead they are 1 and the wheel's position along the body in rover
         lengths, from rear to front axle.
         """
-        return self.packed["lateral_shares"][0]
-
-    @property
-    def directions(self) -> np.ndarray:
-        """Signs (6,): 1 where a wheel rolls forward in the motion of `rolling`, -1 backward."""
-        return self.packed["directions"][0]
+        self.force_unit = float(packed["force_unit"][0])
+        """A sixth of the weight in [N]."""
 
     def lateral_forces(self, x: np.ndarray) -> np.ndarray:
         """Return the lateral forces (6,) of x (14,), in its unit."""
         shares = self.lateral_shares
         return x[LATERAL_SHARE] * shares[:, 0] + x[LATERAL_SLOPE] * shares[:, 1]
-
-    @property
-    def force_unit(self) -> float:
-        """A sixth of the weight in [N]."""
-        return float(self.packed["force_unit"][0])
 
     @property
     def wheel_speeds(self) -> np.ndarray:
@@ -133,11 +114,6 @@ class BalanceRows:
         coefficients of the traction equation, which is the principle of virtual work.
         """
         return WHEEL_COUNT * self.A[TRACTION_EQUATION, TRACTIONS]
-
-    @property
-    def equal_pull(self) -> float:
-        """Traction of each wheel in its direction if all are equal, in force units."""
-        return float(self.b[TRACTION_EQUATION])
 
     def complete(self, tractions: np.ndarray) -> np.ndarray:
         """Return x (14,) that keeps all nine equations and the differences between tractions.
@@ -157,11 +133,7 @@ class BalanceRows:
 
 MEASUREMENT = record_type(
     ("pose", float, (3,)),  # x, y [m] and yaw [rad], for `place`
-    (
-        "q",
-        float,
-        (6,),
-    ),  # z [m], roll, pitch, right rocker, right and left bogie [rad], for `place`
+    ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie [rad], also
     ("contact_angles", float, (WHEEL_COUNT,)),  # [rad]
     ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
     ("steering", float, (WHEEL_COUNT,)),  # [rad]
@@ -210,11 +182,11 @@ class BalanceWriter:
         self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
         """(6,) whether each wheel hangs on a bogie."""
 
-    def find_rolling(self, state: MeasuredState) -> Rolling:
-        """Return how the wheels roll at a measured state; contact angles are not used."""
+    def find_rolling(self, state: MeasuredState) -> Any:
+        """Return a record ROLLING at a measured state; contact angles are not used."""
         self._take(state)
-        _find_rolling(self._linkages, self._works)
-        return Rolling(self._works["rolling"].copy())
+        _place_wheels(self._linkages, self._works)
+        return self._works["rolling"].copy()[0]
 
     def _take(self, state: MeasuredState) -> None:
         q = self._q
@@ -279,14 +251,9 @@ def _complete(balances, tractions, x):
 
 
 @kernel
-def _find_rolling(linkages, works):
-    """Place the wheels of the state in `works` and write how they roll."""
-    _place_wheels(linkages[0], works[0])
-
-
-@kernel
-def _place_wheels(linkage, work):
-    """Place wheels and linkage, and write how the wheels roll."""
+def _place_wheels(linkages, works):
+    """Place the wheels and links of the state in `works`, and write how the wheels roll."""
+    linkage, work = linkages[0], works[0]
     measured, placement = work.measured, work.placement
     for wheel in range(WHEEL_COUNT):
         placement.steering[wheel] = measured.steering[wheel]
@@ -300,7 +267,7 @@ def _write_balance(linkages, works, balances):
     linkage, work, rows = linkages[0], works[0], balances[0]
     placement, balance, measured = work.placement, work.balance, work.measured
     columns = 1 + FREE_TORQUES
-    _place_wheels(linkage, work)
+    _place_wheels(linkages, works)
     place_masses(linkage, measured.q, placement)
     _write_contacts(linkage.radius, work)
     write_equations(linkage, placement, work.contacts, columns, balance)

@@ -136,18 +136,12 @@ class MotionContactEstimator:
         )
         self._motions = array_of(new_record(MOTION))
         self._started = False
-        # Views are kept because looking up a field of a record is as slow as writing it.
-        state, motion = self._filters[0], self._motions[0]
-        self._angles, self._covariance = state.angles, state.covariance
-        self._attitude, self._joints = motion.attitude, motion.joints
-        self._joint_rates = motion.joint_rates
-        self._wheel_rates, self._body_rates = motion.wheel_rates, motion.body_rates
-        self._steering = motion.steering
 
     @property
     def estimate(self) -> ContactEstimate:
         """The current estimate."""
-        return ContactEstimate(self._angles.copy(), self._covariance.copy(), "motion")
+        state = self._filters[0]
+        return ContactEstimate(state.angles.copy(), state.covariance.copy(), "motion")
 
     def update(self, motion: Motion, duration: float) -> ContactEstimate:
         """Correct the angles by a measurement and return them.
@@ -156,11 +150,14 @@ class MotionContactEstimator:
             motion: All values finite.
             duration: Time since the last measurement [s].
         """
-        self._attitude[:] = motion.roll, motion.pitch
-        self._joints[0], self._joints[1:] = motion.rocker_angle, motion.bogie_angles
-        self._joint_rates[0], self._joint_rates[1:] = motion.rocker_rate, motion.bogie_rates
-        self._wheel_rates[:], self._body_rates[:] = motion.wheel_rates, motion.body_rates
-        self._steering[:] = motion.steering
+        self._motions[0] = (
+            (motion.roll, motion.pitch),
+            (motion.rocker_angle, *motion.bogie_angles),
+            (motion.rocker_rate, *motion.bogie_rates),
+            motion.wheel_rates,
+            motion.body_rates,
+            motion.steering,
+        )
         if not self._started:
             _start(self._linkages, self._motions, self._filters)
             self._started = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How good shared forces are, by the round cone, and the best ones on the way to an answer."""
+"""The peak utilisation of shared forces by the round cone, and its search along a line."""
 
 import numpy as np
 
@@ -11,13 +11,14 @@ from rover_physics.traction.layout import (
     LATERAL_SHARE,
     LATERAL_SLOPE,
     LOAD,
-    LOADS,
     TRACTION,
-    TRACTIONS,
 )
 from rover_physics.traction.program import (
+    EFFORT_WEIGHT,
     MIN_LOAD,
     MIN_PEAK,
+    PEAK_WEIGHT,
+    SLACK_PRICE,
     ProgramInputs,
     Reference,
     max_pull_of,
@@ -28,19 +29,13 @@ LINE_END = 1.5
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 """The golden section."""
 SECTIONS = 10
-"""Sections of the search; they find the best place to within 1 % of the way."""
+"""Sections of the search; they find the best place to within 1 % of the line."""
 ROUNDING = 1e-4
 """Share of the largest pull by which OSQP may exceed it."""
 
 
-def measure_utilisation(rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray) -> np.ndarray:
-    """Return sqrt(T^2 + S^2) / (mu N) (6,) of x (14,), with loads of MIN_LOAD at least."""
-    across = np.hypot(x[TRACTIONS], rows.lateral_forces(x))
-    return across / (inputs.friction * np.maximum(x[LOADS], MIN_LOAD))
-
-
 def measure_peak(rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray) -> float:
-    """Return the largest of `measure_utilisation`."""
+    """Return the largest sqrt(T^2 + S^2) / (mu N) of x (14,), with loads of MIN_LOAD at least."""
     return _measure_first_peak(rows.packed, inputs.packed, x)
 
 
@@ -51,12 +46,12 @@ def find_best_between(
 
     A program knows cones as they are about its reference; far from it they may be wrong, and a
     sequence of answers may oscillate. Where its answer has a smaller peak than the reference,
-    peaks fall from the reference on, so that the best place on the way never has a larger one.
+    peaks fall from the reference on, so that the best place on the line never has a larger one.
     The balance is linear: all on the line keep it where both ends do.
 
     Args:
         rows: The balance.
-        inputs: Friction and torque of the wheels, weights of the program.
+        inputs: Friction and torque of the wheels.
         reference: The last forces; its peak is not used.
         aim: (14,) the answer of a program, in force units.
 
@@ -137,7 +132,6 @@ def _cost_at(place, balance, inputs, points, units):
     """
     start, aim, x = points
     max_pull, peak_unit, unit = units
-    weights = inputs.weights
     squares = pull = lift = 0.0
     for k in range(FORCES):
         x[k] = start[k] + place * (aim[k] - start[k])
@@ -147,5 +141,5 @@ def _cost_at(place, balance, inputs, points, units):
         pull = max(pull, abs(traction) - (1.0 + ROUNDING) * max_pull)
         lift = max(lift, -x[LOAD + wheel])
     peak = _measure_peak(balance, inputs, x) / peak_unit
-    cost = 0.5 * (weights.peak * peak * peak + weights.effort * squares / (unit * unit))
-    return cost + weights.slack * (max(peak - 1.0 / peak_unit, 0.0) + (pull + lift) / unit)
+    cost = 0.5 * (PEAK_WEIGHT * peak * peak + EFFORT_WEIGHT * squares / (unit * unit))
+    return cost + SLACK_PRICE * (max(peak - 1.0 / peak_unit, 0.0) + (pull + lift) / unit)

@@ -25,8 +25,8 @@ from rover_physics.traction.contact_ekf import ContactEstimate
 MAP_SOURCE = "map"
 """Source of an estimate from a map."""
 PROFILE_STEPS = 40
-"""Number of ground samples from below a wheel's centre to PROFILE_REACH ahead; same behind."""
-PROFILE_REACH = 1.25
+"""Number of ground samples from below a wheel's centre to PROFILE_LENGTH ahead; same behind."""
+PROFILE_LENGTH = 1.25
 """Distance ahead of and behind a wheel's centre over which the ground is sampled [wheel radii]."""
 PROFILES, MIDDLE_PROFILE = 3, 1
 """Number of ground profiles of a wheel, along its right edge, middle and left edge; index of the
@@ -42,11 +42,7 @@ CELL_DEVIATION = 0.3
 
 MAP_SEARCH = record_type(
     ("pose", float, (3,)),  # x, y [m] and yaw [rad] of the body's origin, map frame
-    (
-        "q",
-        float,
-        (6,),
-    ),  # z [m], roll, pitch, right rocker, right and left bogie [rad], for `place`
+    ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie [rad]
     ("directions", float, (WHEEL_COUNT,)),  # 1 where a wheel rolls forward, -1 where backward
     ("placement", PLACEMENT),
     ("distance", float, (PROFILES, MAX_PLACES)),  # of near places from the wheel's centre [m]
@@ -58,22 +54,18 @@ MAP_SEARCH = record_type(
 
 
 class MapContactFinder:
-    """Finds contact angles of one rover on one map."""
+    """Finds contact angles of `rover` on `terrain`."""
 
     def __init__(self, rover: Rover, terrain: Terrain):
-        """Prepare for a rover and a map."""
+        """Prepare for a rover and a map; takes several milliseconds."""
+        self.rover, self.terrain = rover, terrain
         self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
-        self._radius = rover.wheel.radius
         self._ground = pack_ground(terrain)
-        self._resolution = terrain.resolution
         self._searches = array_of(new_record(MAP_SEARCH))
         # Views are kept because looking up a field of a record is as slow as writing it.
         search = self._searches
-        self._pose, self._q, self._directions = (
-            search["pose"][0],
-            search["q"][0],
-            search["directions"][0],
-        )
+        self._pose, self._q = search["pose"][0], search["q"][0]
+        self._directions = search["directions"][0]
         self._steering = search["placement"]["steering"][0]
         self._gaps, self._angles = search["gaps"][0], search["angles"][0]
 
@@ -101,59 +93,40 @@ class MapContactFinder:
         self._q[4:] = state.bogie_angles
         self._directions[:] = directions
         self._steering[:] = state.steering
-        _find_angles(self._ground.records, self._linkages, self._searches)
-        known = np.isfinite(self._gaps) & np.isfinite(self._angles)
+        arrays = self._ground.records, self._linkages, self._searches
+        _measure_gaps(*arrays)
+        known = np.isfinite(self._gaps)
+        if known.all():
+            lower, upper = np.sort(self._gaps)[WHEEL_COUNT // 2 - 1 : WHEEL_COUNT // 2 + 1]
+            self._q[0] -= 0.5 * (lower + upper)
+            _find_nearest(*arrays)
+            known = np.isfinite(self._angles)
         if not known.all():
             raise ModelError(
                 f"{WHEELS[int(np.argmin(known))]} of a rover at {np.round(pose[:2], 2)} m is over "
                 "ground that the map does not have"
             )
-        error = np.hypot(deviation, CELL_DEVIATION * self._resolution) / self._radius
+        error = np.hypot(deviation, CELL_DEVIATION * self.terrain.resolution)
+        error /= self.rover.wheel.radius
         covariance = (ANGLE_DEVIATION**2 + error**2) * np.eye(WHEEL_COUNT)
         return ContactEstimate(self._angles.copy(), covariance, MAP_SOURCE)
 
 
 @kernel
-def _find_angles(grounds, linkages, searches):
-    """Write gaps at the given height, and angles at the height at which the wheels touch."""
+def _measure_gaps(grounds, linkages, searches):
+    """Write gaps at the given height [m]: from each wheel's middle circle to the ground."""
     ground, linkage, search = grounds[0], linkages[0], searches[0]
-    search.angles[:] = 0.0
     place(linkage, search.pose, search.q, search.placement)
-    _measure_gaps(ground, linkage, search)
-    search.q[0] -= _find_median(search.gaps)
-    if np.isfinite(search.q[0]):
-        place(linkage, search.pose, search.q, search.placement)
-        _find_nearest(ground, linkage, search)
-
-
-@kernel
-def _find_median(values):
-    """Return the median of values (6,), NaN if one of them is NaN."""
-    lower = upper = np.nan
-    for i in range(WHEEL_COUNT):
-        if values[i] != values[i]:
-            return np.nan
-        rank = 0
-        for j in range(WHEEL_COUNT):
-            rank += values[j] < values[i] or (values[j] == values[i] and j < i)
-        if rank == WHEEL_COUNT // 2 - 1:
-            lower = values[i]
-        if rank == WHEEL_COUNT // 2:
-            upper = values[i]
-    return 0.5 * (lower + upper)
-
-
-@kernel
-def _measure_gaps(ground, linkage, search):
-    """Write the distance of the ground from each wheel's middle circle [m], NaN if unknown."""
     for wheel in range(WHEEL_COUNT):
         _scan_profile(ground, linkage, search, wheel, MIDDLE_PROFILE)
         search.gaps[wheel] = search.distance[MIDDLE_PROFILE, 0] - linkage.radius
 
 
 @kernel
-def _find_nearest(ground, linkage, search):
+def _find_nearest(grounds, linkages, searches):
     """Write for each wheel the angle of the place farthest ahead among its nearest places."""
+    ground, linkage, search = grounds[0], linkages[0], searches[0]
+    place(linkage, search.pose, search.q, search.placement)
     angles = search.angles
     for wheel in range(WHEEL_COUNT):
         direction = search.directions[wheel]
@@ -186,7 +159,7 @@ def _scan_profile(ground, linkage, search, wheel, profile):
     cz = centres[wheel, 2] + offset * axis[2]
     for k in range(MAX_PLACES):
         distances[profile, k] = angles[profile, k] = np.inf
-    step = PROFILE_REACH * linkage.radius / PROFILE_STEPS
+    step = PROFILE_LENGTH * linkage.radius / PROFILE_STEPS
     x0 = z0 = 0.0
     count, falling, last, last_angle = 0, False, np.inf, 0.0
     for k in range(-PROFILE_STEPS, PROFILE_STEPS + 1):

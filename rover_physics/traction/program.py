@@ -30,7 +30,7 @@ Journal of Optimization Theory and Applications 47, 1985; Rockafellar, "Monotone
 proximal point algorithm", SIAM Journal on Control and Optimization 14, 1976.
 """
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -63,42 +63,28 @@ from rover_physics.traction.layout import (
     VARIABLES,
 )
 
-WEIGHTS = record_type(("peak", float), ("effort", float), ("change", float), ("slack", float))
-"""`TractionWeights` as the kernels read them."""
-
-
-@dataclass(frozen=True)
-class TractionWeights:
-    """Weights of the objective, for scaled variables: tractions and peak are of order one.
-
-    1/2 peak u^2 + 1/2 effort |T|^2 + 1/2 change |(T, s0, s1) - last|^2 + slack * (slacks).
-    """
-
-    peak: float = 10.0
-    """Weight of the squared peak utilisation. It comes first: 1,000 times the effort."""
-    effort: float = 0.01
-    """Weight of the squared tractions: it decides where several sets have the smallest peak."""
-    change: float = 3.0
-    """Weight of the squared change since the last answer; smaller ones take OSQP longer."""
-    slack: float = 100.0
-    """Price of a slack: more than a peak can be worth, so that no limit gives way to another."""
-
-
-DEFAULT_WEIGHTS = TractionWeights()
-"""Weights where none are given."""
+# Weights of the objective, for scaled variables: tractions and peak are of order one.
+# 1/2 peak u^2 + 1/2 effort |T|^2 + 1/2 change |(T, s0, s1) - last|^2 + slack * (slacks).
+PEAK_WEIGHT = 10.0
+"""Weight of the squared peak utilisation. It comes first: 1,000 times the effort."""
+EFFORT_WEIGHT = 0.01
+"""Weight of the squared tractions: it decides where several sets have the smallest peak."""
+CHANGE_WEIGHT = 3.0
+"""Weight of the squared change since the last answer; smaller ones take OSQP longer."""
+SLACK_PRICE = 100.0
+"""Price of a slack: more than a peak can be worth, so that no limit gives way to another."""
 
 PROGRAM_INPUTS = record_type(
     ("friction", float, (WHEEL_COUNT,)),  # friction coefficients
     ("max_torque", float),  # largest torque of a wheel [N m]
     ("radius", float),  # wheel radius [m]
-    ("weights", WEIGHTS),
 )
 """`ProgramInputs` as the kernels read them."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramInputs:
-    """Friction and torque that the wheels can count on, and the weights of the objective.
+    """Friction and torque that the wheels can count on.
 
     Raises:
         ModelError: A friction coefficient, the largest torque or the radius is not above 0.
@@ -110,27 +96,19 @@ class ProgramInputs:
     """Largest torque of a wheel [N m]."""
     radius: float
     """Wheel radius [m]."""
-    weights: TractionWeights = DEFAULT_WEIGHTS
-    """Weights of the objective."""
 
     def __post_init__(self) -> None:
         """Check all values."""
-        check_program_inputs(self.friction, self.max_torque, self.radius)
+        if not (self.friction.min() > 0.0 and self.max_torque > 0.0 and self.radius > 0.0):
+            raise ModelError(
+                f"friction {self.friction.tolist()}, largest torque {self.max_torque} N m and "
+                f"wheel radius {self.radius} m must all be above 0"
+            )
 
     @cached_property
     def packed(self) -> np.ndarray:
         """Array (1,) of PROGRAM_INPUTS, made once."""
-        numbers = self.friction, self.max_torque, self.radius, astuple(self.weights)
-        return np.array([numbers], PROGRAM_INPUTS)
-
-
-def check_program_inputs(friction: np.ndarray, max_torque: float, radius: float) -> None:
-    """Raise ModelError where friction (6,), largest torque or wheel radius is not above 0."""
-    if not (friction.min() > 0.0 and max_torque > 0.0 and radius > 0.0):
-        raise ModelError(
-            f"friction {friction.tolist()}, largest torque {max_torque} N m and wheel radius "
-            f"{radius} m must all be above 0"
-        )
+        return np.array([(self.friction, self.max_torque, self.radius)], PROGRAM_INPUTS)
 
 
 @kernel
@@ -168,41 +146,25 @@ QP = record_type(
     ("A", float, (ROWS, VARIABLES)),  # rows
     ("lower", float, (ROWS,)),  # lower bounds
     ("upper", float, (ROWS,)),  # upper bounds
-    ("scale", float, (VARIABLES,)),  # x = scale * y + shift
+    ("scale", float, (VARIABLES,)),  # x = scale * y + shift in force units, 1 for the peak
     ("shift", float, (VARIABLES,)),  # the same
     ("start", float, (VARIABLES,)),  # y of the reference
 )
 """The numbers of a `TractionQP` as the kernels write them."""
 
 
-@dataclass(frozen=True, eq=False)
 class TractionQP:
-    """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; `layout` names y and the rows."""
+    """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; `layout` names y and the rows.
 
-    packed: np.ndarray
-    """Array (1,) of QP, which holds all that follows."""
-    P: np.ndarray
-    """(18,) diagonal of the cost's matrix."""
-    q: np.ndarray
-    """(18,) linear cost."""
-    A: np.ndarray
-    """(ROWS, 18) rows."""
-    lower: np.ndarray
-    """(ROWS,) lower bounds."""
-    upper: np.ndarray
-    """(ROWS,) upper bounds."""
-    scale: np.ndarray
-    """(18,) x = scale * y + shift in force units, and in units of one for the peak."""
-    shift: np.ndarray
-    """(18,) see scale."""
-    start: np.ndarray
-    """(18,) y of the reference."""
+    A program of zeros, to be written again and again by `build_traction_qp`. The arrays are views
+    of a record QP.
+    """
 
-
-def new_traction_qp() -> TractionQP:
-    """Return a program of zeros, to be written again and again by `build_traction_qp`."""
-    packed = np.zeros(1, QP)
-    return TractionQP(packed, *(packed[name][0] for name in QP.names or ()))
+    def __init__(self) -> None:
+        """Make a program of zeros."""
+        self.packed = np.zeros(1, QP)
+        views = (self.packed[name][0] for name in QP.names or ())
+        self.P, self.q, self.A, self.lower, self.upper, self.scale, self.shift, self.start = views
 
 
 def build_traction_qp(
@@ -212,11 +174,11 @@ def build_traction_qp(
 
     Args:
         rows: Balance at that state, with the wanted net traction.
-        inputs: Friction and torque of the wheels, weights of the objective.
+        inputs: Friction and torque of the wheels.
         reference: The last answer; at first that of equal torques.
         qp: A program to write over, a new one by default.
     """
-    qp = new_traction_qp() if qp is None else qp
+    qp = qp or TractionQP()
     _write_program(rows.packed, inputs.packed, reference.x, reference.peak, qp.packed)
     return qp
 
@@ -234,7 +196,7 @@ def _write_program(balances, all_inputs, last, last_peak, programs):
         friction += inputs.friction[wheel]
     unit = peak * friction / WHEEL_COUNT
     _write_units(last, peak, unit, qp)
-    _write_costs(inputs.weights, qp)
+    _write_costs(qp)
     for row in range(ROWS):
         qp.lower[row], qp.upper[row] = -np.inf, np.inf
     _write_balance_rows(balance, unit, qp)
@@ -256,17 +218,17 @@ def _write_units(last, peak, unit, qp):
 
 
 @kernel
-def _write_costs(weights, qp):
+def _write_costs(qp):
     """Write the diagonal and the linear part of the cost."""
     P, q, start = qp.P, qp.q, qp.start
     for k in range(VARIABLES):
         P[k], q[k] = REGULARISATION, 0.0
         if k < LOAD or k in (LATERAL_SHARE, LATERAL_SLOPE):
-            P[k] = weights.change + (weights.effort if k < LOAD else REGULARISATION)
-            q[k] = -weights.change * start[k]
+            P[k] = CHANGE_WEIGHT + (EFFORT_WEIGHT if k < LOAD else REGULARISATION)
+            q[k] = -CHANGE_WEIGHT * start[k]
         if k >= FRICTION_SLACK:
-            P[k], q[k] = SLACK_CURVATURE * weights.slack, weights.slack
-    P[PEAK] = weights.peak
+            P[k], q[k] = SLACK_CURVATURE * SLACK_PRICE, SLACK_PRICE
+    P[PEAK] = PEAK_WEIGHT
 
 
 @kernel

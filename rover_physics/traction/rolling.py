@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the wheels of a rover roll with their measured steering angles.
+"""The motion in which the wheels of a rover roll with their measured steering angles.
 
 `shares` has the planar motion of the body in which the wheels roll. Here it is scaled so that the
 mean speed of the wheels along their headings is 1. It goes forward, or to the left if it is mostly
 a turn. Wheels straight ahead have the motion (1, 0, 0).
 """
-
-from dataclasses import dataclass
-
-import numpy as np
 
 from rover_physics.forces.shares import has_turned_wheels, write_shares
 from rover_physics.names import WHEEL_COUNT
@@ -16,47 +12,14 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 
 ROLLING = record_type(
-    ("motion", float, (3,)),  # vx, vy and yaw rate per mean wheel speed [1, 1, 1/m]
+    ("motion", float, (3,)),  # speed ahead, to the left, yaw rate per mean wheel speed [1, 1, 1/m]
     ("directions", float, (WHEEL_COUNT,)),  # 1 where a wheel rolls forward, -1 where backward
-    ("speeds", float, (WHEEL_COUNT,)),  # along the wheels' headings, on level ground
+    ("speeds", float, (WHEEL_COUNT,)),  # along the headings on level ground, over the mean speed
     ("thrust", float, (3,)),  # force at the centre of mass and moment of a unit push [1, 1, m]
-    ("inertia", float),  # effective mass of the motion over the rover's mass
-    ("arms", float, (WHEEL_COUNT,)),  # lever arms of the tractions about body z [m]
+    ("inertia", float),  # push over acceleration of the mean wheel speed, over the rover's mass
+    ("arms", float, (WHEEL_COUNT,)),  # moment about body z per traction [m], positive to the left
 )
-"""The rolling motion of `Rolling`, for kernels."""
-
-
-@dataclass(frozen=True, eq=False)
-class Rolling:
-    """The motion in which the wheels roll with their steering angles."""
-
-    packed: np.ndarray
-    """Array (1,) of ROLLING."""
-
-    @property
-    def motion(self) -> np.ndarray:
-        """(3,) speed ahead and to the left, and yaw rate [1/m], per mean speed of the wheels."""
-        return self.packed["motion"][0]
-
-    @property
-    def directions(self) -> np.ndarray:
-        """(6,) 1 where a wheel rolls forward in this motion, -1 where backward."""
-        return self.packed["directions"][0]
-
-    @property
-    def speeds(self) -> np.ndarray:
-        """(6,) speeds of the wheels along their headings on level ground, over the mean speed."""
-        return self.packed["speeds"][0]
-
-    @property
-    def inertia(self) -> float:
-        """Effective mass: push over acceleration of the mean wheel speed, over the mass."""
-        return float(self.packed["inertia"][0])
-
-    @property
-    def arms(self) -> np.ndarray:
-        """(6,) moment about body z per traction of each wheel [m], positive to the left."""
-        return self.packed["arms"][0]
+"""The motion in which the wheels roll with their steering angles."""
 
 
 @kernel

@@ -2,7 +2,6 @@
 """Solving for the torques: a sequence of quadratic programs by OSQP, each about the last one."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import osqp
@@ -11,17 +10,14 @@ from scipy import sparse
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.records import array_of, new_record
 from rover_physics.traction.balance import MEASURED_BALANCE, BalanceRows
-from rover_physics.traction.fallback import fall_back_to_equal_torques
-from rover_physics.traction.layout import FORCES, ROWS, TRACTION, TRACTIONS, VARIABLES
+from rover_physics.traction.layout import FORCES, LOADS, ROWS, TRACTION, TRACTIONS, VARIABLES
 from rover_physics.traction.line_search import find_best_between, measure_peak
 from rover_physics.traction.program import (
     ProgramInputs,
     Reference,
     TractionQP,
     build_traction_qp,
-    new_traction_qp,
 )
-from rover_physics.traction.wheel_forces import WHEEL_FORCES, write_wheel_forces
 
 OSQP_SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
@@ -72,7 +68,7 @@ class TractionAnswer:
     programs: int
     """Programs solved."""
     fallback: bool
-    """Whether OSQP failed and torques are equal; see `fallback.py`."""
+    """Whether OSQP failed and torques are equal; see `solve_traction`."""
     status: str
     """OSQP's last status in its own words."""
 
@@ -82,7 +78,7 @@ class TractionWorkspace:
 
     def __init__(self, max_iterations: int = MAX_ITERATIONS):
         """Set up the problem; OSQP gives up after `max_iterations`."""
-        self.qp = new_traction_qp()
+        self.qp = TractionQP()
         """The program that is written anew each time."""
         self._cells, pattern = _find_pattern()
         self._solver = osqp.OSQP()
@@ -127,48 +123,20 @@ def solve_traction(
 ) -> TractionAnswer:
     """Find the torques with the smallest peak friction utilisation.
 
+    If OSQP does not solve the first program (its status is not "solved", or a variable is not
+    finite), all wheels get the same torque, and the answer is marked as fallback. Equal torques
+    always keep the balance, so the rover drives on, but a wheel may slip while others still have
+    friction in reserve.
+
     Args:
         workspace: OSQP's problem, kept from one call to the next.
         rows: Balance with the wanted net traction.
-        inputs: Friction and torque of the wheels, weights of the objective.
+        inputs: Friction and torque of the wheels.
         last: (6,) tractions of the last answer [N], near which the search starts; None starts
             from equal torques.
         max_programs: Largest number of programs, fewer where they converge before; 0 asks for
             equal torques.
-
-    Returns:
-        The answer; equal torques, marked as fallback, where OSQP does not solve the first.
     """
-    if max_programs == 0:
-        return _describe_answer(rows, inputs, Run(rows.pull_equally(), 0, 0, ""))
-    run = _run_programs(workspace, rows, inputs, last, max_programs)
-    if run.programs > 0:
-        return _describe_answer(rows, inputs, run)
-    equal = run._replace(x=fall_back_to_equal_torques(rows))
-    return _describe_answer(rows, inputs, equal, fallback=True)
-
-
-class Run(NamedTuple):
-    """What a sequence of programs came to."""
-
-    x: np.ndarray
-    """(14,) forces in force units."""
-    iterations: int
-    """Iterations of OSQP."""
-    programs: int
-    """Programs solved."""
-    status: str
-    """OSQP's last status."""
-
-
-def _run_programs(
-    workspace: TractionWorkspace,
-    rows: BalanceRows,
-    inputs: ProgramInputs,
-    last: np.ndarray | None,
-    max_programs: int,
-) -> Run:
-    """Solve one program about the answer of another until they converge, or OSQP fails."""
     x = rows.pull_equally() if last is None else rows.complete(last / rows.force_unit)
     forces = Reference(x, measure_peak(rows, inputs, x))
     status, iterations, programs = "", 0, 0
@@ -184,27 +152,29 @@ def _run_programs(
         forces, moved = find_best_between(rows, inputs, forces, aim)
         if moved <= CONVERGED_SHARE * unit:
             break
-    return Run(forces.x, iterations, programs, status)
+    x = forces.x if programs else rows.pull_equally()
+    fallback = programs == 0 < max_programs
+    return _describe_answer(rows, inputs, x, (iterations, programs, fallback, status))
 
 
 def _describe_answer(
-    rows: BalanceRows, inputs: ProgramInputs, run: Run, fallback: bool = False
+    rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray, run: tuple[int, int, bool, str]
 ) -> TractionAnswer:
-    """Return the answer of a run in SI units."""
-    table = np.empty((len(WHEEL_FORCES), WHEEL_COUNT))
-    torques, loads, tractions, lateral, utilisation = table
-    peak, min_load, max_traction = write_wheel_forces(rows.packed, inputs.packed, run.x, table)
+    """Return forces x (14,) in SI units, with what the run of the programs came to."""
+    unit, limit = rows.force_unit, inputs.max_torque
+    tractions, loads = unit * x[TRACTIONS], unit * x[LOADS]
+    lateral = unit * rows.lateral_forces(x)
+    across = np.sqrt(tractions * tractions + lateral * lateral)
+    utilisation = np.full(WHEEL_COUNT, np.inf)
+    np.divide(across, inputs.friction * loads, out=utilisation, where=loads > 0.0)
     return TractionAnswer(
-        torques=torques,
-        loads=loads,
-        tractions=tractions,
-        lateral=lateral,
-        utilisation=utilisation,
-        friction_slack=max(peak - 1.0, 0.0),
-        load_slack=max(-min_load, 0.0),
-        torque_slack=max(inputs.radius * max_traction - inputs.max_torque, 0.0),
-        iterations=run.iterations,
-        programs=run.programs,
-        fallback=fallback,
-        status=run.status,
+        np.minimum(np.maximum(inputs.radius * tractions, -limit), limit),
+        loads,
+        tractions,
+        lateral,
+        utilisation,
+        max(float(utilisation.max()) - 1.0, 0.0),
+        max(-float(loads.min()), 0.0),
+        max(inputs.radius * float(np.abs(tractions).max()) - limit, 0.0),
+        *run,
     )

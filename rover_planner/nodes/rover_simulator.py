@@ -79,7 +79,7 @@ class RoverSimulator(Node):
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._commands = None
-        if self._settings.follow_commands:
+        if self._settings.parameters.follow_commands:
             self._commands = self.create_publisher(TwistStamped, "cmd_vel", qos)
         self._transforms = _make_broadcaster(self)
 
@@ -87,7 +87,7 @@ class RoverSimulator(Node):
         qos = topic_qos()
         self.create_subscription(Path, "path", self._take_path, qos)
         self.create_subscription(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
-        if self._settings.follow_commands:
+        if self._settings.parameters.follow_commands:
             self.create_subscription(Float64MultiArray, COMMANDS, self._take_torques, qos)
 
     def _take_path(self, path: Path) -> None:

@@ -34,7 +34,7 @@ from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.process import take_priority
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
 from rover_planner.shell.kernels import load_kernels
-from rover_planner.traction.clock_watch import ClockWatch
+from rover_planner.traction.clocks import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.statistics import TractionStatistics
 from rover_planner.traction.supervisor import (

@@ -22,7 +22,7 @@ from rover_planner.parameters.table import ParameterTable, parameter
 
 HOLD, BRAKE, COAST = "hold", "brake", "coast"
 REST_POLICIES = (HOLD, BRAKE, COAST)
-"""Values of the parameter rest_policy; `rover_planner.traction.hold` explains them."""
+"""Values of the parameter rest_policy; `rover_planner.traction.supervisor` explains them."""
 
 
 @dataclass(frozen=True)

@@ -28,18 +28,18 @@ class PathFollower:
     Source: Coulter, "Implementation of the pure pursuit path tracking algorithm", 1992.
     """
 
-    def __init__(self, poses: Floats, look_ahead: float, reach: float | None = None):
+    def __init__(self, poses: Floats, look_ahead: float, outermost: float | None = None):
         """Follow poses (n, 3).
 
         Args:
             poses: (n, 3) x, y [m], yaw [rad].
             look_ahead: Look-ahead distance along the path [m].
-            reach: Distance of the outermost wheel from the body origin [m], which moves at the
+            outermost: Distance of the outermost wheel from the body origin [m], which moves at the
                 commanded speed in a turn on the spot (default: the look-ahead distance).
         """
         self._legs = _find_legs(np.asarray(poses, dtype=float))
         self._look_ahead = look_ahead
-        self._reach = look_ahead if reach is None else reach
+        self._outermost = look_ahead if outermost is None else outermost
         self._at, self._finished = 0, 0.0
 
     @property
@@ -76,10 +76,10 @@ class PathFollower:
         if self._leg.is_turn:
             return 0.0, self._turn(pose, speed)
         target = self._leg.at(self._leg.done + self._look_ahead)
-        way, gear = target - pose[:2], self._leg.gear
+        ahead, gear = target - pose[:2], self._leg.gear
         # Backwards, the rover is steered as one that heads the other way.
-        across = gear * (-np.sin(pose[2]) * way[0] + np.cos(pose[2]) * way[1])
-        curvature = 2.0 * across / max(float(way @ way), 1e-6)
+        across = gear * (-np.sin(pose[2]) * ahead[0] + np.cos(pose[2]) * ahead[1])
+        curvature = 2.0 * across / max(float(ahead @ ahead), 1e-6)
         most = 1.0 / self._look_ahead
         return gear * speed, speed * float(np.clip(curvature, -most, most))
 
@@ -95,11 +95,11 @@ class PathFollower:
         """Return the yaw rate [rad/s] of a turn on the spot."""
         left = self._leg.left_to_turn(pose)
         share = min(max(abs(left) / SLOW_ANGLE, MIN_TURN_SHARE), 1.0)
-        return math.copysign(share * speed / self._reach, left)
+        return math.copysign(share * speed / self._outermost, left)
 
 
 class _Leg:
-    """A stretch of a path, or a turn on the spot, with the way that is done."""
+    """A stretch of a path, or a turn on the spot, with the distance that is done."""
 
     def __init__(self, poses: Floats):
         self.is_turn = len(poses) > 1 and bool((_steps(poses) <= SAME_PLACE).all())
@@ -115,7 +115,7 @@ class _Leg:
         return float(np.hypot(*(self._places[-1] - pose[:2])))
 
     def left_to_turn(self, pose: Floats) -> float:
-        """Return the turn [rad] that is left, positive to the left; large turns keep their way."""
+        """Return the turn [rad] that is left, positive to the left; of large turns, too."""
         if self._seen is None:
             self._seen = self._yaw[0] + _wrap(float(pose[2]) - self._yaw[0])
         self._seen += _wrap(float(pose[2]) - self._seen)

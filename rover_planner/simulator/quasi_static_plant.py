@@ -179,10 +179,10 @@ class QuasiStaticPlant:
         self._stopped = ""
         middle = self._pose[2] + 0.5 * motion[2] * duration
         c, s = np.cos(middle), np.sin(middle)
-        way = duration * np.array(
+        step = duration * np.array(
             [c * motion[0] - s * motion[1], s * motion[0] + c * motion[1], motion[2]]
         )
-        there, moves = self._pose + way, bool(motion.any())
+        there, moves = self._pose + step, bool(motion.any())
         self._motion = motion if moves else self._motion
         pulled = forces is not None
         moved = self._predict(np.vstack([self._pose, there]), angles, pulled)
@@ -194,10 +194,10 @@ class QuasiStaticPlant:
         self._before, self._here = self._here, _last_row(moved)
         self._pose, self._moved, self._angles = there, motion, angles
         self._duration = duration
-        ways = self._here.wheel_centres[0] - self._before.wheel_centres[0]
+        moved_by = self._here.wheel_centres[0] - self._before.wheel_centres[0]
         headings = middle + angles
-        ahead = ways[:, 0] * np.cos(headings) + ways[:, 1] * np.sin(headings)
-        rolled = np.copysign(np.hypot(ahead, ways[:, 2]), ahead)
+        ahead = moved_by[:, 0] * np.cos(headings) + moved_by[:, 1] * np.sin(headings)
+        rolled = np.copysign(np.hypot(ahead, moved_by[:, 2]), ahead)
         wheel = self._rover.wheel
         turned = rolled / wheel.radius
         turned /= 1.0 - np.clip(self._slip(forces), 0.0, MAX_SLIP)

@@ -18,7 +18,7 @@ RAYS = 1440
 class RangeSensor:
     """Position and properties of the sensor."""
 
-    reach: float
+    max_range: float
     """Range [m]."""
     noise: float
     """Standard deviation of heights [m]."""
@@ -54,7 +54,7 @@ class RangeSensor:
         dy = y0 + terrain.resolution * y - position[1]
         away = np.hypot(dx, dy)
         bearing = np.arctan2(dy, dx)
-        seen = (away <= self.reach) & (away >= self.least_range)
+        seen = (away <= self.max_range) & (away >= self.least_range)
         if self.field_of_view < ALL_AROUND:
             aside = np.abs((bearing - yaw + np.pi) % (2.0 * np.pi) - np.pi)
             seen &= aside <= 0.5 * self.field_of_view
@@ -69,7 +69,7 @@ class RangeSensor:
 
     def _window(self, terrain: Terrain, position: Floats) -> tuple[slice, slice]:
         ny, nx = terrain.elevation.shape
-        cells = int(np.ceil(self.reach / terrain.resolution))
+        cells = int(np.ceil(self.max_range / terrain.resolution))
         column, row = (
             round((position[k] - terrain.origin[k]) / terrain.resolution) for k in (0, 1)
         )
@@ -83,7 +83,9 @@ class RangeSensor:
     ) -> NDArray[np.bool_]:
         """Return a mask of the cells that no nearer cell on the same ray hides."""
         eye = position[2] + self.height
-        ranges = np.arange(terrain.resolution, self.reach + terrain.resolution, terrain.resolution)
+        ranges = np.arange(
+            terrain.resolution, self.max_range + terrain.resolution, terrain.resolution
+        )
         angles = (np.arange(RAYS) + 0.5) * (2.0 * np.pi / RAYS) - np.pi
         px = position[0] + ranges * np.cos(angles)[:, None]
         py = position[1] + ranges * np.sin(angles)[:, None]

@@ -7,16 +7,16 @@ from rover_physics.numerics.arrays import Floats
 from rover_planner.simulator.path_follower import PathFollower
 
 PROGRESS, TURN_PROGRESS = 0.01, 0.02
-"""Way [m] and turn [rad] that count as progress."""
+"""Distance [m] and turn [rad] that count as progress."""
 STUCK_TIME = 12.0
 """Time without progress [s] after which the rover stands still. The traction controller stops
 pushing before that (`stall_time`), and pushes again after it was told to reverse."""
 BACK_DISTANCE, BACK_TIME = 0.12, 6.0
-"""The rover backs off by this way [m], but no longer than this time [s]."""
+"""The rover backs off by this distance [m], but no longer than this time [s]."""
 MAX_TRIES = 3
 """Attempts at one place."""
 NEW_PLACE = 0.3
-"""Way along the path [m] after which the attempts are counted anew."""
+"""Distance along the path [m] after which the attempts are counted anew."""
 NO_PLACE = (math.inf, math.inf)
 
 
@@ -43,7 +43,7 @@ class SecondTry:
         self._tries, self._counted_from = 1, 0.0
         self._back_from, self._back_until = NO_PLACE, -math.inf
         self.retries = 0
-        """How often the rover has backed off."""
+        """Number of times that the rover has backed off."""
 
     @property
     def given_up(self) -> bool:

@@ -31,26 +31,18 @@ class SimulationSettings:
     """The rover that is simulated."""
     terrain: Terrain
     """The true ground."""
-    start: tuple[float, float, float]
-    """x, y [m] and yaw [rad] of the body origin at the start."""
-    engine: str
-    """One of ENGINES."""
-    friction: float | None
-    """Coulomb friction of the ground; None takes that of the terrain or the rover file."""
-    soil: str | None
-    """Soil where the terrain names none; None: Coulomb friction."""
-    policy: str
-    """How the rover's own servos share the traction, one of CONTROL_POLICIES."""
-    speed: float
-    """Speed along a path [m/s]."""
-    follow_commands: bool
-    """Whether commanded torques of a controller drive the wheels."""
-    timeout: float
-    """Age above which commanded speeds and torques are ignored [s]."""
-    sensor: RangeSensor
-    """The terrain sensor."""
-    seed: int
-    """Seed of all noise."""
+    parameters: RoverSimulatorParameters
+    """The parameters; empty texts and 0 stand for "as rover and terrain say"."""
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """x, y [m] and yaw [rad] of the body origin at the start."""
+        return self.parameters.start_x, self.parameters.start_y, self.parameters.start_yaw
+
+    @property
+    def speed(self) -> float:
+        """Speed along a path [m/s]."""
+        return self.parameters.speed or self.rover.nominal_speed
 
 
 def load_simulation_settings(parameters: RoverSimulatorParameters) -> SimulationSettings:
@@ -64,27 +56,7 @@ def load_simulation_settings(parameters: RoverSimulatorParameters) -> Simulation
         terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
     else:
         terrain = make_mars_terrain(parameters.seed, MADE_SIZE, MADE_RESOLUTION)
-    return SimulationSettings(
-        rover=rover,
-        terrain=terrain,
-        start=(parameters.start_x, parameters.start_y, parameters.start_yaw),
-        engine=parameters.engine,
-        friction=parameters.friction or None,
-        soil=parameters.soil or None,
-        policy=parameters.policy,
-        speed=parameters.speed or rover.nominal_speed,
-        follow_commands=parameters.follow_commands,
-        timeout=parameters.timeout,
-        sensor=RangeSensor(
-            parameters.sensor_range,
-            parameters.sensor_noise,
-            parameters.sensor_height,
-            parameters.sensor_occlusion,
-            parameters.sensor_field_of_view,
-            parameters.sensor_least_range,
-        ),
-        seed=parameters.seed,
-    )
+    return SimulationSettings(rover, terrain, parameters)
 
 
 def make_plant(settings: SimulationSettings) -> Plant:
@@ -95,16 +67,15 @@ def make_plant(settings: SimulationSettings) -> Plant:
             the rover cannot stand at the start.
         SoilError: No soil of that name.
     """
-    if settings.engine != MUJOCO:
-        return QuasiStaticPlant(
-            settings.rover, settings.terrain, settings.start,
-            settings.friction, settings.policy, settings.soil,
-        )  # fmt: skip
-    if settings.soil is not None:
-        raise PlanningError(f"soil is {settings.soil!r}; it must be empty with the engine mujoco")
-    if settings.policy != EQUAL:
+    asked = settings.parameters
+    placed = settings.rover, settings.terrain, settings.start, asked.friction or None
+    if asked.engine != MUJOCO:
+        return QuasiStaticPlant(*placed, asked.policy, asked.soil or None)
+    if asked.soil:
+        raise PlanningError(f"soil is {asked.soil!r}; it must be empty with the engine mujoco")
+    if asked.policy != EQUAL:
         raise PlanningError(
-            f"policy is {settings.policy!r}; it must be left out with the engine mujoco, whose "
+            f"policy is {asked.policy!r}; it must be left out with the engine mujoco, whose "
             "servos hold speeds"
         )
     try:
@@ -113,7 +84,7 @@ def make_plant(settings: SimulationSettings) -> Plant:
         raise PlanningError(
             "engine is mujoco, which is not installed: pip install 'rover_planner[bench]'"
         ) from None
-    return MujocoPlant(settings.rover, settings.terrain, settings.start, settings.friction)
+    return MujocoPlant(*placed)
 
 
 class Simulation:
@@ -125,9 +96,13 @@ class Simulation:
         Raises:
             PlanningError, SoilError: As in `make_plant`.
         """
-        self.settings = settings
+        self.settings, asked = settings, settings.parameters
         self.plant = make_plant(settings)
-        self._rng = np.random.default_rng(settings.seed)
+        self._sensor = RangeSensor(
+            asked.sensor_range, asked.sensor_noise, asked.sensor_height, asked.sensor_occlusion,
+            asked.sensor_field_of_view, asked.sensor_least_range,
+        )  # fmt: skip
+        self._rng = np.random.default_rng(asked.seed)
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
@@ -141,9 +116,10 @@ class Simulation:
         """
         rover = self.settings.rover
         wheels = rover.suspension.wheels
-        reach = max(float(np.hypot(x, y)) for x, y, _ in wheels.values())
-        follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]), reach)
-        tries, steering = MAX_TRIES if self.settings.follow_commands else 1, rover.steering
+        outermost = max(float(np.hypot(x, y)) for x, y, _ in wheels.values())
+        follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]), outermost)
+        tries = MAX_TRIES if self.settings.parameters.follow_commands else 1
+        steering = rover.steering
         # From one limit to the other, while the rover stands.
         longest = 0.0 if steering is None else 2.0 * steering.limit / steering.rate
         self._follower = SecondTry(follower, tries, STUCK_TIME + longest)
@@ -159,7 +135,7 @@ class Simulation:
 
     def has_speeds(self, now: float) -> bool:
         """Return whether commanded speeds apply: they are recent and no path is followed."""
-        return self._follower is None and now - self._wanted_at <= self.settings.timeout
+        return self._follower is None and now - self._wanted_at <= self.settings.parameters.timeout
 
     @property
     def follows_path(self) -> bool:
@@ -169,8 +145,8 @@ class Simulation:
     def advance(self, now: float, duration: float) -> PlantState:
         """Advance by a duration [s] from time `now` [s]; return the measurements."""
         self.steering = self._steer(now)
-        if self.settings.follow_commands:
-            fresh = now - self._torques_at <= self.settings.timeout
+        if self.settings.parameters.follow_commands:
+            fresh = now - self._torques_at <= self.settings.parameters.timeout
             self.plant.pull(self._torques if fresh else np.zeros(6), self.steering, duration)
         else:
             self.plant.drive(*self.steering, duration)
@@ -189,4 +165,4 @@ class Simulation:
         """Return the sensor's map of the ground around the rover."""
         position = self.plant.state().position
         yaw = float(self.plant.pose()[2])
-        return self.settings.sensor.look(self.settings.terrain, position, self._rng, yaw)
+        return self._sensor.look(self.settings.terrain, position, self._rng, yaw)

@@ -2,80 +2,99 @@
 """Monitors inputs: whether each is available, recent and valid."""
 
 import math
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 NEVER = -math.inf
 """Time of an input that has not arrived yet [s]."""
 
 
+@dataclass
+class InputRecord:
+    """Last valid time [s] of one input, and what is wrong with it."""
+
+    time: float = NEVER
+    error: str = ""
+    error_time: float = NEVER
+    ignored: str = ""
+    detail: str = ""
+
+    def describe(self) -> str:
+        """Return why nothing recent was used, in brackets; empty if that is not known."""
+        text = "; ".join(filter(None, (self.detail, self.ignored)))
+        return f" ({text})" if text else ""
+
+
 class InputMonitor:
     """Keeps the last valid time of each input and the errors of invalid inputs."""
 
-    def __init__(self, timeouts: Mapping[str, float]):
-        """Monitor inputs by name; one older than its timeout [s] is stale."""
+    def __init__(self, timeouts: Mapping[str, float], optional: Collection[str] = ()):
+        """Monitor inputs by name; one older than its timeout [s] is stale.
+
+        Inputs that are `optional` are never a fault.
+        """
         self.timeouts = dict(timeouts)
         """Timeouts [s] by name."""
-        self._times: dict[str, float] = {}
-        self._errors: dict[str, tuple[str, float]] = {}
-        self._ignored: dict[str, str] = {}
-        self._details: dict[str, str] = {}
+        self._optional = optional
+        self._inputs: defaultdict[str, InputRecord] = defaultdict(InputRecord)
 
     def take(self, name: str, time: float) -> None:
         """Record a valid input that was measured at a time [s]."""
-        self._times[name] = max(time, self._times.get(name, NEVER))
-        self._ignored.pop(name, None)
-        self._details.pop(name, None)
-        if name in self._errors and time >= self._errors[name][1]:
-            del self._errors[name]
+        record = self._inputs[name]
+        record.time = max(time, record.time)
+        record.ignored = record.detail = ""
+        if time >= record.error_time:
+            record.error = ""
 
     def refuse(self, name: str, error: str, now: float = NEVER) -> None:
         """Record an invalid input; it is a fault until one that was measured later arrives."""
-        self._errors[name] = error, now
+        record = self._inputs[name]
+        record.error, record.error_time = error, now
 
     def ignore(self, name: str, reason: str) -> None:
         """Record why a message was not used; the reason is shown when the input is stale."""
-        self._ignored[name] = reason
+        self._inputs[name].ignored = reason
 
     def describe(self, name: str, detail: str) -> None:
         """Take what is known about a stale input, such as which part of it is missing."""
-        self._details[name] = detail
+        self._inputs[name].detail = detail
 
     def forget(self) -> None:
         """Forget the times of all inputs: each must arrive anew."""
-        self._times.clear()
+        for record in self._inputs.values():
+            record.time = NEVER
 
     def is_fresh(self, name: str, now: float) -> bool:
         """Return whether an input is available, valid and not stale at time `now` [s]."""
-        age = now - self._times.get(name, NEVER)
-        return name not in self._errors and age <= self.timeouts[name]
+        record = self._inputs[name]
+        return not record.error and now - record.time <= self.timeouts[name]
 
     @property
     def expiry(self) -> float:
-        """Time at which the first of the inputs becomes stale [s]."""
-        return min(
-            self._times.get(name, NEVER) + timeout for name, timeout in self.timeouts.items()
-        )
+        """Time at which the first of the needed inputs becomes stale [s]."""
+        needed = self._find_needed()
+        return min(record.time + self.timeouts[name] for name, record in needed.items())
 
     def find_fault(self, now: float) -> str:
-        """Return the fault of the inputs at time `now` [s]; empty if there is none.
+        """Return the fault of the needed inputs at time `now` [s]; empty if there is none.
 
         The text of a fault does not change with time.
         """
-        missing = [name for name in self.timeouts if name not in self._times | self._errors]
+        needed = self._find_needed()
+        missing = {n: one for n, one in needed.items() if one.time == NEVER and not one.error}
         if missing:
-            reasons = "".join(self._describe_ignored(name) for name in missing)
+            reasons = "".join(record.describe() for record in missing.values())
             return f"waiting for {', '.join(missing)}{reasons}"
-        errors = [self._errors[name][0] for name in self.timeouts if name in self._errors]
-        if errors:
-            return "; ".join(errors)
-        stale = [name for name in self.timeouts if not self.is_fresh(name, now)]
+        errors = [record.error for record in needed.values() if record.error]
         return "; ".join(
-            f"{name} stale: none for {1e3 * self.timeouts[name]:.0f} ms"
-            f"{self._describe_ignored(name)}"
-            for name in stale
+            errors
+            or [
+                f"{name} stale: none for {1e3 * self.timeouts[name]:.0f} ms{record.describe()}"
+                for name, record in needed.items()
+                if not self.is_fresh(name, now)
+            ]
         )
 
-    def _describe_ignored(self, name: str) -> str:
-        known = (self._details.get(name, ""), self._ignored.get(name, ""))
-        text = "; ".join(filter(None, known))
-        return f" ({text})" if text else ""
+    def _find_needed(self) -> dict[str, InputRecord]:
+        return {n: self._inputs[n] for n in self.timeouts if n not in self._optional}

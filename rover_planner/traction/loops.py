@@ -8,7 +8,6 @@ import numpy as np
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.kernels import kernel
 
 MAX_PUSH = 0.6
 """Largest push of the speed loop, as a share of the rover's weight."""
@@ -35,29 +34,13 @@ CLIMBING_ANGLE = 0.02
 RELEASE_TIME = 1.5
 """Time in which their share falls from 1 to 0 when the rover moves again [s]."""
 SERVO_INTEGRAL_GAIN = 5.0
-"""Integral gain of the speed servos over their gain [1/s]."""
+"""Integral gain of the speed servos of a stalled rover, over their gain [1/s]."""
 MAX_PEAK = 0.95
 """Peak friction utilisation above which the push falls: beyond it wheels slip."""
 FALL_TIME, REGROWTH_TIME = 0.1, 0.5
 """Time constants with which the largest push falls and grows again [s]."""
 MIN_PUSH_SHARE = 1e-3
 """Lower bound of the largest push, over its upper bound, from where it grows again."""
-
-
-@dataclass(frozen=True)
-class LoopGains:
-    """Gains of the loops."""
-
-    speed: float
-    """Acceleration per error of speed [1/s]."""
-    travel: float
-    """Acceleration per error of distance travelled [1/s^2]."""
-    heading: float
-    """Angular acceleration per error of yaw rate [1/s]; the integral gain is half of it."""
-    slip: float
-    """Torque per difference between wheel rate and rolling rate [N m s/rad]."""
-    torque_rate: float
-    """Largest rate of change of a torque [N m/s]."""
 
 
 class PIController:
@@ -103,21 +86,6 @@ class PIController:
 
     def _clip(self, output: float) -> float:
         return min(max(output, -self._limit), self._limit)
-
-
-class HeadingLoop(PIController):
-    """The heading loop: the moment that an error of the yaw rate asks for."""
-
-    def __init__(self, gain: float, half_track: float, max_push: float):
-        """Start with an integral of zero.
-
-        Args:
-            gain: Mass times angular acceleration per error of yaw rate [kg/s].
-            half_track: Half the distance between the middle wheels [m].
-            max_push: Largest force of the wheels together [N].
-        """
-        own = half_track**2 * gain
-        super().__init__(own, HEADING_INTEGRAL_GAIN * own, max_push * half_track)
 
 
 class PushLimit:
@@ -181,7 +149,7 @@ class PushLoop(PIController):
 
 @dataclass(frozen=True, eq=False)
 class WheelMotion:
-    """How the wheels move and should move, each in the direction in which it rolls."""
+    """Measured and wanted motion of the wheels, each in the direction in which it rolls."""
 
     rates: Floats
     """(6,) measured rates [rad/s]."""
@@ -239,29 +207,30 @@ class StallDetector:
         return max(self._share, 0.0)
 
 
-class StallServos:
-    """Speed servos of the wheels of a stalled rover: PI controllers with limited torque."""
+class WheelServos:
+    """Speed servos of all wheels: PI controllers whose integral part is a limited torque."""
 
-    def __init__(self, gain: float, max_torque: float):
+    def __init__(self, gain: float, integral_gain: float, max_torque: float):
         """Start with an integral of zero.
 
         Args:
             gain: Torque per error of a wheel's rate [N m s/rad]. A servo that is stiffer than the
                 wheel's inertia over the period allows makes a slipping wheel oscillate.
+            integral_gain: Torque per error of a wheel's angle [N m/rad].
             max_torque: Largest magnitude of the integral part [N m].
         """
-        self._gain, self._max_torque = gain, max_torque
-        self._integral = np.zeros(WHEEL_COUNT)
+        self._gain, self._integral_gain, self._max_torque = gain, integral_gain, max_torque
+        self.integral = np.zeros(WHEEL_COUNT)
+        """Integral part (6,) of the torques [N m]."""
 
-    def follow(self, torques: Floats) -> None:
-        """Take over from torques (6,) [N m] when the rover stalls."""
-        self._integral = np.clip(torques, -self._max_torque, self._max_torque)
+    def start(self, torques: Floats) -> None:
+        """Go on from torques (6,) [N m]."""
+        self.integral = np.clip(torques, -self._max_torque, self._max_torque)
 
     def update(self, errors: Floats, duration: float) -> Floats:
-        """Return torques (6,) [N m] for errors (6,) of the rates [rad/s]."""
-        step = SERVO_INTEGRAL_GAIN * self._gain * duration * errors
-        self._integral = np.clip(self._integral + step, -self._max_torque, self._max_torque)
-        return self._gain * errors + self._integral
+        """Return torques (6,) [N m] for errors (6,) of the rates [rad/s] over a time [s]."""
+        self.start(self.integral + self._integral_gain * duration * errors)
+        return self._gain * errors + self.integral
 
 
 class SlipControl:
@@ -275,7 +244,7 @@ class SlipControl:
             max_torque: Largest torque of a wheel [N m].
         """
         self._gain = gain
-        self._servos = StallServos(gain, max_torque)
+        self._servos = WheelServos(gain, SERVO_INTEGRAL_GAIN * gain, max_torque)
         self.detector = StallDetector()
         """Tells whether the rover is stalled or climbs."""
 
@@ -294,7 +263,7 @@ class SlipControl:
         torques = torques - self._gain * _find_slip(motion)
         share = self.detector.update(motion, duration)
         if share == 0.0:
-            self._servos.follow(torques)
+            self._servos.start(torques)
             return torques
         wanted = motion.wanted * motion.level_ratios
         servo = self._servos.update(wanted - motion.rates, duration)
@@ -336,17 +305,7 @@ def limit_rate(torques: Floats, last: Floats, max_change: float) -> Floats:
 
     All changes are scaled by the same factor, which keeps their ratios.
     """
-    limited = np.empty(len(torques))
-    _write_limited(torques, last, max_change, limited)
-    return limited
-
-
-@kernel
-def _write_limited(torques, last, max_change, limited):
-    """Write the torques of `limit_rate` into `limited` (6,)."""
-    largest = 0.0
-    for wheel in range(len(torques)):
-        largest = max(largest, abs(torques[wheel] - last[wheel]))
+    change = torques - last
+    largest = float(np.abs(change).max())
     share = 1.0 if largest <= max_change else max_change / largest
-    for wheel in range(len(torques)):
-        limited[wheel] = last[wheel] + share * (torques[wheel] - last[wheel])
+    return last + share * change

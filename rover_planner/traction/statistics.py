@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_planner.traction.traction_update import TractionUpdate
+from rover_planner.traction.traction_service import TractionUpdate
 
 MAX_TIMES = 6000
 """Number of updates whose times are kept: one minute at 100 Hz."""

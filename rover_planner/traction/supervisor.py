@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decides whether the rover drives or rests, and what its wheels do at rest."""
+"""Decides whether the rover drives or rests, and what its wheels do at rest.
+
+The policies of rest:
+
+- hold: each wheel has a PI servo to a rate of zero. It starts from the torques that balance the
+  weight along the slope, so the rover does not roll first. It needs fresh wheel rates; without
+  them the torques are zero and the brake is applied.
+- brake: zero torques, the brake is applied.
+- coast: zero torques, the brake is released. On a slope the rover rolls.
+"""
 
 import math
 from dataclasses import dataclass
@@ -9,27 +18,28 @@ import numpy as np
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import BRAKE, HOLD
-from rover_planner.traction.drive_permission import DrivePermission
-from rover_planner.traction.hold import HoldServo
+from rover_planner.traction.loops import WheelServos
 from rover_planner.traction.settings import TractionSettings
 from rover_planner.traction.stall_watch import StallWatch
-from rover_planner.traction.traction_service import TractionService
-from rover_planner.traction.traction_update import TractionUpdate
+from rover_planner.traction.traction_service import MAX_STEP, TractionService, TractionUpdate
 
 DISABLED, EMERGENCY_STOP, FAULT = "disabled", "emergency_stop", "fault"
 STALLED, STANDSTILL, DRIVING = "stalled", "standstill", "driving"
 STATES = (DISABLED, EMERGENCY_STOP, FAULT, STALLED, STANDSTILL, DRIVING)
-"""What the rover does; it drives in the last state only."""
+"""States of the rover; it drives in the last one only."""
 STANDSTILL_DELAY = 0.5
 """Time for which the loops bring the rover to a stop before the rest policy takes over [s]."""
-
 RECOVERY_TIME = 0.2
 """Time for which everything must be right before the rover drives again [s]."""
+HOLD_RATE_GAIN = 10.0
+"""Angular deceleration per wheel rate of the hold servos [1/s]."""
+HOLD_ANGLE_GAIN = 25.0
+"""Angular deceleration per angle turned of the hold servos [1/s^2]."""
 
 
 @dataclass(frozen=True, eq=False)
 class TractionCommand:
-    """What the node commands after one update."""
+    """The command of the node after one update."""
 
     torques: Floats
     """(6,) torques, wheel order [N m]."""
@@ -52,7 +62,7 @@ class TractionSupervisor:
         """Keeps measurements and allocates torques."""
         self.permission = DrivePermission(enabled)
         """Enabling and emergency stop."""
-        self._hold = HoldServo(settings, self.service.weight)
+        self._hold = self._create_hold()
         self._latch = FaultLatch()
         self._stall = StallWatch()
         self._tripped = ""
@@ -64,7 +74,15 @@ class TractionSupervisor:
     def configure(self, settings: TractionSettings) -> None:
         """Take new settings between two updates; torques go on from the last ones."""
         self.service.settings = settings
-        self._hold.configure(settings, self.service.weight)
+        integral, self._hold = self._hold.integral, self._create_hold()
+        self._hold.integral = integral
+
+    def _create_hold(self) -> WheelServos:
+        """Return the servos that hold the wheels at rest."""
+        rover, weight = self.service.settings.rover, self.service.weight
+        inertia = weight / rover.gravity * rover.wheel.radius**2 / WHEEL_COUNT
+        most = self.service.settings.max_torque
+        return WheelServos(HOLD_RATE_GAIN * inertia, HOLD_ANGLE_GAIN * inertia, most)
 
     def trip(self, fault: str) -> None:
         """Take a fault that was found elsewhere into the next update."""
@@ -119,7 +137,7 @@ class TractionSupervisor:
     def _is_stalled(self, duration: float) -> bool:
         if self.service.climbs:
             self._stall.reset_time()
-        stall_time = self.service.settings.stall_time
+        stall_time = self.service.settings.parameters.stall_time
         rates, wanted = self.service.wheel_rates, self.service.wanted_rates
         return self._stall.update(rates, wanted, duration, stall_time)
 
@@ -130,13 +148,13 @@ class TractionSupervisor:
 
     def _rest(self, state: str, fault: str, now: float, duration: float) -> TractionCommand:
         """Return the command of a rover at rest, by the policy of the settings."""
-        settings = self.service.settings
+        parameters = self.service.settings.parameters
         update = self.service.rest(fault)
         torques, expiry = np.zeros(WHEEL_COUNT), float("inf")
-        timeout = settings.timeouts.joint_states
+        timeout, policy = parameters.joint_states_timeout, parameters.rest_policy
         blind = now - self.service.wheel_time > timeout
-        brake = settings.rest_policy == BRAKE or (settings.rest_policy == HOLD and blind)
-        if settings.rest_policy == HOLD and not blind:
+        brake = policy == BRAKE or (policy == HOLD and blind)
+        if policy == HOLD and not blind:
             torques, expiry = self._hold_wheels(duration), self.service.wheel_time + timeout
         else:
             self._held = False
@@ -144,10 +162,39 @@ class TractionSupervisor:
         return TractionCommand(torques, brake, state, update, expiry)
 
     def _hold_wheels(self, duration: float) -> Floats:
+        """Return the torques (6,) [N m] that stop and hold the wheels."""
+        service, most = self.service, self.service.settings.max_torque
         if not self._held:
-            self._hold.start(self.service.pitch)
+            radius = service.settings.rover.wheel.radius
+            needed = -(service.weight * radius / WHEEL_COUNT) * math.sin(service.pitch)
+            self._hold.start(np.full(WHEEL_COUNT, needed))
         self._held = True
-        return self._hold.update(self.service.wheel_rates, duration)
+        torques = self._hold.update(-service.wheel_rates, min(duration, MAX_STEP))
+        return np.clip(torques, -most, most)
+
+
+class DrivePermission:
+    """Keeps enabling and emergency stop; the stop also takes the enabling away."""
+
+    def __init__(self, enabled: bool):
+        """Start enabled or not, without an emergency stop."""
+        self.enabled = enabled
+        """Whether an operator has enabled the rover."""
+        self.emergency_stop = False
+        """Whether the emergency stop is pressed."""
+
+    def set_enabled(self, enabled: bool) -> tuple[bool, str]:
+        """Enable or disable; return whether that was done, and what holds now."""
+        if enabled and self.emergency_stop:
+            return False, "not enabled: ~/emergency_stop is true; it must be false first"
+        self.enabled = enabled
+        return True, "enabled" if enabled else "disabled"
+
+    def take_emergency_stop(self, pressed: bool) -> None:
+        """Take the emergency stop: pressed, or released, which does not enable again."""
+        self.emergency_stop = pressed
+        if pressed:
+            self.enabled = False
 
 
 class FaultLatch:

@@ -4,6 +4,7 @@
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,21 +33,38 @@ from rover_planner.traction.input_monitor import NEVER, InputMonitor
 from rover_planner.traction.joint_memory import JointMemory
 from rover_planner.traction.limits import MeasurementLimits
 from rover_planner.traction.loops import (
+    HEADING_INTEGRAL_GAIN,
     MAX_PUSH,
     STALLED_GROWTH,
-    HeadingLoop,
+    PIController,
     PushLoop,
     SlipControl,
     WheelMotion,
     limit_rate,
 )
-from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 from rover_planner.traction.settings import TractionSettings
-from rover_planner.traction.traction_update import TractionUpdate
 
 JOINT_STATES, IMU, CMD_VEL, ODOMETRY = "joint_states", "imu", "cmd_vel", "odometry"
 MAX_STEP = 0.1
 """Upper bound of the time step of loops and filter [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class TractionUpdate:
+    """The result of one update."""
+
+    torques: Floats
+    """(6,) torques to command, wheel order [N m]; zero if there is a fault."""
+    fault: str
+    """Reason for zero torques; empty if there is no fault."""
+    warning: str
+    """Problem that does not stop the rover; empty if there is none."""
+    answer: TractionAnswer | None
+    """The torque allocation, before heading and slip control; None if there is a fault."""
+    estimate: ContactEstimate | None
+    """The contact angles; None if there is a fault."""
+    duration: float
+    """Computation time of the update [s]."""
 
 
 class TractionService:
@@ -55,17 +73,18 @@ class TractionService:
     def __init__(self, settings: TractionSettings):
         """Start without measurements."""
         self._workspace = TractionWorkspace()
-        self._monitor = InputMonitor({})
-        self._odometry_monitor = InputMonitor({})
+        self._monitor = InputMonitor({}, optional=(ODOMETRY,))
         self._follow_steering(settings)
         self._suspension_angles = np.zeros(len(SUSPENSION_JOINTS))
         self._suspension_rates: Floats | None = None
-        self._wheel_rates = np.zeros(WHEEL_COUNT)
-        self._attitude = (0.0, 0.0)
+        self.wheel_rates = np.zeros(WHEEL_COUNT)
+        """Last measured rates (6,) of the wheels [rad/s]."""
+        self.roll, self.pitch = 0.0, 0.0
+        """Last measured attitude [rad], pitch positive with the nose down."""
         self._body_rates: Floats | None = None
-        self._wanted_speed, self._wanted_yaw_rate = 0.0, 0.0
+        self.wanted = (0.0, 0.0)
+        """Commanded speed [m/s] and yaw rate [rad/s], within what the rover can do."""
         self._pose, self._deviation = np.zeros(4), 0.0
-        self._terrain: Terrain | None = None
         self._finder: MapContactFinder | None = None
         self._last_time: float | None = None
         self._last: Floats | None = None
@@ -91,8 +110,8 @@ class TractionService:
         self._estimator = MotionContactEstimator(settings.rover)
         self._follow_steering(settings)
         self._last = None
-        if self._terrain is not None:
-            self.take_terrain(self._terrain)
+        if self._finder is not None:
+            self.take_map(self._finder)
 
     def _follow_steering(self, settings: TractionSettings) -> None:
         """Ask for the joints of a rover; all inputs must arrive anew."""
@@ -107,29 +126,28 @@ class TractionService:
     def _apply(self, settings: TractionSettings) -> None:
         """Take what follows from settings and has no state."""
         self._settings = settings
-        rover, timeouts = settings.rover, settings.timeouts
+        rover, parameters = settings.rover, settings.parameters
         self._radius = rover.wheel.radius
         self._monitor.timeouts = {
-            JOINT_STATES: timeouts.joint_states,
-            IMU: timeouts.imu,
-            CMD_VEL: timeouts.cmd_vel,
+            name: getattr(parameters, f"{name}_timeout")
+            for name in (JOINT_STATES, IMU, CMD_VEL, ODOMETRY)
         }
-        self._odometry_monitor.timeouts = {ODOMETRY: timeouts.odometry}
         self._writer = BalanceWriter(rover, settings.payload)
         self._limits = MeasurementLimits(rover)
-        self._optimal = settings.policy == OPTIMAL
+        self._optimal = parameters.policy == OPTIMAL
         friction = np.full(WHEEL_COUNT, settings.friction)
         self._inputs = ProgramInputs(friction, settings.max_torque, rover.wheel.radius)
 
     def _create_loops(self) -> None:
         """Create the loops of speed and heading with the current gains."""
-        rover, gains = self._settings.rover, self._settings.gains
+        rover, gains = self._settings.rover, self._settings.parameters
         weight = self._writer.weight
         mass, max_push = weight / rover.gravity, MAX_PUSH * weight
-        self._speed = PushLoop(mass * gains.speed, mass * gains.travel, max_push)
+        self._speed = PushLoop(mass * gains.speed_gain, mass * gains.travel_gain, max_push)
         half_track = rover.suspension.wheels["middle"][1]
-        self._heading = HeadingLoop(mass * gains.heading, half_track, max_push)
-        self._slip = SlipControl(gains.slip, self._settings.max_torque)
+        gain = half_track**2 * (mass * gains.heading_gain)
+        self._heading = PIController(gain, HEADING_INTEGRAL_GAIN * gain, max_push * half_track)
+        self._slip = SlipControl(self._settings.slip_gain, self._settings.max_torque)
 
     @property
     def weight(self) -> float:
@@ -142,24 +160,9 @@ class TractionService:
         return self._slip.detector.climbs
 
     @property
-    def wheel_rates(self) -> Floats:
-        """Last measured rates (6,) of the wheels [rad/s]."""
-        return self._wheel_rates
-
-    @property
     def wheel_time(self) -> float:
         """Time of the oldest of these rates [s]."""
         return self._joints.wheel_time
-
-    @property
-    def pitch(self) -> float:
-        """Last measured pitch [rad], positive with the nose down."""
-        return self._attitude[1]
-
-    @property
-    def wanted(self) -> tuple[float, float]:
-        """Commanded speed [m/s] and yaw rate [rad/s], within what the rover can do."""
-        return self._wanted_speed, self._wanted_yaw_rate
 
     @property
     def wanted_rates(self) -> Floats:
@@ -192,9 +195,9 @@ class TractionService:
                 self._monitor.ignore(JOINT_STATES, "stamps do not advance")
             return
         self._suspension_angles = self._joints.suspension_angles
-        self._wheel_rates = self._joints.wheel_rates
+        self.wheel_rates = self._joints.wheel_rates
         self.steering[self._steered] = self._joints.steering_angles
-        earliest = now - self._settings.timeouts.joint_states
+        earliest = now - self._monitor.timeouts[JOINT_STATES]
         self._suspension_rates = self._joints.find_suspension_rates(earliest)
         if math.isfinite(self._joints.time):
             self._monitor.take(JOINT_STATES, self._joints.time)
@@ -203,7 +206,6 @@ class TractionService:
         """Forget when inputs came, after a step of the clock: each must arrive anew."""
         self._joints.forget()
         self._monitor.forget()
-        self._odometry_monitor.forget()
 
     def take_attitude(self, roll: float, pitch: float, rates: Floats | None, now: float) -> None:
         """Take roll and pitch [rad], measured at time `now` [s].
@@ -214,7 +216,7 @@ class TractionService:
         if wrong:
             self._monitor.refuse(IMU, wrong, now)
             return
-        self._attitude, self._body_rates = (roll, pitch), rates
+        self.roll, self.pitch, self._body_rates = roll, pitch, rates
         self._monitor.take(IMU, now)
 
     def take_command(self, speed: float, yaw_rate: float, now: float) -> None:
@@ -222,38 +224,39 @@ class TractionService:
 
         Speeds beyond those of the rover's wheels are reduced.
         """
-        self._wanted_speed, self._wanted_yaw_rate = self._limits.clip_command(speed, yaw_rate)
+        self.wanted = self._limits.clip_command(speed, yaw_rate)
         self._monitor.take(CMD_VEL, now)
 
     def take_odometry(self, pose: Floats, deviation: float, now: float) -> None:
         """Take x, y, z [m], yaw [rad] (4,), map frame, and the standard deviation of x, y [m]."""
         self._pose, self._deviation = pose, deviation
-        self._odometry_monitor.take(ODOMETRY, now)
+        self._monitor.take(ODOMETRY, now)
 
     def take_terrain(self, terrain: Terrain) -> None:
         """Take a map; it is used while odometry is recent."""
-        self.take_map(prepare_map(self._settings.rover, terrain))
+        self.take_map(MapContactFinder(self._settings.rover, terrain))
 
-    def take_map(self, prepared: PreparedMap) -> None:
-        """Take a prepared map; prepare it again if it is for another rover."""
+    def take_map(self, finder: MapContactFinder) -> None:
+        """Take a prepared map; prepare it again if it is for another rover.
+
+        Preparing takes longer than an update may. `ros/map_intake.py` does it in a thread.
+        """
         rover = self._settings.rover
-        if prepared.rover is not rover:
-            prepared = prepare_map(rover, prepared.terrain)
-        self._terrain, self._finder = prepared.terrain, prepared.finder
+        is_own = finder.rover is rover
+        self._finder = finder if is_own else MapContactFinder(rover, finder.terrain)
 
     def refuse(self, name: str, error: str, now: float = NEVER) -> None:
         """Record an invalid input and its error; later inputs end it."""
-        (self._odometry_monitor if name == ODOMETRY else self._monitor).refuse(name, error, now)
+        self._monitor.refuse(name, error, now)
 
     def ignore(self, name: str, reason: str) -> None:
         """Record why a message was not used; it is a fault only if no other one comes."""
-        (self._odometry_monitor if name == ODOMETRY else self._monitor).ignore(name, reason)
+        self._monitor.ignore(name, reason)
 
     def find_fault(self, now: float) -> str:
         """Return the fault of the inputs at time `now` [s]; empty if there is none."""
         if not self._monitor.is_fresh(JOINT_STATES, now) and not self._joints.is_empty:
-            timeout = self._settings.timeouts.joint_states
-            missing = self._joints.describe_older(now - timeout)
+            missing = self._joints.describe_older(now - self._monitor.timeouts[JOINT_STATES])
             self._monitor.describe(JOINT_STATES, missing)
         return self._monitor.find_fault(now)
 
@@ -308,7 +311,7 @@ class TractionService:
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
         """Return the contact angles of the best source, and a warning, empty if none."""
         from_motion, warning = self._estimate_from_motion(duration)
-        if self._finder is None or not self._odometry_monitor.is_fresh(ODOMETRY, now):
+        if self._finder is None or not self._monitor.is_fresh(ODOMETRY, now):
             return from_motion, warning
         try:
             backward = self._mean_wanted() < 0.0
@@ -329,16 +332,17 @@ class TractionService:
         state = self._level_state()
         motion = Motion(
             state.roll, state.pitch, state.rocker_angle, state.bogie_angles, rocker,
-            self._suspension_rates[2:], self._wheel_rates, self._body_rates, state.steering,
+            self._suspension_rates[2:], self.wheel_rates, self._body_rates, state.steering,
         )  # fmt: skip
         return self._estimator.update(motion, duration), ""
 
     def _level_state(self) -> MeasuredState:
         """Return the measured state with zero contact angles."""
-        roll, pitch = self._attitude
         right, left, *bogies = self._suspension_angles
-        rocker, zero, none = 0.5 * (right - left), np.zeros(WHEEL_COUNT), np.zeros(WHEEL_COUNT)
-        return MeasuredState(roll, pitch, rocker, np.array(bogies), zero, none, self.steering)
+        return MeasuredState(
+            self.roll, self.pitch, 0.5 * (right - left), np.array(bogies), np.zeros(WHEEL_COUNT),
+            steering=self.steering,
+        )  # fmt: skip
 
     def _measure_state(self, estimate: ContactEstimate) -> MeasuredState:
         """Return the measured state with estimated contact angles."""
@@ -352,7 +356,7 @@ class TractionService:
 
     def _find_push(self, duration: float) -> float:
         """Return the wanted push [N], from the mean travel of the wheels."""
-        error = self._mean_wanted() - self.course.mean_of(self._wheel_rates) * self._radius
+        error = self._mean_wanted() - self.course.mean_of(self.wheel_rates) * self._radius
         growth = STALLED_GROWTH * duration if self._slip.detector.stalled else duration
         if not self._optimal:
             return self._speed.update(error, growth, self._limited)
@@ -382,20 +386,20 @@ class TractionService:
         """Return the torques (6,) [N m] with the other loops, limited in magnitude and rate."""
         settings, torques, course = self._settings, answer.torques.copy(), self.course
         if self._body_rates is not None:
-            mean_speed = course.mean_of(self._wheel_rates) * self._radius
-            wanted = course.yaw_rate(self._wanted_yaw_rate, mean_speed)
+            mean_speed = course.mean_of(self.wheel_rates) * self._radius
+            wanted = course.yaw_rate(self.wanted[1], mean_speed)
             error = wanted - float(self._body_rates[2])
             moment = self._heading.update(error, duration, self._limited)
             torques += self._radius * moment * course.turning_shares
         if self._optimal:
             ahead = course.directions
             motion = WheelMotion(
-                ahead * self._wheel_rates, course.sign * ahead * rows.wheel_speeds,
+                ahead * self.wheel_rates, course.sign * ahead * rows.wheel_speeds,
                 self._suspension_angles, self._mean_wanted() / self._radius, self._from_map,
                 course.ratios,
             )  # fmt: skip
             torques = ahead * self._slip.correct(ahead * torques, motion, duration)
         torques = np.minimum(np.maximum(torques, -settings.max_torque), settings.max_torque)
-        max_change = settings.gains.torque_rate * duration
+        max_change = settings.torque_rate * duration
         self._torques = limit_rate(torques, self._torques, max_change)
         return self._torques

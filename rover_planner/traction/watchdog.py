@@ -34,7 +34,7 @@ class Watchdog:
 
     @property
     def trips(self) -> int:
-        """How often commands expired."""
+        """Number of times that commands expired."""
         return self._trips
 
     def send(self, command: Callable[[], None], started: float, deadline: float) -> bool:

@@ -22,7 +22,7 @@ NUMBER_EXPONENT = 2.0
 """Craters of diameter D and larger are proportional to D to minus this power."""
 MAX_COUNT = 100_000
 """Largest expected number of craters."""
-EJECTA_REACH = 3.0
+EJECTA_RADII = 3.0
 """Outer radius of the ejecta blanket [crater radii]."""
 
 
@@ -35,14 +35,14 @@ def crater_profile(distance, diameter: float) -> np.ndarray:
 
     Returns:
         Heights [m] of the same shape: negative on the floor, highest on the rim, zero from
-        EJECTA_REACH radii on.
+        EJECTA_RADII radii on.
     """
     r = np.asarray(distance, dtype=float) / (0.5 * diameter)
     rim = RIM_TO_DIAMETER * diameter
     depth = DEPTH_TO_DIAMETER * diameter
     bowl = rim - depth * (1 - r**2)
-    outside = np.clip(r, 1.0, EJECTA_REACH) ** -3.0
-    end = EJECTA_REACH**-3.0
+    outside = np.clip(r, 1.0, EJECTA_RADII) ** -3.0
+    end = EJECTA_RADII**-3.0
     return np.where(r < 1, bowl, rim * (outside - end) / (1 - end))
 
 
@@ -102,9 +102,9 @@ def add_crater(
         freshness: Scale of the relief, 1 for a fresh crater, less for a worn one.
     """
     ny, nx = elevation.shape
-    reach = EJECTA_REACH * 0.5 * diameter / resolution
-    i0, i1 = max(0, int(column - reach)), min(nx, int(column + reach) + 2)
-    j0, j1 = max(0, int(row - reach)), min(ny, int(row + reach) + 2)
+    extent = EJECTA_RADII * 0.5 * diameter / resolution
+    i0, i1 = max(0, int(column - extent)), min(nx, int(column + extent) + 2)
+    j0, j1 = max(0, int(row - extent)), min(ny, int(row + extent) + 2)
     if i0 >= i1 or j0 >= j1:
         return
     x = (np.arange(i0, i1) - column) * resolution

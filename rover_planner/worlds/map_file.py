@@ -27,7 +27,7 @@ class MapFileError(PlanningError):
 
 @dataclass(frozen=True)
 class MapLimits:
-    """What a client may load."""
+    """Limits of the files that a client may load."""
 
     folder: str = "/"
     """Folder that the file must be below; symbolic links that lead out of it are refused."""

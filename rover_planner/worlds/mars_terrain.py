@@ -124,7 +124,7 @@ def make_relief(
 def _dig_craters(rng, elevation, resolution, density, span) -> None:
     """Add craters in and around the map, the largest first, with random freshness."""
     ny, nx = elevation.shape
-    margin = 0.5 * craters.EJECTA_REACH * span[1] / resolution
+    margin = 0.5 * craters.EJECTA_RADII * span[1] / resolution
     area = (nx + 2 * margin) * (ny + 2 * margin) * resolution**2
     for diameter in craters.sample_diameters(rng, density, area, *span):
         column, row = rng.uniform(-margin, nx + margin), rng.uniform(-margin, ny + margin)

@@ -27,11 +27,6 @@ def decay_rate(k: float) -> float:
     return 1.79 + 0.152 / k
 
 
-def cumulative_area(k: float, diameter):
-    """Return F_k(D), the fraction of the ground covered by rocks of `diameter` [m] and larger."""
-    return k * np.exp(-decay_rate(k) * np.asarray(diameter))
-
-
 def cumulative_number(k: float, diameters: np.ndarray, largest: float) -> np.ndarray:
     """Return the number of rocks per square metre at or above each diameter.
 

@@ -94,7 +94,6 @@ def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_demo_on_mars_reaches_what_it_sees_and_refuses_what_it_does_not(tmp_path):
     demo = Demo(tmp_path, "--map", "spirit", "--out", tmp_path / "demo.png")
     code, out, err = demo.finish()
@@ -108,7 +107,7 @@ def test_demo_on_mars_reaches_what_it_sees_and_refuses_what_it_does_not(tmp_path
     assert_nothing_left(demo)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
     demo.wait_for("rover_planner.nodes.mission_planner")
@@ -119,7 +118,7 @@ def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file):
     assert_nothing_left(demo)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
     os.kill(demo.wait_for("rover_planner.nodes.traverse_server"), signal.SIGKILL)
@@ -136,7 +135,6 @@ def test_a_demo_takes_no_domain_of_a_test_though_it_looks_unused():
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
     """The step that says so did nothing once its module had moved; the server compiled then."""
     environment = os.environ | {"PYTHONPATH": str(REPOSITORY), "NUMBA_CACHE_DIR": str(tmp_path)}

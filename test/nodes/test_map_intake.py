@@ -7,8 +7,8 @@ from rclpy.serialization import serialize_message
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics.errors import ModelError
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.traction.prepared_map import prepare_map
 from support.rough_grounds import plane
 from support.waiting import wait_until
 
@@ -23,7 +23,7 @@ def test_a_map_is_prepared_once_and_returned_once():
     made = []
 
     def prepare(cloud):
-        made.append(prepare_map(LSR1, terrain_from_point_cloud(cloud)))
+        made.append(MapContactFinder(LSR1, terrain_from_point_cloud(cloud)))
         return made[-1]
 
     intake = MapIntake(prepare, made.append)
@@ -46,7 +46,7 @@ def test_a_map_that_cannot_be_used_is_refused_and_the_next_is_taken():
     def prepare(cloud):
         if cloud.width < 60:
             raise ModelError("too small")
-        return prepare_map(LSR1, terrain_from_point_cloud(cloud))
+        return MapContactFinder(LSR1, terrain_from_point_cloud(cloud))
 
     intake = MapIntake(prepare, told.append)
     intake.offer(cloud_of(0.5))

@@ -10,7 +10,6 @@ from rover_planner.traction.loops import (
     PIController,
     PushLimit,
     StallDetector,
-    StallServos,
     WheelMotion,
     estimate_rolling_rates,
     limit_rate,
@@ -72,15 +71,6 @@ def test_servos_in_vain_leave_the_torques_to_the_program_again():
     taken = np.flatnonzero(np.diff(np.array(shares) == 1.0))
     assert len(taken) >= 3
     assert 0.02 * (taken[1] - taken[0]) == pytest.approx(SERVO_TIME, abs=0.05)
-
-
-def test_a_servo_starts_from_the_torques_that_act_and_rises_to_its_limit():
-    servos, acting = StallServos(0.8, 2.0), np.linspace(-0.5, 0.5, 6)
-    servos.follow(acting)
-    np.testing.assert_allclose(servos.update(np.zeros(6), 0.02), acting)
-    for _ in range(200):
-        torques = servos.update(np.full(6, 0.3), 0.02)
-    np.testing.assert_allclose(torques, 2.0 + 0.8 * 0.3)
 
 
 def test_a_push_that_makes_wheels_slip_falls_until_they_do_not():

@@ -24,7 +24,7 @@ from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import sensor_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
-from rover_planner.traction.stamps import NANOSECONDS, StampCheck, StampError
+from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
     IMU,

@@ -11,17 +11,17 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.rover.model import Rover
+from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import TransformError
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
-from rover_planner.traction.prepared_map import PreparedMap, prepare_map
 
 CLOUD = "elevation_cloud"
 
 
-class TractionMaps(MapIntake[PreparedMap]):
+class TractionMaps(MapIntake[MapContactFinder]):
     """Prepares clouds for the controller in a thread of their own."""
 
     def __init__(
@@ -62,7 +62,7 @@ class TractionMaps(MapIntake[PreparedMap]):
             self._unplaced = None
             self.repeat()
 
-    def _make(self, cloud: PointCloud2) -> PreparedMap:
+    def _make(self, cloud: PointCloud2) -> MapContactFinder:
         """Prepare a map from a cloud; called in the thread."""
         frame, stamp = cloud.header.frame_id, stamp_to_ns(cloud.header.stamp)
         self._unplaced = None
@@ -73,7 +73,7 @@ class TractionMaps(MapIntake[PreparedMap]):
             raise
         values, move = self._parameters, None if source is None else source.matrix
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
-        return prepare_map(self._rover(), terrain)
+        return MapContactFinder(self._rover(), terrain)
 
     def _tell(self, error: str) -> None:
         line = f"{CLOUD} refused, the last map stays: {error}"

@@ -11,7 +11,7 @@ from msg_adapters.commands import effort_commands, set_values, wheel_values
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.ros.qos import latched_qos, topic_qos
-from rover_planner.traction.traction_update import TractionUpdate
+from rover_planner.traction.traction_service import TractionUpdate
 
 STANDING_WHEELS = np.zeros(WHEEL_COUNT)
 """Rates of wheels that stand [rad/s]."""

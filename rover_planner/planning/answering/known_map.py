@@ -6,7 +6,7 @@ from functools import cached_property
 
 from rover_physics.terrain.grid import Terrain
 from rover_planner.worlds.maps.blind_ground import SeenGround, seen_ground
-from rover_planner.worlds.maps.sources import CellSources
+from rover_planner.worlds.maps.layers import CellSources
 
 NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second."""

@@ -22,7 +22,7 @@ from rover_planner.planning.answering.situation import GivenPath, Situation
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.worlds.maps.ground_beneath import Standing
-from rover_planner.worlds.maps.sources import CellSources
+from rover_planner.worlds.maps.layers import CellSources
 
 
 class TraverseService:

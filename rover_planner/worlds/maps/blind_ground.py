@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.sources import FOOTPRINT, CellSources
+from rover_planner.worlds.maps.layers import FOOTPRINT, CellSources
 
 ALLOW, ALLOW_FOOTPRINT, REFUSE = "allow", "allow_footprint", "refuse"
 BLIND_GROUND = (ALLOW, ALLOW_FOOTPRINT, REFUSE)
@@ -19,7 +19,7 @@ are allowed, allowed over the start footprint only, or refused."""
 CODE = "blind_ground"
 """Code of the refusal."""
 SEEN, ASSUMED, UNSEEN = range(3)
-"""What is known of a cell: measured, filled in as part of the start footprint, or nothing."""
+"""Kinds of cells: measured, filled in as part of the start footprint, or nothing."""
 MOST = 300
 """Largest number of points along a side of the belly."""
 CHUNK = 500_000
@@ -48,7 +48,7 @@ class BlindShare:
 
 @dataclass(frozen=True, eq=False)
 class SeenGround:
-    """What was seen of a map."""
+    """The seen part of a map."""
 
     terrain: Terrain
     """The map, of which the cells count."""
@@ -63,32 +63,22 @@ class SeenGround:
         """
         if self._is_seen_around(rover, poses):
             return BlindShare(0.0, 0.0, -1, -1)
-        ny, nx = self.kinds.shape
-        swept = np.zeros((ny, nx), bool)
-        first, beyond = -1, -1
+        swept = np.zeros(self.kinds.shape, bool)
         poses, waypoints = self._spread_out(rover, poses)
         near = self._is_near(rover, poses)
-        off_map = waypoints[~near][:1].tolist()
-        poses, waypoints = poses[near], waypoints[near]
-        for start, rows, columns in self._cells_below(rover, poses):
-            on_map = (rows >= 0) & (rows < ny) & (columns >= 0) & (columns < nx)
-            i, j = np.clip(rows, 0, ny - 1), np.clip(columns, 0, nx - 1)
-            kinds = np.where(on_map, self.kinds[i, j], UNSEEN)
-            swept[i[on_map], j[on_map]] = True
-            if first < 0:
-                first = _first(start, kinds != SEEN)
-            if beyond < 0:
-                beyond = _first(start, kinds == UNSEEN)
+        firsts = {SEEN: waypoints[~near][:1].tolist(), ASSUMED: waypoints[~near][:1].tolist()}
+        waypoints = waypoints[near]
+        for here, kinds, cells in self._kinds_below(rover, poses[near]):
+            swept[cells] = True
+            for best, found in firsts.items():  # a waypoint is bad from a kind beyond `best` on
+                found += waypoints[here][(kinds > best).any(axis=1)][:1].tolist()
         counts = np.bincount(self.kinds[swept], minlength=3)
         if not counts.any():
             return BlindShare(1.0, 0.0, 0, 0)
         total, assumed = int(counts.sum()), int(counts[ASSUMED])
         blind = (assumed + int(counts[UNSEEN])) / total
-        firsts = (
-            min([int(waypoints[k]) for k in (found,) if k >= 0] + off_map, default=-1)
-            for found in (first, beyond)
-        )
-        return BlindShare(blind, assumed / total, *firsts)
+        first, beyond = (min(found, default=-1) for found in firsts.values())
+        return BlindShare(blind, assumed / total, first, beyond)
 
     def refused_below(
         self, rover: Rover, poses: NDArray[np.float64], rule: str
@@ -100,27 +90,24 @@ class SeenGround:
         refused = np.zeros(len(poses), bool)
         if rule == ALLOW or self._is_seen_around(rover, poses):
             return refused
-        ny, nx = self.kinds.shape
         near = self._is_near(rover, poses)
         refused[~near] = True
         rows_near = np.flatnonzero(near)
-        for start, rows, columns in self._cells_below(rover, poses[near]):
-            on_map = (rows >= 0) & (rows < ny) & (columns >= 0) & (columns < nx)
-            kinds = self.kinds[np.clip(rows, 0, ny - 1), np.clip(columns, 0, nx - 1)]
-            bad = ~on_map | (kinds == UNSEEN if rule == ALLOW_FOOTPRINT else kinds != SEEN)
-            refused[rows_near[start : start + len(rows)]] = bad.any(axis=1)
+        best = ASSUMED if rule == ALLOW_FOOTPRINT else SEEN
+        for here, kinds, _ in self._kinds_below(rover, poses[near]):
+            refused[rows_near[here]] = (kinds > best).any(axis=1)
         return refused
 
     def _is_near(self, rover: Rover, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return (n,) True for the poses at which the belly may be over the map."""
-        reach = _reach(rover) + self.terrain.resolution
+        most = _corner_distance(rover) + self.terrain.resolution
         x0, x1, y0, y1 = self.terrain.bounds
         x, y, _ = poses.T
-        return (x >= x0 - reach) & (x <= x1 + reach) & (y >= y0 - reach) & (y <= y1 + reach)
+        return (x >= x0 - most) & (x <= x1 + most) & (y >= y0 - most) & (y <= y1 + most)
 
     def _is_seen_around(self, rover: Rover, poses: NDArray[np.float64]) -> bool:
         """Return whether all ground around a path is on the map and was seen."""
-        half = _reach(rover)
+        half = _corner_distance(rover)
         low, high = poses[:, :2].min(axis=0) - half, poses[:, :2].max(axis=0) + half
         origin, step = self.terrain.origin, self.terrain.resolution
         first = np.floor((low - origin) / step).astype(int)
@@ -137,18 +124,22 @@ class SeenGround:
         """Return the poses at which the belly has moved on by a cell, and their indices."""
         steps = np.diff(poses, axis=0)
         turns = np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
-        moved = np.hypot(*steps[:, :2].T) + _reach(rover) * turns
-        way = np.concatenate([[0.0], np.cumsum(moved)])
-        cells = np.floor(way / self.terrain.resolution)
+        moved = np.hypot(*steps[:, :2].T) + _corner_distance(rover) * turns
+        distance = np.concatenate([[0.0], np.cumsum(moved)])
+        cells = np.floor(distance / self.terrain.resolution)
         kept = np.concatenate([[True], np.diff(cells) > 0])
         kept[-1] = True
         return poses[kept], np.flatnonzero(kept)
 
-    def _cells_below(
+    def _kinds_below(
         self, rover: Rover, poses: NDArray[np.float64]
-    ) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.intp]]]:
-        """Yield first pose, and rows and columns (k, m) of the cells below the belly there."""
-        terrain, belly = self.terrain, rover.belly
+    ) -> Iterator[tuple[slice, NDArray[np.uint8], tuple[NDArray[np.intp], ...]]]:
+        """Yield some poses, the kinds (k, m) of the ground below the belly, and cells of the map.
+
+        The cells are the rows and columns of those below the belly there, without shape. Ground
+        off the map is UNSEEN.
+        """
+        terrain, belly, (ny, nx) = self.terrain, rover.belly, self.kinds.shape
         step = 0.7 * terrain.resolution  # no cell is narrower than that across its diagonal
         along, across = (
             np.linspace(low, high, min(max(2, math.ceil((high - low) / step) + 1), MOST))
@@ -161,18 +152,15 @@ class SeenGround:
             c, s = np.cos(yaw), np.sin(yaw)
             columns = (x + c * u - s * v - terrain.origin[0]) / terrain.resolution
             rows = (y + s * u + c * v - terrain.origin[1]) / terrain.resolution
-            yield start, np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
+            i, j = np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
+            on_map = (i >= 0) & (i < ny) & (j >= 0) & (j < nx)
+            kinds = np.where(on_map, self.kinds[i.clip(0, ny - 1), j.clip(0, nx - 1)], UNSEEN)
+            yield slice(start, start + len(i)), kinds, (i[on_map], j[on_map])
 
 
-def _reach(rover: Rover) -> float:
+def _corner_distance(rover: Rover) -> float:
     """Return the distance of the belly's farthest corner from the body origin [m]."""
     return max(math.hypot(x, y) for x in rover.belly.x for y in rover.belly.y)
-
-
-def _first(start: int, blind: NDArray[np.bool_]) -> int:
-    """Return start plus the first row (k, m) with a True, -1 if there is none."""
-    found = np.flatnonzero(blind.any(axis=1))
-    return start + int(found[0]) if len(found) else -1
 
 
 def seen_ground(received: Terrain, sources: CellSources | None) -> SeenGround:

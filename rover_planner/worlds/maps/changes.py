@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a map differs from the one before."""
+"""The cells in which a map differs from the one before."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -16,9 +16,10 @@ from rover_physics.prediction.evaluation import new_work
 from rover_physics.rover.linkage import pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
-from rover_planner.worlds.maps.cells import CellBox, CellGrid, Patch
+from rover_planner.worlds.maps.cells import CellBox, CellGrid
+from rover_planner.worlds.maps.layers import Patch
 
-CONTACT_REACH = 0.25
+CONTACT_LENGTH = 0.25
 """Distance along a wheel's plane from its contact up to which the ground is measured [radii]."""
 EDGE_CELLS = 1.5
 """Width beyond the wheels' outline that interpolation between cells needs [cells]."""
@@ -62,7 +63,7 @@ class GroundBeneath:
     """Smallest and largest x and y of the wheels seen from above [m], body axes turned by yaw."""
     half_width: float
     """Half of a wheel's width [m]."""
-    reach: float
+    contact_length: float
     """Distance along the wheel from its contact up to which the ground is measured [m]."""
 
     def patch(self, grid: CellGrid, margin: float, std: float) -> tuple[Patch, NDArray[np.bool_]]:
@@ -77,23 +78,19 @@ class GroundBeneath:
         """
         beyond = margin + EDGE_CELLS * grid.resolution
         x0, x1, y0, y1 = self.outline
-        corners_x = np.array([x0 - beyond, x1 + beyond, x0 - beyond, x1 + beyond])
-        corners_y = np.array([y0 - beyond, y0 - beyond, y1 + beyond, y1 + beyond])
+        corners = np.array([(x, y) for x in (x0 - beyond, x1 + beyond)
+                            for y in (y0 - beyond, y1 + beyond)])  # fmt: skip
         c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
         column, row = grid.coordinates(
-            self.pose[0] + c * corners_x - s * corners_y,
-            self.pose[1] + s * corners_x + c * corners_y,
+            self.pose[0] + c * corners[:, 0] - s * corners[:, 1],
+            self.pose[1] + s * corners[:, 0] + c * corners[:, 1],
         )
-        low_row, low_column = int(np.floor(row.min())), int(np.floor(column.min()))
-        box = CellBox(
-            low_row,
-            low_column,
-            int(np.ceil(row.max())) - low_row + 1,
-            int(np.ceil(column.max())) - low_column + 1,
-        )
-        x = grid.anchor[0] + grid.resolution * (low_column + np.arange(box.columns, dtype=float))
-        y = grid.anchor[1] + grid.resolution * (low_row + np.arange(box.rows, dtype=float))
-        along, across = self._to_body(x[None, :], y[:, None])
+        low = int(np.floor(row.min())), int(np.floor(column.min()))
+        high = int(np.ceil(row.max())) + 1, int(np.ceil(column.max())) + 1
+        box = CellBox.between(low, high)
+        columns, rows = np.arange(box.columns, dtype=float), np.arange(box.rows, dtype=float)
+        x, y = grid.places(box.column + columns, box.row + rows)
+        along, across = _to_body(self.pose, x[None, :], y[:, None])
         inside = (along >= x0 - beyond) & (along <= x1 + beyond)
         inside &= (across >= y0 - beyond) & (across <= y1 + beyond)
         heights = np.where(inside, self._height(along, across), np.nan)
@@ -103,17 +100,12 @@ class GroundBeneath:
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the heights of the surface [m] at points [m], map frame."""
-        return self._height(*self._to_body(np.asarray(x, float), np.asarray(y, float)))
-
-    def _to_body(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        dx, dy = x - self.pose[0], y - self.pose[1]
-        c, s = np.cos(self.pose[2]), np.sin(self.pose[2])
-        return c * dx + s * dy, c * dy - s * dx
+        return self._height(*_to_body(self.pose, np.asarray(x, float), np.asarray(y, float)))
 
     def _height(self, along: Floats, across: Floats) -> Floats:
         sides = []
         for side in (slice(0, 3), slice(3, 6)):
-            ahead, aside = self._to_body(self.contacts[side, 0], self.contacts[side, 1])
+            ahead, aside = _to_body(self.pose, *self.contacts[side, :2].T)
             z = self.contacts[side, 2]
             slope = (z[2] - z[0]) / (ahead[2] - ahead[0])
             beyond = np.minimum(along - ahead[0], 0.0) + np.maximum(along - ahead[2], 0.0)
@@ -123,10 +115,12 @@ class GroundBeneath:
         return heights
 
     def _is_contact(self, along: Floats, across: Floats) -> NDArray[np.bool_]:
-        ahead, aside = self._to_body(self.contacts[:, 0], self.contacts[:, 1])
+        ahead, aside = _to_body(self.pose, *self.contacts[:, :2].T)
         near = np.zeros(np.broadcast_shapes(along.shape, across.shape), bool)
         for x, y in zip(ahead, aside, strict=True):
-            near |= (np.abs(along - x) <= self.reach) & (np.abs(across - y) <= self.half_width)
+            near |= (np.abs(along - x) <= self.contact_length) & (
+                np.abs(across - y) <= self.half_width
+            )
         return near
 
 
@@ -153,19 +147,22 @@ def find_ground_beneath(rover: Rover, standing: Standing) -> GroundBeneath:
     axle = np.array(placement.R)[:, 1]
     down = normal - (normal @ axle) * axle
     contacts = centres - rover.wheel.radius * down / np.linalg.norm(down)
-    x, y = centres[:, 0] - standing.x, centres[:, 1] - standing.y
-    c, s = np.cos(standing.yaw), np.sin(standing.yaw)
-    along, across = c * x + s * y, c * y - s * x
-    half = 0.5 * rover.wheel.width
-    radius = rover.wheel.radius
+    here = standing.x, standing.y, standing.yaw
+    along, across = _to_body(here, *centres[:, :2].T)
+    half, radius = 0.5 * rover.wheel.width, rover.wheel.radius
     outline = (
         float(along.min() - radius),
         float(along.max() + radius),
         float(across.min() - half),
         float(across.max() + half),
     )
-    place_of = standing.x, standing.y, standing.yaw
-    return GroundBeneath(place_of, contacts, outline, half, CONTACT_REACH * radius)
+    return GroundBeneath(here, contacts, outline, half, CONTACT_LENGTH * radius)
+
+
+def _to_body(pose: tuple[float, float, float], x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Return points [m] of the map along and across a body at x, y [m] and yaw [rad]."""
+    dx, dy, c, s = x - pose[0], y - pose[1], np.cos(pose[2]), np.sin(pose[2])
+    return c * dx + s * dy, c * dy - s * dx
 
 
 def _normal_of(points: Floats) -> Floats:

@@ -1,12 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The layers of a living map's window: grown, moved and written without touching earlier ones."""
+"""Layers of a rectangle of cells: grown, moved, written, and laid onto other cells."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rover_planner.worlds.maps.cells import CellBox, Layer, Patch
-from rover_planner.worlds.maps.sources import UNKNOWN
+from rover_physics.terrain.grid import Terrain
+from rover_planner.worlds.maps.cells import CellBox, CellGrid, grid_of
+from rover_planner.worlds.maps.changes import LAYERS
+
+MAX_OFF_CENTRE = 0.02
+"""Largest distance between the centres of a map's cells and those of the grid at which the map
+is taken without interpolation [cells]."""
+MAX_FINER = 0.5
+"""Size of a map's cells relative to the grid's below which several of them share a cell."""
+UNKNOWN, LOADED, CONTACT, FOOTPRINT = range(4)
+"""Sources of cells: none, a loaded map, a wheel that stands there, and the ground assumed between
+and around the wheels. Higher numbers are topics."""
+FIRST_NAMES = ("unknown", "loaded", "contact", "footprint")
+"""Their names."""
+
 
 EMPTY = {
     "elevation": (np.float64, np.nan),
@@ -20,44 +36,63 @@ EMPTY = {
 ALWAYS = ("elevation", "source", "time")
 """Layers that every window has."""
 
+Layer = NDArray[Any]
+
 
 @dataclass(frozen=True, eq=False)
-class Window:
-    """Layers of a box of cells. The arrays are never written to: changes make a new window."""
+class CellSources:
+    """Source and time of each cell of a map."""
+
+    source: NDArray[np.uint8]
+    """(ny, nx) indices into `names`."""
+    time: NDArray[np.float64]
+    """(ny, nx) stamp of the map or measurement [s, ROS time]; -inf where unknown."""
+    names: tuple[str, ...] = FIRST_NAMES
+    """Names of the sources: FIRST_NAMES, then topics."""
+
+    def count(self) -> dict[str, int]:
+        """Return the number of cells of each source, by name."""
+        counts = np.bincount(self.source.ravel(), minlength=len(self.names))
+        return dict(zip(self.names, counts.tolist(), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Layers of a box of cells. The arrays are never written to: changes make a new patch."""
 
     box: CellBox
     """The cells."""
     layers: dict[str, Layer]
-    """(rows, columns) by name, those of ALWAYS and others of EMPTY."""
+    """(rows, columns) by name: elevation and others of EMPTY; those of a window have ALWAYS."""
 
-    def moved_to(self, box: CellBox) -> "Window":
-        """Return the layers over another box; cells that this window lacks are empty."""
+    def moved_to(self, box: CellBox) -> "Patch":
+        """Return the layers over another box; cells that this one lacks are empty."""
         if box == self.box:
             return self
-        moved = empty_window(box, tuple(self.layers))
+        moved = empty_patch(box, tuple(self.layers))
         to, source = self.box.within(box), box.within(self.box)
         for name, layer in self.layers.items():
             moved.layers[name][to] = layer[source]
         return moved
 
-    def with_layers(self, names: tuple[str, ...]) -> "Window":
-        """Return a window that has these layers too; heights that were exact stay so."""
+    def with_layers(self, names: tuple[str, ...]) -> "Patch":
+        """Return a patch that has these layers too; heights that were exact stay so."""
         missing = tuple(name for name in names if name not in self.layers)
         if not missing:
             return self
-        layers = self.layers | empty_window(self.box, missing).layers
+        layers = self.layers | empty_patch(self.box, missing).layers
         if "elevation_std" in missing:
             layers["elevation_std"] = np.where(np.isnan(layers["elevation"]), np.nan, 0.0)
         return replace(self, layers=layers)
 
-    def written(self, patch: Patch, take: Layer, source: int, time: float) -> "Window":
-        """Return a window in which a patch replaces some cells.
+    def written(self, patch: "Patch", take: Layer, source: int, time: float) -> "Patch":
+        """Return a patch in which another one replaces some cells.
 
-        Friction and soil that the patch does not have stay.
+        Friction and soil that the other one does not have stay.
 
         Args:
             patch: The new values, of any box.
-            take: (rows, columns) of the part of the patch within this window: True for the cells
+            take: (rows, columns) of the part of `patch` within this one: True for the cells
                 that it replaces.
             source: Their new source.
             time: Their new time [s].
@@ -82,8 +117,106 @@ class Window:
         return replace(old, layers=layers)
 
 
-def empty_window(box: CellBox, names: tuple[str, ...] = ALWAYS) -> Window:
-    """Return a window without known cells."""
+def empty_patch(box: CellBox, names: tuple[str, ...] = ALWAYS) -> Patch:
+    """Return a patch without known cells."""
     shape = box.rows, box.columns
     layers = {name: np.full(shape, EMPTY[name][1], EMPTY[name][0]) for name in names}
-    return Window(box, layers)
+    return Patch(box, layers)
+
+
+_Lay = Callable[[Terrain, CellGrid, CellBox], Patch]
+"""Lays a map onto the cells of a box."""
+
+
+def box_on(terrain: Terrain, grid: CellGrid) -> CellBox:
+    """Return the cells of a grid onto which `lay_onto` lays a map."""
+    return _place_on(terrain, grid)[1]
+
+
+def lay_onto(terrain: Terrain, grid: CellGrid, within: CellBox | None = None) -> Patch:
+    """Lay a map onto the cells of a grid.
+
+    A map whose cells are those of the grid keeps its values to the bit. One with cells of about
+    the same size or larger is interpolated bilinearly; a cell is then unknown if one of the four
+    around it is. Of several finer cells in one cell, the highest height, the largest standard
+    deviation and the lowest friction count.
+
+    Args:
+        terrain: The map.
+        grid: The grid.
+        within: Cells that are wanted; others are left out where they would be interpolated, as
+            they may be many times those of the map.
+    """
+    lays, box = _place_on(terrain, grid)
+    return lays(
+        terrain, grid, box if within is None or lays is not _interpolate else box.cut(within)
+    )
+
+
+def _place_on(terrain: Terrain, grid: CellGrid) -> tuple[_Lay, CellBox]:
+    """Return how a map is laid onto a grid, and the cells that it takes there."""
+    column, row = grid.coordinates(*terrain.origin)
+    ny, nx = terrain.elevation.shape
+    ratio = terrain.resolution / grid.resolution
+    first = round(row), round(column)
+    drift = abs(ratio - 1.0) * max(ny, nx)
+    if max(abs(row - first[0]), abs(column - first[1])) + drift <= MAX_OFF_CENTRE:
+        return _copy, CellBox(*first, ny, nx)
+    if ratio < MAX_FINER:
+        rows, columns = _cells_of(terrain, grid)
+        low, high = (int(rows[0]), int(columns[0])), (int(rows[-1]) + 1, int(columns[-1]) + 1)
+        return _combine, CellBox.between(low, high)
+    ends = row + (ny - 1) * ratio, column + (nx - 1) * ratio
+    low = int(np.ceil(row - 1e-6)), int(np.ceil(column - 1e-6))
+    high = int(np.floor(ends[0] + 1e-6)) + 1, int(np.floor(ends[1] + 1e-6)) + 1
+    return _interpolate, CellBox.between(low, high)
+
+
+def _cells_of(terrain: Terrain, grid: CellGrid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the rows (ny,) and columns (nx,) of a grid in which the cells of a map are."""
+    ny, nx = terrain.elevation.shape
+    columns, rows = grid.coordinates(*grid_of(terrain).places(np.arange(nx), np.arange(ny)))
+    return np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
+
+
+def layers_of(terrain: Terrain) -> dict[str, Layer]:
+    """Return the layers that a terrain has, by name."""
+    layers = {name: getattr(terrain, name) for name in LAYERS}
+    return {name: layer for name, layer in layers.items() if layer is not None}
+
+
+def _copy(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
+    return Patch(box, layers_of(terrain))
+
+
+def _interpolate(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
+    x, y = grid.places(
+        box.column + np.arange(box.columns), (box.row + np.arange(box.rows))[:, None]
+    )
+    bounds = terrain.bounds
+    x, y = np.clip(x, *bounds[:2]), np.clip(y, *bounds[2:])
+    layers: dict[str, Layer] = {"elevation": terrain.elevation_at(x, y)}
+    if terrain.elevation_std is not None:
+        std = replace(terrain, elevation=terrain.elevation_std, elevation_std=None)
+        layers["elevation_std"] = np.asarray(std.elevation_at(x, y))
+    j, i = (np.rint(at).astype(np.intp) for at in grid_of(terrain).coordinates(x, y))
+    for name in ("friction", "soil"):
+        layer = getattr(terrain, name)
+        if layer is not None:
+            layers[name] = layer[i, j]
+    return Patch(box, layers)
+
+
+def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
+    rows, columns = _cells_of(terrain, grid)
+    at = (rows - box.row)[:, None], (columns - box.column)[None, :]
+    layers: dict[str, Layer] = {}
+    for name, layer in layers_of(terrain).items():
+        if name == "soil":
+            combined = np.full((box.rows, box.columns), -1, np.int32)
+            np.maximum.at(combined, at, layer)
+        else:
+            combined = np.full((box.rows, box.columns), np.nan)
+            (np.fmin if name == "friction" else np.fmax).at(combined, at, layer)
+        layers[name] = combined
+    return Patch(box, layers)

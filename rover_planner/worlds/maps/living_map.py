@@ -14,23 +14,19 @@ from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
-from rover_planner.worlds.maps.cells import (
-    CellBox,
-    CellGrid,
-    Layer,
-    Patch,
-    box_on,
-    grid_of,
-    lay_onto,
-)
-from rover_planner.worlds.maps.layers import Window, empty_window
-from rover_planner.worlds.maps.sources import (
+from rover_planner.worlds.maps.cells import CellBox, CellGrid, grid_of
+from rover_planner.worlds.maps.layers import (
     CONTACT,
     FIRST_NAMES,
     FOOTPRINT,
     LOADED,
     UNKNOWN,
     CellSources,
+    Layer,
+    Patch,
+    box_on,
+    empty_patch,
+    lay_onto,
 )
 
 NEWEST, SUREST = "newest", "surest"
@@ -48,7 +44,7 @@ FINER = 0.75
 
 @dataclass(frozen=True)
 class MergeRules:
-    """How maps merge."""
+    """Rules by which maps merge."""
 
     rule: str = NEWEST
     """One of MERGE_RULES."""
@@ -77,14 +73,14 @@ class LivingMap:
 
     def __init__(self, rules: MergeRules | None = None):
         self.rules = rules or MergeRules()
-        """How maps merge from now on."""
+        """Rules by which maps merge from now on."""
         self._names = list(FIRST_NAMES)
         self._last: dict[str, float] = {}
         self._rolls = False
         self._loaded: Terrain | None = None
         self._loaded_time = 0.0
         self._grid: CellGrid | None = None
-        self._window: Window | None = None
+        self._window: Patch | None = None
         self._whole: Terrain | None = None
 
     @property
@@ -102,7 +98,7 @@ class LivingMap:
         self._clear(terrain)
         self._loaded, self._loaded_time = terrain, time
         patch = lay_onto(terrain, grid_of(terrain))
-        self._window = self._with_loaded(empty_window(patch.box))
+        self._window = self._with_loaded(empty_patch(patch.box))
         self._whole = terrain if self._std_to_add() == 0.0 else None
 
     def replace(self, terrain: Terrain, source: str, time: float) -> None:
@@ -110,7 +106,7 @@ class LivingMap:
         self._clear(terrain)
         patch = lay_onto(terrain, grid_of(terrain))
         take = np.isfinite(terrain.elevation)
-        window = empty_window(patch.box)
+        window = empty_patch(patch.box)
         self._window = window.written(patch, take, self._index_of(source), time)
         self._whole = terrain
 
@@ -141,13 +137,13 @@ class LivingMap:
             raise
         if time < self._last.get(source, time):
             layers = window.layers | {"time": np.minimum(window.layers["time"], time)}
-            window = Window(window.box, layers)
+            window = Patch(window.box, layers)
         self._last[source] = time
         take = self._wins(window, patch, time)
         self._window = window.written(patch, take, self._index_of(source), time)
         self._whole = None
 
-    def _lay(self, terrain: Terrain, centre: tuple[float, float] | None) -> tuple[Window, Patch]:
+    def _lay(self, terrain: Terrain, centre: tuple[float, float] | None) -> tuple[Patch, Patch]:
         """Return a window with room for a local map, and the map on its cells."""
         self._choose_grid(terrain)
         assert self._grid is not None
@@ -207,13 +203,11 @@ class LivingMap:
         for layer in layers.values():
             seal_array(layer)
         if self._whole is None:
-            x, y = self._grid.anchor
-            step = self._grid.resolution
             soils = () if self._loaded is None else self._loaded.soil_names
             self._whole = Terrain(
                 layers["elevation"],
-                step,
-                (x + step * box.column, y + step * box.row),
+                self._grid.resolution,
+                self._grid.places(box.column, box.row),
                 layers.get("friction"),
                 layers.get("soil"),
                 soils if "soil" in layers else (),
@@ -254,7 +248,7 @@ class LivingMap:
         if self.grid_for(terrain) is None:
             self._grid, self._window = grid_of(terrain), None
 
-    def _room_for(self, box: CellBox, centre: tuple[float, float]) -> Window:
+    def _room_for(self, box: CellBox, centre: tuple[float, float]) -> Patch:
         """Return the window with room for a box, or around a place of the rover [m]."""
         old = self._window
         wanted = self._wanted_box(box, centre)
@@ -271,7 +265,7 @@ class LivingMap:
             )
         if old is not None and old.box == wanted:
             return old
-        moved = empty_window(wanted) if old is None else old.moved_to(wanted)
+        moved = empty_patch(wanted) if old is None else old.moved_to(wanted)
         return moved if self._loaded is None else self._with_loaded(moved)
 
     def _wanted_box(self, box: CellBox, centre: tuple[float, float]) -> CellBox:
@@ -292,18 +286,19 @@ class LivingMap:
         if old.contains(box):
             return old
         union = old.union(box)
-        low_row = GROWTH if union.row < old.row else 0
-        low_column = GROWTH if union.column < old.column else 0
-        high_row = GROWTH if union.row + union.rows > old.row + old.rows else 0
-        high_column = GROWTH if union.column + union.columns > old.column + old.columns else 0
-        return CellBox(
-            union.row - low_row,
-            union.column - low_column,
-            union.rows + low_row + high_row,
-            union.columns + low_column + high_column,
+        (end_row, end_column), (old_row, old_column) = union.end, old.end
+        return CellBox.between(
+            (
+                union.row - GROWTH * (union.row < old.row),
+                union.column - GROWTH * (union.column < old.column),
+            ),
+            (
+                end_row + GROWTH * (end_row > old_row),
+                end_column + GROWTH * (end_column > old_column),
+            ),
         )
 
-    def _with_loaded(self, window: Window) -> Window:
+    def _with_loaded(self, window: Patch) -> Patch:
         """Return a window whose unknown cells are those of the loaded map."""
         assert self._loaded is not None and self._grid is not None
         patch = lay_onto(self._loaded, self._grid, window.box)
@@ -322,7 +317,7 @@ class LivingMap:
                 window.layers[name][to][empty] = patch.layers[name][own][empty]
         return window
 
-    def _wins(self, window: Window, patch: Patch, time: float) -> Layer:
+    def _wins(self, window: Patch, patch: Patch, time: float) -> Layer:
         """Return True for the cells of a patch within the window that replace the old ones."""
         to, own = patch.box.within(window.box), window.box.within(patch.box)
         known = np.isfinite(patch.layers["elevation"][own])
@@ -350,9 +345,5 @@ class LivingMap:
 
     def _centre_of(self, box: CellBox) -> tuple[float, float]:
         assert self._grid is not None
-        x, y = self._grid.anchor
-        step = self._grid.resolution
-        return (
-            x + step * (box.column + 0.5 * (box.columns - 1)),
-            y + step * (box.row + 0.5 * (box.rows - 1)),
-        )
+        centre = box.column + 0.5 * (box.columns - 1), box.row + 0.5 * (box.rows - 1)
+        return self._grid.places(*centre)

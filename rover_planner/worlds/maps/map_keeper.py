@@ -11,18 +11,18 @@ from rover_planner.worlds.maps.moved_map import MapMove, move_map
 
 AUTO, MERGE, REPLACE = "auto", "merge", "replace"
 MAP_UPDATES = (AUTO, MERGE, REPLACE)
-"""What a local map does: it merges if there is a loaded map and else replaces the last one; it
+"""Effects of a local map: it merges if there is a loaded map and else replaces the last one; it
 always merges; or it always replaces."""
 
 
 @dataclass(frozen=True)
 class KeeperSettings:
-    """How a server keeps its map."""
+    """Settings of a `MapKeeper`."""
 
     updates: str = AUTO
     """One of MAP_UPDATES."""
     rules: MergeRules = field(default_factory=MergeRules)
-    """How maps merge."""
+    """Rules by which maps merge."""
     fill: bool = True
     """Whether unknown cells under the standing rover are filled."""
     margin: float = 0.0

@@ -6,6 +6,7 @@ Ground is never made up: a cell is known only if all cells that its height comes
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
-from rover_planner.worlds.maps.cells import MAX_FINER, MAX_OFF_CENTRE, CellBox, CellGrid
+from rover_planner.worlds.maps.cells import CellBox, CellGrid, grid_of
+from rover_planner.worlds.maps.layers import MAX_FINER, MAX_OFF_CENTRE, layers_of
 
 MAX_LEAN = 0.005
 """Largest lean of a map's frame [rad]. Heights follow it; what neglects it is that cells move
@@ -31,7 +33,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MapMove:
-    """Where the frame of a map is in that of the server: a point p is at R p + t there."""
+    """The place of a map's frame in that of the server: a point p is at R p + t there."""
 
     rotation: Floats
     """(3, 3) R."""
@@ -81,7 +83,7 @@ def move_map(
         return replace(upright, origin=(x, y))
     if grid is None or terrain.resolution < MAX_FINER * grid.resolution:
         grid = CellGrid((0.0, 0.0), terrain.resolution)
-    return _Turn(upright, moved, move.yaw, grid).lay(max_cells)
+    return _lay_turned(upright, moved, move.yaw, grid, max_cells)
 
 
 def _find_centres(terrain: Terrain, move: MapMove) -> tuple[Floats, Floats]:
@@ -99,131 +101,94 @@ def _lean_heights(terrain: Terrain, move: MapMove) -> Floats:
         return z if up == 0.0 else seal_array(z + up)
     along, across, upright = move.rotation[2]
     ny, nx = z.shape
-    x = terrain.origin[0] + terrain.resolution * np.arange(nx)
-    y = terrain.origin[1] + terrain.resolution * np.arange(ny)[:, None]
+    x, y = grid_of(terrain).places(np.arange(nx), np.arange(ny)[:, None])
     return seal_array(upright * z + (along * x + across * y + up))
 
 
-class _Turn:
-    """Lays a turned map onto the cells of a grid."""
-
-    def __init__(self, terrain: Terrain, middle: Floats, yaw: float, grid: CellGrid):
-        """Take a map, where its middle is on the grid [m], and its turn [rad]."""
-        self._terrain, self._middle, self._grid = terrain, middle, grid
-        self._turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-
-    def lay(self, max_cells: int) -> Terrain:
-        """Return the map on the grid; see `move_map`."""
-        box, grid, layers = self._find_box(), self._grid, self._list_layers()
-        if box.cells > max_cells:
-            raise PlanningError(
-                f"the map turned into its frame would have {box.rows} x {box.columns} cells; "
-                f"at most {max_cells} are taken"
-            )
-        laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers}
-        band = max(BAND_CELLS // max(box.columns, 1), 1)
-        for first in range(0, box.rows, band):
-            rows = slice(first, min(first + band, box.rows))
-            around = self._find_around(box, rows)
-            for name, layer in layers.items():
-                sample = around.nearest if name == "friction" else around.interpolate
-                laid[name][rows] = sample(layer)
-        if not np.isfinite(laid["elevation"]).any():
-            raise PlanningError(
-                "the map is turned against its cells, and none of them has four known ones around"
-            )
-        x, y = grid.anchor
-        step = grid.resolution
-        origin = x + step * box.column, y + step * box.row
-        sealed = {name: seal_array(layer) for name, layer in laid.items()}
-        std, friction = sealed.get("elevation_std"), sealed.get("friction")
-        return Terrain(sealed["elevation"], step, origin, friction, elevation_std=std)
-
-    def _list_layers(self) -> dict[str, Floats]:
-        names = ("elevation", "elevation_std", "friction")
-        layers = {name: getattr(self._terrain, name) for name in names}
-        return {name: layer for name, layer in layers.items() if layer is not None}
-
-    def _find_box(self) -> CellBox:
-        """Return the cells of the grid around the turned map."""
-        ny, nx = self._terrain.elevation.shape
-        half = 0.5 * self._terrain.resolution * np.array([nx - 1, ny - 1])
-        reach = np.abs(self._turn) @ half
-        low = self._grid.coordinates(*(self._middle - reach))
-        high = self._grid.coordinates(*(self._middle + reach))
-        column, row = (math.ceil(value - SAME_PLACE) for value in low)
-        last_column, last_row = (math.floor(value + SAME_PLACE) for value in high)
-        counts = max(last_row - row + 1, 0), max(last_column - column + 1, 0)
-        return CellBox(row, column, *counts)
-
-    def _find_around(self, box: CellBox, rows: slice) -> "_Around":
-        """Return which cells of the map are around those of some rows of a box."""
-        grid, step = self._grid, self._terrain.resolution
-        columns = box.column + np.arange(box.columns)
-        lines = box.row + np.arange(rows.start, rows.stop)[:, None]
-        x = (grid.anchor[0] - self._middle[0]) + grid.resolution * columns
-        y = (grid.anchor[1] - self._middle[1]) + grid.resolution * lines
-        ny, nx = self._terrain.elevation.shape
-        (cosine, _), (sine, _) = self._turn
-        column = (cosine * x + sine * y) / step + 0.5 * (nx - 1)
-        row = (cosine * y - sine * x) / step + 0.5 * (ny - 1)
-        return _Around(_Between.find(row, ny), _Between.find(column, nx))
+def _lay_turned(
+    terrain: Terrain, middle: Floats, yaw: float, grid: CellGrid, max_cells: int
+) -> Terrain:
+    """Lay a map that is turned by a yaw [rad] about its middle (2,) [m] onto a grid."""
+    turn = math.cos(yaw), math.sin(yaw)
+    box = _find_box(terrain, middle, turn, grid)
+    if box.cells > max_cells:
+        raise PlanningError(
+            f"the map turned into its frame would have {box.rows} x {box.columns} cells; "
+            f"at most {max_cells} are taken"
+        )
+    layers = {name: layer for name, layer in layers_of(terrain).items() if name != "soil"}
+    laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers}
+    band = max(BAND_CELLS // max(box.columns, 1), 1)
+    for first in range(0, box.rows, band):
+        rows = slice(first, min(first + band, box.rows))
+        around = _find_around(terrain, middle, turn, grid, box, rows)
+        for name, layer in layers.items():
+            laid[name][rows] = _sample(layer, *around, nearest=name == "friction")
+    if not np.isfinite(laid["elevation"]).any():
+        raise PlanningError(
+            "the map is turned against its cells, and none of them has four known ones around"
+        )
+    sealed: dict[str, Any] = {name: seal_array(layer) for name, layer in laid.items()}
+    origin = grid.places(box.column, box.row)
+    return Terrain(**sealed, resolution=grid.resolution, origin=origin)
 
 
-@dataclass(frozen=True, eq=False)
-class _Between:
-    """Between which two cells of a row or column some places are."""
-
-    first: NDArray[np.intp]
-    """Index of the lower cell."""
-    last: NDArray[np.intp]
-    """Index of the upper one."""
-    beyond: Floats
-    """How far a place is beyond the lower one, 0 to 1."""
-    inside: NDArray[np.bool_]
-    """Whether a place is on the map."""
-
-    @staticmethod
-    def find(place: Floats, count: int) -> "_Between":
-        """Find the cells around fractional indices, of `count` cells."""
-        whole = np.rint(place)
-        place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
-        inside = (place >= 0.0) & (place <= count - 1)
-        first = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
-        return _Between(first, np.minimum(first + 1, count - 1), place - first, inside)
-
-    @property
-    def nearest(self) -> NDArray[np.intp]:
-        """Index of the nearer cell."""
-        return np.where(self.beyond < 0.5, self.first, self.last)
-
-    @property
-    def shares(self) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
-        """Both indices, each with its share of the value."""
-        return (self.first, 1.0 - self.beyond), (self.last, self.beyond)
+def _find_box(
+    terrain: Terrain, middle: Floats, turn: tuple[float, float], grid: CellGrid
+) -> CellBox:
+    """Return the cells of a grid around a turned map; `turn` are cosine and sine of its yaw."""
+    ny, nx = terrain.elevation.shape
+    half = 0.5 * terrain.resolution * np.array([nx - 1, ny - 1])
+    cosine, sine = turn
+    extent = np.abs([[cosine, -sine], [sine, cosine]]) @ half
+    low, high = (grid.coordinates(*(middle + sign * extent)) for sign in (-1.0, 1.0))
+    column, row = (math.ceil(value - SAME_PLACE) for value in low)
+    last_column, last_row = (math.floor(value + SAME_PLACE) for value in high)
+    return CellBox.between((row, column), (last_row + 1, last_column + 1))
 
 
-@dataclass(frozen=True, eq=False)
-class _Around:
-    """The four cells around some places."""
+Bracket = tuple[NDArray[np.intp], NDArray[np.intp], Floats, NDArray[np.bool_]]
+"""Lower and upper cell of some places, how far they are beyond the lower one, 0 to 1, and whether
+they are on the map."""
 
-    rows: _Between
-    columns: _Between
 
-    @property
-    def inside(self) -> NDArray[np.bool_]:
-        """Whether a place is on the map."""
-        return self.rows.inside & self.columns.inside
+def _find_around(
+    terrain: Terrain, middle: Floats, turn: tuple[float, float], grid: CellGrid, box: CellBox,
+    rows: slice,
+) -> tuple[Bracket, Bracket]:  # fmt: skip
+    """Return rows and columns of a map around the cells of some rows of a box."""
+    step, (cosine, sine) = terrain.resolution, turn
+    columns = box.column + np.arange(box.columns)
+    lines = box.row + np.arange(rows.start, rows.stop)[:, None]
+    x = (grid.anchor[0] - middle[0]) + grid.resolution * columns
+    y = (grid.anchor[1] - middle[1]) + grid.resolution * lines
+    ny, nx = terrain.elevation.shape
+    column = (cosine * x + sine * y) / step + 0.5 * (nx - 1)
+    row = (cosine * y - sine * x) / step + 0.5 * (ny - 1)
+    return _bracket(row, ny), _bracket(column, nx)
 
-    def interpolate(self, layer: Floats) -> Floats:
-        """Interpolate bilinearly; NaN where a cell that counts is not known."""
-        found = np.zeros(self.rows.first.shape)
-        for row, up in self.rows.shares:
-            for column, along in self.columns.shares:
-                share = up * along
+
+def _bracket(place: Floats, count: int) -> Bracket:
+    """Return the cells around fractional indices, of `count` cells."""
+    whole = np.rint(place)
+    place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
+    inside = (place >= 0.0) & (place <= count - 1)
+    first = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
+    return first, np.minimum(first + 1, count - 1), place - first, inside
+
+
+def _sample(layer: Floats, rows: Bracket, columns: Bracket, *, nearest: bool) -> Floats:
+    """Return the values of the nearest cells, or interpolated ones.
+
+    NaN where a cell that counts is not known, and off the map.
+    """
+    (below, above, up, on_rows), (left, right, along, on_columns) = rows, columns
+    if nearest:
+        found = layer[np.where(up < 0.5, below, above), np.where(along < 0.5, left, right)]
+    else:
+        found = np.zeros(below.shape)
+        for row, of_row in ((below, 1.0 - up), (above, up)):
+            for column, of_column in ((left, 1.0 - along), (right, along)):
+                share = of_row * of_column
                 found += np.where(share == 0.0, 0.0, share * layer[row, column])
-        return np.where(self.inside, found, np.nan)
-
-    def nearest(self, layer: Floats) -> Floats:
-        """Return the values of the nearest cells."""
-        return np.where(self.inside, layer[self.rows.nearest, self.columns.nearest], np.nan)
+    return np.where(on_rows & on_columns, found, np.nan)

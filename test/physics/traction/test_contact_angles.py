@@ -11,10 +11,8 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import (
-    SLOPE_DEVIATION,
     Motion,
     MotionContactEstimator,
-    level_estimate,
 )
 from rover_physics.traction.map_contacts import MapContactFinder
 from support.reference_drives import drive_ground
@@ -40,29 +38,27 @@ def rms(errors):
     return float(np.sqrt(np.mean(errors[150:] ** 2)))
 
 
-@pytest.mark.parametrize("slope", [(0.3, 0.0), (-0.3, 0.0), (0.1, 0.25)])
-@pytest.mark.parametrize("rover", [LSR1, load_rover("m2020")], ids=lambda rover: rover.name)
+@pytest.mark.parametrize(
+    ("rover", "slope"), [(LSR1, (0.1, 0.25)), (load_rover("m2020"), (-0.3, 0.0))]
+)
 def test_on_an_even_slope_the_angles_are_known_at_rest_and_in_motion(rover, slope):
     prediction, motions, duration = drive_states(rover, plane(*slope, half=4.0))
     still = replace(motions[0], wheel_rates=np.zeros(6), body_rates=np.zeros(3))
     estimate = MotionContactEstimator(rover).update(still, 0.02)
     assert estimate.angles == pytest.approx(prediction.contact_angle[0], abs=0.01)
-    if rover is LSR1:
-        angles, _ = follow(rover, motions, duration)
-        assert np.abs(angles - prediction.contact_angle)[400:].max() < 0.01
+    angles, _ = follow(rover, motions, duration)
+    assert np.abs(angles - prediction.contact_angle)[400:].max() < 0.01
 
 
 @pytest.mark.parametrize(
-    ("ground", "share"),
+    ("rover", "ground", "share"),
     [
-        (drive_ground("slope", 20.0), 0.15),
-        (drive_ground("step", 0.08), 0.6),
-        (fractal(1), 0.45),
-        (rocky(1), 0.45),
+        (LSR1, drive_ground("slope", 20.0), 0.15),
+        (LSR1, drive_ground("step", 0.08), 0.6),
+        (turned_round(LSR1), rocky(1), 0.45),
     ],
-    ids=["slope", "step", "fractal", "rocky"],
+    ids=["slope", "step", "rocky, backwards"],
 )
-@pytest.mark.parametrize("rover", [LSR1, turned_round(LSR1)], ids=lambda rover: rover.name)
 def test_motion_tells_the_angles_where_zero_is_far_off(rover, ground, share):
     prediction, motions, duration = drive_states(rover, ground)
     angles, deviations = follow(rover, motions, duration)
@@ -94,12 +90,6 @@ def test_at_rest_nothing_is_learnt_or_forgotten():
     rested = estimator.update(still, 100.0)
     assert np.array_equal(rested.angles, moved.angles)
     assert np.array_equal(rested.covariance, moved.covariance)
-
-
-def test_without_a_source_the_angles_are_zero_and_as_uncertain_as_ground_is():
-    estimate = level_estimate()
-    assert estimate.source == "zero" and not estimate.angles.any()
-    assert np.diag(estimate.covariance) == pytest.approx(np.full(6, SLOPE_DEVIATION**2))
 
 
 def test_at_the_foot_of_a_face_it_is_the_face_that_counts():

@@ -26,7 +26,7 @@ def test_the_planner_calls_the_step_passable_but_not_with_equal_torques():
     assert set(classes) == {"passable", "passable with speed servos"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("controller", "passes"), [(EQUAL_TORQUES, False), (BY_MAP, True)])
 def test_in_mujoco_the_step_is_passed_with_the_program_and_not_with_equal_torques(
     controller, passes

@@ -95,7 +95,7 @@ def test_the_rolling_motion_is_that_of_the_curve():
     assert rolling.directions.tolist() == [1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
 
 
-@pytest.mark.parametrize("drift", [0.0, 0.05, -0.05])
+@pytest.mark.parametrize("drift", [0.0, 0.05])
 def test_the_map_tells_the_contact_angles_whatever_height_odometry_says(drift):
     errors = []
     for seed, curvature in enumerate(CURVATURES):

@@ -17,7 +17,7 @@ from rover_planner.worlds.maps.blind_ground import (
     SeenGround,
     seen_ground,
 )
-from rover_planner.worlds.maps.sources import FOOTPRINT, CellSources
+from rover_planner.worlds.maps.layers import FOOTPRINT, CellSources
 
 LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])
@@ -32,12 +32,6 @@ def with_holes(x_low, x_high, value=np.nan):
     x = -2.0 + 0.05 * np.arange(161)
     elevation[:, (x >= x_low) & (x < x_high)] = value
     return Terrain(elevation, 0.05, (-2.0, -2.0))
-
-
-def test_on_seen_ground_nothing_is_blind():
-    share = seen_ground(ground(), None).share(LSR1, PATH)
-    assert share.blind_share == 0.0 and share.first == -1
-    assert share.first_refused(REFUSE) == -1
 
 
 def test_the_share_is_that_of_the_cells_under_the_belly():

@@ -29,7 +29,7 @@ def test_a_cell_of_any_layer_that_differs_is_found(layer, value):
     assert np.argwhere(back).tolist() == [[8, 3]]
 
 
-@pytest.mark.parametrize("shift", [(2, -3), (0, 4), (-5, 0), (40, 0)])
+@pytest.mark.parametrize("shift", [(2, -3), (40, 0)])
 def test_in_a_window_that_moved_only_new_cells_and_the_edge_differ(shift):
     whole = np.random.default_rng(1).standard_normal((60, 60))
     old = Terrain(whole[20:32, 20:35], 0.1, (0.0, 0.0))

@@ -5,8 +5,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
@@ -16,15 +17,22 @@ from rover_planner.planning.answering.service_settings import (
 )
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
+from rover_planner.worlds.maps.ground_beneath import Standing
 from rover_planner.worlds.maps.map_keeper import MERGE, MapKeeper
 from support.grounds import make_terrain, waves
-from support.messages.standing import standing_of
 
 CAMERA = {"sensor_field_of_view": math.radians(60.0), "sensor_least_range": 0.5}
 """A camera that sees 60 degrees ahead, from 0.5 m on."""
 START, GOAL = (-2.0, 0.0, 0.0), (0.5, 0.2, 0.0)
 MARGIN = 0.2
 """Margin of the start footprint that reaches from the wheels to where the camera sees [m]."""
+
+
+def standing_of(state):
+    """Return pose and suspension of a plant's state."""
+    roll, pitch, yaw = rpy_from_xyzw(tuple(state.orientation.tolist()))
+    suspension = {name: state.joint_positions[name] for name in SUSPENSION_JOINTS}
+    return Standing(*state.position.tolist(), roll, pitch, yaw, suspension)
 
 
 class Drive:
@@ -55,9 +63,8 @@ class Drive:
         return ""
 
 
-@pytest.mark.parametrize("ground", [waves, lambda x, y: 0.08 * x + 0.03 * y])
-def test_the_first_drive_is_accepted_and_reaches_its_goal(ground):
-    drive = Drive(make_terrain(ground), footprint_margin=MARGIN)
+def test_the_first_drive_is_accepted_and_reaches_its_goal():
+    drive = Drive(make_terrain(waves), footprint_margin=MARGIN)
     drive.look()
     first = drive.service.answer(START, GOAL)
     assert first.traversable, first.reason
