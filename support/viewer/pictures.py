@@ -14,7 +14,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.reasons.explanation import explain
+from rover_planner.viewer.state.reasons.failure import explain
 from rover_planner.viewer.state.scenario import Pose
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain

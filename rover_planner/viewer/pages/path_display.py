@@ -15,9 +15,8 @@ from rover_planner.viewer.panel.reasons.failure_notice import describe_failure
 from rover_planner.viewer.panel.tabs.drive_tab import DriveTab
 from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.state.playback import Playback
-from rover_planner.viewer.state.reasons.explanation import Explanation, explain
-from rover_planner.viewer.state.reasons.path_limits import along_rows
-from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.reasons.failure import Explanation, explain
+from rover_planner.viewer.state.reasons.path_limits import find_worst
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.trajectory import MAX_VALUE, RoverState, Trajectory
 
@@ -96,7 +95,7 @@ class PathDisplay:
         rover, trajectory, why = self._session.rover, self._session.shown.trajectory, self.why
         old = None if before is None else _curves(before)
         failure_at = None if why is None else why.failure_at
-        now = _curves(trajectory) if why is None else _curves_between(trajectory, why)
+        now = _curves(trajectory) if why is None else _curves_between(why)
         limit = None if why is None else why.limits.lane("friction").limit.bound
         on_servos = why is not None and limit is None
         self._plots.set_curves(rover, now, old, failure_at, math.inf if on_servos else limit)
@@ -185,13 +184,13 @@ class PathDisplay:
         return BoardNotes(has_slip, worst, self.why.failing_link)
 
 
-def _curves_between(trajectory: Trajectory, why: Explanation) -> Curves:
+def _curves_between(why: Explanation) -> Curves:
     """Return the curves of the plots with the poses between waypoints, while the rover stands."""
-    rows, prediction = why.limits.rows, trajectory.prediction
-    lost = np.flatnonzero(along_rows(rows, prediction, "settled") == 0)
+    rows = why.limits.rows
+    lost = np.flatnonzero(~rows.prediction.settled)
     stands = slice(int(lost[0]) if lost.size else len(rows.distance))
     values = {
-        name: np.nan_to_num(along_rows(rows, prediction, name)[stands], posinf=MAX_VALUE)
+        name: np.nan_to_num(getattr(rows.prediction, name)[stands], posinf=MAX_VALUE)
         for name in PLOTS
     }
     return Curves(rows.distance[stands], values)

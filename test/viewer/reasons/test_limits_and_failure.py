@@ -17,9 +17,8 @@ from rover_planner.viewer.state.reasons.before_after import (
     list_changes,
 )
 from rover_planner.viewer.state.reasons.candidate_rows import list_candidates, place_numbers
-from rover_planner.viewer.state.reasons.explanation import explain
-from rover_planner.viewer.state.reasons.path_limits import Use
-from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.reasons.failure import explain
+from rover_planner.viewer.state.reasons.path_limits import find_worst
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on
@@ -65,8 +64,8 @@ def test_rows_are_in_the_order_of_the_path_with_the_poses_between_in_their_place
 def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(height, policy):
     _, verdict, why = why_on(height, policy=policy, friction=0.5)
     limits, failure = why.limits, why.failure
-    broken = np.any([lane.use == Use.BROKEN for lane in limits.lanes], axis=0)
-    refused = set(np.unique(limits.rows.waypoint[broken]).tolist())
+    broken = np.any([lane.used > 1.0 for lane in limits.lanes], axis=0)
+    refused = set(np.unique(limits.rows.prediction.waypoint[broken]).tolist())
     first = verdict.first_failure
     assert refused == ({first} if first >= 0 else set())
     assert (failure is None) == verdict.traversable
@@ -76,11 +75,8 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
         assert failure.is_settled == (failure.code != "unknown_ground")
 
 
-def test_a_limit_is_used_by_its_share_and_fully_where_it_is_broken():
+def test_a_limit_is_used_by_its_share():
     _, _, why = why_on(wall_at(0.5))
-    for lane in why.limits.lanes:
-        used = lane.used[(lane.use == Use.KEPT) & ~np.isnan(lane.used)]
-        assert (used <= 1.0 + 1e-6).all(), lane.limit.title
     friction = why.limits.lane("friction")
     known = ~np.isnan(friction.values)
     np.testing.assert_allclose(friction.used[known], friction.values[known] / friction.limit.bound)
@@ -109,7 +105,7 @@ def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
     assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
     row = verdict.first_failure
     assert failure.distance == pytest.approx(prediction.distance[row], abs=0.021)
-    assert why.failure_at == failure.distance <= why.limits.path_length
+    assert why.failure_at == failure.distance
     assert why.limits.end >= failure.distance
 
 

@@ -31,8 +31,8 @@ from rover_planner.viewer.state.colours import (
 from rover_planner.viewer.state.layers import LAYERS, predict_layer
 from rover_planner.viewer.state.reasons.before_after import Difference
 from rover_planner.viewer.state.reasons.candidate_rows import list_candidates
-from rover_planner.viewer.state.reasons.explanation import explain
-from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.reasons.failure import explain
+from rover_planner.viewer.state.reasons.path_limits import find_worst
 from rover_planner.viewer.state.survey_layers import list_class_colours, list_limit_colours
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on
