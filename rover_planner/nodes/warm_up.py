@@ -26,8 +26,9 @@ HAZARDS = (Step("classes of poses", "rover_planner.nodes.warm_up:classify_pose")
 """All that the hazard map needs."""
 TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
 """All that updates of the traction controller need."""
-GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES), WAYS, HAZARDS)
-"""All kernels; groups have hardly any in common."""
+GROUPS = ((*EXACT, *SCORES, *HAZARDS, *WAYS), (*UNCERTAIN, *TRACTION, *CANDIDATES))
+"""All kernels in two groups that take about the same time to compile: the first compiles the model
+of a pose once for all that use it."""
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 

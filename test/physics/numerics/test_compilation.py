@@ -33,7 +33,7 @@ def second():
 
 def endless():
     from rover_physics.numerics.kernel_cache import KernelMissingError
-    if "compile_worker" not in sys.argv[0]:
+    if "compilation" not in sys.argv[0]:
         raise KernelMissingError
     Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
     while True:

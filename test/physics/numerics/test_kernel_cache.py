@@ -44,7 +44,7 @@ class SmallPackage:
         self.home.mkdir()
         numerics = self.package / "numerics"
         numerics.mkdir(parents=True)
-        for name in ("kernels.py", "kernel_cache.py", "kernel_compiler.py"):
+        for name in ("kernels.py", "kernel_cache.py"):
             shutil.copy(Path(rover_physics.numerics.__file__).parent / name, numerics)
         for name, text in (("__init__", ""), ("callee", CALLEE), ("caller", CALLER)):
             (self.package / f"{name}.py").write_text(text)
