@@ -26,7 +26,7 @@ import rover_physics
 from rover_physics.numerics.kernel_cache import KernelMissingError, can_save_kernels, loading_only
 
 NICENESS = 19
-"""How far a process gives way to others if nobody waits for what it compiles: the farthest."""
+"""Niceness of a process if nobody waits for what it compiles: the largest."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Step:
     """Kernels that belong together, and how to get them."""
 
     name: str
-    """What is compiled, for people."""
+    """Name of the kernels, for people."""
     function: str
     """MODULE:NAME of a function without arguments that calls the kernels once."""
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bounds on the prediction at a pose on uncertain ground, and their parallel sweep over poses."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -74,18 +73,6 @@ BOUNDS_WORK = record_type(
 """Work space of one thread."""
 
 
-@dataclass(frozen=True, eq=False)
-class UncertainGround:
-    """A terrain whose heights are known within bounds."""
-
-    low: Ground
-    """The lowest ground."""
-    high: Ground
-    """The highest ground."""
-    error: Ground
-    """Its elevation is the largest error of each height [m]."""
-
-
 def new_bounds(n: int) -> Any:
     """Return BOUNDS (n,), all NaN with status 0."""
     blank = new_record(BOUNDS)
@@ -96,7 +83,7 @@ def new_bounds(n: int) -> Any:
 
 def find_bounds(
     model: PackedModel,
-    ground: UncertainGround,
+    grounds: tuple[Ground, Ground, Ground],
     poses: np.ndarray,
     motions: np.ndarray,
     nominal: np.ndarray,
@@ -105,7 +92,8 @@ def find_bounds(
 
     Args:
         model: The model on the nominal ground.
-        ground: The bounds of the ground.
+        grounds: The lowest and the highest ground, and one whose elevation is the largest error of
+            each height [m].
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         motions: (n, 3) their motions, as for `evaluate`; the wheels are steered along them.
         nominal: (n,) NOMINAL, the prediction on the nominal ground.
@@ -114,7 +102,7 @@ def find_bounds(
     works = np.zeros(min(MAX_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
     for name in ("held_height", "held_angle"):
         works["rover"]["contacts"][name] = np.nan
-    uncertain = shared_array_of(_pack_uncertain(model, ground))
+    uncertain = shared_array_of(_pack_uncertain(model, *grounds))
     with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
             places = (view_read_only(one[part]) for one in (poses, motions, nominal))
@@ -123,13 +111,12 @@ def find_bounds(
     return bounds
 
 
-def _pack_uncertain(model: PackedModel, ground: UncertainGround) -> Any:
+def _pack_uncertain(model: PackedModel, low: Ground, high: Ground, error: Ground) -> Any:
     """Return the UNCERTAIN of a model; it is valid as long as the grounds live."""
-    uncertain = new_record(UNCERTAIN, error=ground.error.records[0])
-    for name, surface in (("nominal", None), ("low", ground.low), ("high", ground.high)):
+    uncertain = new_record(UNCERTAIN, nominal=model.record, error=error.records[0])
+    for name, ground in (("low", low), ("high", high)):
         uncertain[name] = model.record
-        if surface is not None:
-            uncertain[name]["ground"] = surface.records[0]
+        uncertain[name]["ground"] = ground.records[0]
     return uncertain
 
 

@@ -147,10 +147,10 @@ def _may_change_level(uncertain, work):
         along, reach = _find_moves(linkage, work, wheel)
         spread.reach[wheel] = reach
         ahead, arm = _find_arm(linkage, wheel, placement)
-        for way in range(2):
-            surface = uncertain.high if way == 0 else uncertain.low
-            sign = 1.0 - 2.0 * way
-            margin = spread.high[wheel] if way == 0 else -spread.low[wheel]
+        for falls in range(2):
+            surface = uncertain.low if falls else uncertain.high
+            sign = 1.0 - 2.0 * falls
+            margin = -spread.low[wheel] if falls else spread.high[wheel]
             for side in range(2):
                 shift = reach * (1.0 - 2.0 * side)
                 rise = sign * _rise_at(surface, rover, wheel, shift)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far the ground intrudes into a wheel: the record of a search, and its elements.
+"""Intrusion of the ground into a wheel: begin of a search, and its elements.
 
 Lengths are in cells here. A point of the ground is at s along the wheel's heading and t to the
 left of its centre. The lower side of the cylinder is the surface tan(camber) t - sqrt(R^2 - s^2) /

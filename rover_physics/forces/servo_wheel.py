@@ -24,8 +24,8 @@ SLIP_PRECISION = 1e-9
 T, S, D = range(3)
 """Forces of a wheel: traction, lateral force, and the difference of the two points' tractions."""
 ALONG, ACROSS, SPIN, GRIP = range(4)
-"""What they depend on: velocity of the contact along and across the wheel, half the difference of
-the two points' velocities, and mu N."""
+"""Inputs of these forces: velocity of the contact along and across the wheel, half the difference
+of the two points' velocities, and mu N."""
 
 
 @kernel

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits.table import MODERATE_SINKAGE
 from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import SOIL_NUMBERS
 from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, load_soils, soil_named
@@ -168,12 +167,6 @@ def effective_friction(soil, wheel, N):
 
 
 @kernel
-def is_sinkage_moderate(sinkage, radius):
-    """Return whether the sinkage formula is valid: z0 <= D / 6. Arguments in [m]."""
-    return sinkage <= MODERATE_SINKAGE * 2.0 * radius
-
-
-@kernel
 def _own_friction(soil, mu):
     """Return the Coulomb coefficient of a soil, or `mu` if it has none."""
     own = soil[SOIL_FRICTION]
@@ -209,21 +202,6 @@ def contact_length(radius, sinkage):
 def shear_strength(soil, area, N):
     """Return the shear force [N] of a fully mobilised contact (Mohr-Coulomb), A c + N tan(phi)."""
     return area * soil[COHESION] + N * soil[TAN_PHI]
-
-
-@kernel
-def thrust_at_slip(soil, radius, width, N, slip):
-    """Return the thrust F [N] at a slip ratio, drawbar pull plus motion resistance.
-
-    F = (A c + N tan(phi)) (1 - K / (i l) (1 - exp(-i l / K))), negative for braking. It is 0 for a
-    wheel sunk to its axle.
-    """
-    sinkage = find_sinkage(soil, radius, width, N)
-    if sinkage >= radius:
-        return 0.0
-    length = contact_length(radius, sinkage)
-    share = mobilised_share(abs(slip) * length / soil[SHEAR_MODULUS])
-    return np.copysign(share * shear_strength(soil, width * length, N), slip)
 
 
 @kernel

@@ -9,7 +9,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
-from rover_physics.warm_up import EXACT, SCORES, UNCERTAIN
+from rover_physics.warm_up import EXACT, SCORES, SINGLE, UNCERTAIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_query import PathQueryOptions
@@ -26,7 +26,7 @@ HAZARDS = (Step("classes of poses", "rover_planner.nodes.warm_up:classify_pose")
 """All that the hazard map needs."""
 TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
 """All that updates of the traction controller need."""
-GROUPS = ((*EXACT, *SCORES, *HAZARDS, *WAYS), (*UNCERTAIN, *TRACTION, *CANDIDATES))
+GROUPS = ((*EXACT, *SCORES, *SINGLE, *HAZARDS, *WAYS), (*UNCERTAIN, *TRACTION, *CANDIDATES))
 """All kernels in two groups that take about the same time to compile: the first compiles the model
 of a pose once for all that use it."""
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from rover_physics.errors import ModelError
-from rover_physics.forces.servo import CREEP, write_residual
+from rover_physics.forces.servo_balance import CREEP, write_residual
 from rover_physics.forces.soil import pack_soils, thrust_at_slip
 from rover_physics.prediction.evaluation import evaluate_pose, new_works, set_pose
 from rover_physics.prediction.map_sweep import score_poses

@@ -7,7 +7,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from rover_physics.forces.servo_record import SERVO
+from rover_physics.forces.servo_motion import SERVO
 from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import D, S, T, roll_wheel
 from rover_physics.forces.soil import (

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rover_physics.errors import TerrainError
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
-from rover_physics.terrain.presets import terrain_presets
+from rover_physics.terrain.terrain_file import terrain_presets
 
 
 def plane(ny=6, nx=8, resolution=0.5, origin=(-1.0, 2.0), a=0.1, b=-0.2, c=0.3):
