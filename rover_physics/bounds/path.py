@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.forces import MAX_SOILS
-from rover_physics.bounds.kernel import NOMINAL, find_bounds
+from rover_physics.bounds.kernel import BOUNDS, NOMINAL, find_bounds
 from rover_physics.errors import ModelError
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.arrays import Floats
@@ -27,18 +27,7 @@ from rover_physics.terrain.ground import Ground, pack_ground
 
 SIGMAS = 3.0
 """Default number of standard deviations by which the map's heights may be wrong."""
-BOUNDED_VALUES = (
-    "roll",
-    "pitch",
-    "rocker_angle",
-    "bogie_angle",
-    "belly_clearance",
-    "tip_over_ratio",
-    "wheel_loads",
-    "friction_utilisation",
-    "torque_saturation",
-    "sinkage",
-)
+BOUNDED_VALUES = tuple(name for name in BOUNDS.names or () if name != "status")
 """Names of the bounded values in `PathPrediction` and `PathBounds`."""
 
 

@@ -7,7 +7,7 @@ with Janosi and Hanamoto's shear relation. docs/soil.md has the formulas, symbol
 Source: Wong, Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 2.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import SOIL_NUMBERS
-from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, load_soils, soil_named
+from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, soil_named
 
 SOIL_MODEL, SOIL_FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(
     SOIL_NUMBERS
@@ -29,19 +29,13 @@ MAX_NEWTON_STEPS = 50
 """Largest number of Newton steps of `find_mobilisation`."""
 
 
-def pack_soils(
-    names: Sequence[str] = (),
-    *,
-    default: str | None = None,
-    soils: Mapping[str, Soil] | None = None,
-) -> NDArray[np.float64]:
-    """Return a table of soils for the kernels.
+def pack_soils(names: Sequence[str] = (), default: str | None = None) -> NDArray[np.float64]:
+    """Return a table of preset soils for the kernels.
 
     Args:
         names: Soils of a terrain's soil layer, ``terrain.soil_names``.
         default: Soil where the layer is -1, or everywhere without a layer (default: Coulomb
             friction with the coefficient of the terrain or the rover).
-        soils: Soils by name (default: the presets).
 
     Returns:
         Table (1 + number of names, SOIL_NUMBERS): row 0 is the default, row 1 + k is
@@ -50,12 +44,11 @@ def pack_soils(
     Raises:
         SoilError: A name that is not among the soils.
     """
-    known = load_soils() if soils is None and (names or default is not None) else soils
     table = np.zeros((1 + len(names), SOIL_NUMBERS))
     table[:, SOIL_FRICTION] = np.nan
     for row, name in enumerate((default, *names)):
         if name is not None:
-            _write_soil(soil_named(name, known), table[row])
+            _write_soil(soil_named(name), table[row])
     return table
 
 
