@@ -14,7 +14,7 @@ RIMS = 3
 """Scanned circles: both rims and the middle one."""
 WHEEL_SAMPLES = record_type(
     ("radius", float),  # wheel radius [m]
-    ("reach", float),  # largest horizontal distance of a sample from the wheel's centre [m]
+    ("extent", float),  # largest horizontal distance of a sample from the wheel's centre [m]
     ("rows", np.int64),  # number k of contact angles
     ("circles", np.int64),  # number m of circles
     ("sines", float, (MAX_ANGLES,)),  # (k,) sines of the contact angles, ascending
@@ -39,7 +39,7 @@ def sample_wheel(rover: Rover, resolution: float) -> Any:
     samples = new_record(
         WHEEL_SAMPLES,
         radius=wheel.radius,
-        reach=np.hypot(wheel.radius, 0.5 * wheel.width),
+        extent=np.hypot(wheel.radius, 0.5 * wheel.width),
         rows=angles.size,
         circles=2 * half_laterals + 1,
         half_width=0.5 * wheel.width,

@@ -92,8 +92,8 @@ def _slip_of_pull(pull, wide, spin):
     """Return the root s of f(s + spin) + f(s - spin) = pull, -2 < pull < 2, f = `_share`."""
     share = 0.5 * pull
     middle = wide * share / np.sqrt(1.0 - share * share)
-    reach = abs(spin)
-    return _find_root((1.0, 0.0, pull), (middle - reach, middle + reach, middle), wide, spin)
+    away = abs(spin)
+    return _find_root((1.0, 0.0, pull), (middle - away, middle + away, middle), wide, spin)
 
 
 @kernel

@@ -171,13 +171,13 @@ def known_max_of_block(ground, bi, bj):
 
 
 @kernel
-def find_block_max(ground, gx, gy, reach_x, reach_y):
-    """Return the highest elevation [m] in a box around (gx, gy), whose reach is also in cells.
+def find_block_max(ground, gx, gy, half_x, half_y):
+    """Return the highest elevation [m] in a box around (gx, gy); half sides are in cells, too.
 
     It is infinite if the box contains unknown ground or leaves the map. The search takes whole
     blocks, so it covers slightly more than the box.
     """
-    low_x, high_x, low_y, high_y = gx - reach_x, gx + reach_x, gy - reach_y, gy + reach_y
+    low_x, high_x, low_y, high_y = gx - half_x, gx + half_x, gy - half_y, gy + half_y
     if not (
         low_x >= 0.0 and low_y >= 0.0 and high_x < ground.columns - 1 and high_y < ground.rows - 1
     ):
