@@ -65,9 +65,8 @@ def bound_contacts(uncertain, work, nominal):
         for i in range(3):
             lateral += axis[wheel, i] * (points[wheel, i] - placement.centres[wheel, i])
         angle = angles[wheel]
-        contact_bounds.angle[wheel] = contact_bounds.angle_low[wheel] = contact_bounds.angle_high[
-            wheel
-        ] = angle
+        contact_bounds.angle[wheel] = angle
+        contact_bounds.angle_low[wheel] = contact_bounds.angle_high[wheel] = angle
         contact_bounds.lateral[wheel] = lateral
         contact_bounds.lateral_low[wheel] = contact_bounds.lateral_high[wheel] = lateral
         rim.shift = shift[wheel]

@@ -87,9 +87,8 @@ def bound_forces(model, work):
     _fill_box(work.spread, work.contact_bounds, box)
     place(model.linkage, rover.pose, work.spread.q, rover.placement)
     _find_grounds(model, rover.placement, work.contact_bounds, box)
-    box.columns = (
-        1 if settings.policy == TorquePolicy.EQUAL or settings.on_soil else 1 + FREE_FORCES
-    )
+    equal = settings.policy == TorquePolicy.EQUAL or settings.on_soil
+    box.columns = 1 if equal else 1 + FREE_FORCES
     if not _choose_torques(model, work):
         return False
     for output in range(OUTPUT_COUNT):

@@ -191,14 +191,10 @@ def _write_wheel(model, wheel, box, result):
     """Write the bounds on load, sinkage, torque saturation and utilisation of a wheel."""
     ground, linkage, settings = model.ground, model.linkage, model.settings
     weight = linkage.mass * linkage.gravity
-    lightest, heaviest = (
-        weight * box.smallest[LOAD_OUTPUTS + wheel],
-        weight * box.largest[LOAD_OUTPUTS + wheel],
-    )
-    backward, forward = (
-        weight * box.smallest[PULL_OUTPUTS + wheel],
-        weight * box.largest[PULL_OUTPUTS + wheel],
-    )
+    lightest = weight * box.smallest[LOAD_OUTPUTS + wheel]
+    heaviest = weight * box.largest[LOAD_OUTPUTS + wheel]
+    backward = weight * box.smallest[PULL_OUTPUTS + wheel]
+    forward = weight * box.largest[PULL_OUTPUTS + wheel]
     most = max(abs(backward), abs(forward))
     least = min(abs(backward), abs(forward)) if backward * forward > 0.0 else 0.0
     result.wheel_loads[wheel, 0], result.wheel_loads[wheel, 1] = lightest, heaviest
@@ -220,9 +216,8 @@ def _write_wheel(model, wheel, box, result):
     result.friction_utilisation[wheel, 0] = 0.0
     if heaviest > 0.0:
         result.friction_utilisation[wheel, 0] = least / (box.mu_high[wheel] * heaviest)
-    result.friction_utilisation[wheel, 1] = (
-        box.largest[USE_OUTPUTS + wheel] if lightest > 0.0 else np.inf
-    )
+    largest = box.largest[USE_OUTPUTS + wheel]
+    result.friction_utilisation[wheel, 1] = largest if lightest > 0.0 else np.inf
 
 
 @kernel

@@ -119,11 +119,9 @@ def _find_heights(uncertain, work):
     if not _invert(spread.rates, rover.J, spread.lift):
         return BoundStatus.ON_EDGE
     write_gap_rates(linkage, placement, contacts, GroundSlope.SLOPED, spread.rates)
-    return (
-        BoundStatus.BOUNDED
-        if _invert(spread.rates, rover.J, spread.response)
-        else BoundStatus.ON_EDGE
-    )
+    if not _invert(spread.rates, rover.J, spread.response):
+        return BoundStatus.ON_EDGE
+    return BoundStatus.BOUNDED
 
 
 @kernel
@@ -240,11 +238,8 @@ def _find_contact_on(model, rover, wheel):
     contacts = rover.contacts
     outcome = find_contact(model, rover, wheel, SearchScope.QUICK)
     if outcome != ContactStatus.IN_CONTACT or contacts.gap[wheel] != contacts.gap[wheel]:
-        return (
-            BoundStatus.OFF_MAP_NEAR
-            if outcome == ContactStatus.OFF_MAP
-            else BoundStatus.UNKNOWN_NEAR
-        )
+        off_map = outcome == ContactStatus.OFF_MAP
+        return BoundStatus.OFF_MAP_NEAR if off_map else BoundStatus.UNKNOWN_NEAR
     find_contact(model, rover, wheel, SearchScope.FULL)
     return BoundStatus.BOUNDED
 

@@ -80,10 +80,8 @@ def _look_at_vertices(ground, search, tops):
     high_t = search.half_width + max(lean, 0.0)
     rear, front = tops
     tilt = abs(tangent) * (max(high_t, -low_t) + 1.0)
-    low_s, high_s = (
-        -_find_extent(search, rear, tilt, scale),
-        _find_extent(search, front, tilt, scale),
-    )
+    low_s = -_find_extent(search, rear, tilt, scale)
+    high_s = _find_extent(search, front, tilt, scale)
     if not low_s < high_s:
         return ContactStatus.IN_CONTACT
     # One cell more on all sides: edges extend beyond the footprint.

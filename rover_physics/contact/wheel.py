@@ -59,11 +59,11 @@ def find_contact(model, work, wheel, scope):
     elif scope == SearchScope.QUICK:
         contacts.kept[wheel] = 0
     if lost or (scope != SearchScope.NEAR and scope != SearchScope.FULL):
-        status = scan_rims(model, work, wheel, scope)
-        if contacts.noted_gap[wheel] == np.inf:
+        status, nearest = scan_rims(model, work, wheel, scope)
+        if nearest[0] == np.inf:
             contacts.gap[wheel] = np.nan
             return status
-        _take_sample(model.samples, contacts, wheel)
+        _take_sample(model.samples, contacts, wheel, nearest)
         if scope != SearchScope.COARSE:
             follow_contact(model, work, wheel)
     if scope == SearchScope.NEAR:
@@ -71,7 +71,7 @@ def find_contact(model, work, wheel, scope):
     if scope == SearchScope.FULL or scope == SearchScope.WHOLE:
         rear, front = find_tops(model, work, wheel)
         if scope == SearchScope.FULL and not (rear < np.inf and front < np.inf):
-            status = scan_carefully(model, work, wheel, scope)
+            status = scan_carefully(model, work, wheel, scope)[0]
         below = look_everywhere(model, work, wheel, (rear, front))
         if status == ContactStatus.IN_CONTACT:
             status = below
@@ -114,12 +114,11 @@ def _guess(model, work, wheel):
 
 
 @kernel
-def _take_sample(samples, contacts, wheel):
-    """Take the nearest sample as the contact."""
-    rim = contacts.noted_circle[wheel]
-    k = contacts.noted_row[wheel]
+def _take_sample(samples, contacts, wheel, nearest):
+    """Take the nearest sample, (gap, circle, row), as the contact."""
+    gap, rim, k = nearest
     contacts.across[wheel], contacts.inside[wheel] = (rim - 1) * samples.half_width, 0
-    contacts.gap[wheel] = contacts.noted_gap[wheel]
+    contacts.gap[wheel] = gap
     contacts.sine[wheel], contacts.cosine[wheel] = samples.sines[k], samples.cosines[k]
     contacts.slope[wheel, 0] = contacts.slope[wheel, 1] = 0.0
 

@@ -98,11 +98,8 @@ def _write_ground(servo, mu, wheel, result):
 
     The RESULT has load and forces of the wheel; `mu` is the Coulomb friction of its ground.
     """
-    N, traction, lateral = (
-        result.wheel_loads[wheel],
-        result.tangential[wheel],
-        result.lateral[wheel],
-    )
+    N, traction = result.wheel_loads[wheel], result.tangential[wheel]
+    lateral = result.lateral[wheel]
     result.sinkage[wheel] = result.motion_resistance[wheel] = 0.0
     result.friction[wheel] = mu
     result.friction_utilisation[wheel] = 0.0 if servo.speed_share > 0.0 else np.inf

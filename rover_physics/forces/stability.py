@@ -85,11 +85,9 @@ def measure_edge(corners, edge, centre, force, moment):
     `tip_over_angles`.
     """
     start, end = edge, (edge + 1) % corners.shape[0]
-    ax, ay, az = (
-        corners[end, 0] - corners[start, 0],
-        corners[end, 1] - corners[start, 1],
-        corners[end, 2] - corners[start, 2],
-    )
+    ax = corners[end, 0] - corners[start, 0]
+    ay = corners[end, 1] - corners[start, 1]
+    az = corners[end, 2] - corners[start, 2]
     length = np.sqrt(ax * ax + ay * ay + az * az)
     if not length > 0.0:
         return np.inf, np.inf
