@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.optimize import brentq
 
 from rover_physics.errors import ModelError
 from rover_physics.forces.servo_balance import CREEP, write_residual
@@ -21,7 +20,6 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import new_results
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.soil_file import load_soils
 from rover_physics.traversability.judge import judge_path, judge_poses
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
@@ -254,33 +252,6 @@ def test_energy_and_time_count_slip_and_droop(slope, soil):
 # Soil
 
 
-def evenly_loaded():
-    """Return lsr1 with the centre of mass where all wheels carry alike on level ground."""
-
-    def moved(ahead):
-        body = LSR1.masses.body
-        com = (body.com[0] + ahead, *body.com[1:])
-        return replace(LSR1, masses=replace(LSR1.masses, body=replace(body, com=com)))
-
-    def excess(ahead):
-        loads = judge_path(moved(ahead), LEVEL, POSE)[0].wheel_loads[0]
-        return loads[0] - loads[1]
-
-    return moved(brentq(excess, -0.1, 0.1, xtol=1e-12))
-
-
-@pytest.mark.parametrize("soil", SOFT)
-@pytest.mark.parametrize("backward", [False, True])
-def test_where_all_wheels_carry_alike_servos_are_equal_torques(soil, backward):
-    rover, options = evenly_loaded(), SweepOptions(soil=soil, backward=backward)
-    servo = judge_path(rover, LEVEL, POSE, replace(options, policy="servo"))[0]
-    equal = judge_path(rover, LEVEL, POSE, options)[0]
-    for name in ("wheel_loads", "torque", "slip_ratio", "sinkage", "motion_resistance"):
-        found, expected = getattr(servo, name), getattr(equal, name)
-        np.testing.assert_allclose(found, expected, rtol=1e-5, err_msg=name)
-    np.testing.assert_allclose(servo.friction_utilisation, 0.0, atol=1e-5)
-
-
 @few
 @given(soils, st.floats(-0.15, 0.25), st.floats(-0.1, 0.1))
 def test_each_wheel_obeys_soil_servo_and_speed(soil, slope, cross):
@@ -312,33 +283,6 @@ def test_a_rover_drives_where_its_wheels_can_pull_and_slides_where_they_cannot(s
     assume(abs(most - needed) > 0.05 * needed)
     assert (found.speed_share[0] > 0.0) == (most > needed)
     assert found.stalls[0] == 0.0
-
-
-def test_hard_soil_comes_to_coulomb_friction(monkeypatch):
-    soft, apart = load_soils()["lete_sand"], []
-
-    def sweep(**options):
-        ground = fractal(8, roughness=0.05)  # anew: a ground keeps the soils it was packed with
-        poses = random_poses(8, 30, 2.0)
-        return judge_poses(LSR1, ground, poses, np.zeros(30), replace(SERVO, **options))[0]
-
-    coulomb = sweep(friction=0.7)
-    for hardness in (1e2, 1e4, 1e6):
-        hard = replace(
-            soft, cohesion=1e-3, friction_angle=np.arctan(0.7), k_c=soft.k_c * hardness,
-            k_phi=soft.k_phi * hardness, shear_modulus=soft.shear_modulus / hardness,
-        )  # fmt: skip
-        monkeypatch.setattr("rover_physics.forces.soil.soil_named", lambda _, hard=hard: hard)
-        found = sweep(soil="x")
-        both = (found.speed_share > 0.0) & (coulomb.speed_share > 0.0)
-        assert both.sum() >= 20
-        torque, speed = (
-            np.abs(getattr(found, name) - getattr(coulomb, name))[both].mean()
-            for name in ("torque", "speed_share")
-        )
-        apart.append([torque, speed, found.sinkage[both].max()])
-    assert (np.diff(apart, axis=0) <= 1e-6).all()
-    assert (np.array(apart[-1]) < [0.02, 0.005, 1e-5]).all()
 
 
 def test_firm_patches_of_a_soil_layer_are_driven_as_coulomb_ground():
