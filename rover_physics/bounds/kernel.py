@@ -22,7 +22,7 @@ from rover_physics.forces.stability import CORNERS
 from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.numerics.records import new_record, record_type, shared_array_of
+from rover_physics.numerics.records import new_record, record_type
 from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
 from rover_physics.prediction.packed_model import PackedModel
@@ -102,7 +102,7 @@ def find_bounds(
     works = np.zeros(min(MAX_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
     for name in ("held_height", "held_angle"):
         works["rover"]["contacts"][name] = np.nan
-    uncertain = shared_array_of(_pack_uncertain(model, *grounds))
+    uncertain = _pack_uncertain(model, *grounds)
     with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
             places = (view_read_only(one[part]) for one in (poses, motions, nominal))
@@ -112,11 +112,11 @@ def find_bounds(
 
 
 def _pack_uncertain(model: PackedModel, low: Ground, high: Ground, error: Ground) -> Any:
-    """Return the UNCERTAIN of a model; it is valid as long as the grounds live."""
-    uncertain = new_record(UNCERTAIN, nominal=model.record, error=error.records[0])
-    for name, ground in (("low", low), ("high", high)):
-        uncertain[name] = model.record
-        uncertain[name]["ground"] = ground.records[0]
+    """Return the UNCERTAIN (1,) of a model; it is valid as long as the grounds live."""
+    uncertain = np.zeros(1, UNCERTAIN)
+    uncertain["nominal"] = uncertain["low"] = uncertain["high"] = model.record
+    uncertain["low"]["ground"], uncertain["high"]["ground"] = low.records, high.records
+    uncertain["error"] = error.records
     return uncertain
 
 
