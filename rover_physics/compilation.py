@@ -30,7 +30,7 @@ NICENESS = 19
 
 
 @dataclass(frozen=True)
-class Step:
+class CompilationStep:
     """Kernels that belong together, and how to get them."""
 
     name: str
@@ -64,7 +64,7 @@ class Compilation:
     block; the process then ends at once.
     """
 
-    def __init__(self, steps: Sequence[Step], niceness: int = 0):
+    def __init__(self, steps: Sequence[CompilationStep], niceness: int = 0):
         """Start nothing yet.
 
         Args:
@@ -105,7 +105,7 @@ class Compilation:
                 self._process.kill()
                 self._process.wait()
 
-    def _compile(self, steps: Sequence[Step], report: Callable[[str], None]) -> None:
+    def _compile(self, steps: Sequence[CompilationStep], report: Callable[[str], None]) -> None:
         """Compile steps in a process."""
         with self._lock:
             if self._closed:
@@ -118,7 +118,7 @@ class Compilation:
 
 
 def compile_groups(
-    groups: Sequence[Sequence[Step]], report: Callable[[str], None], processes: int
+    groups: Sequence[Sequence[CompilationStep]], report: Callable[[str], None], processes: int
 ) -> None:
     """Load the kernels of groups; compile what is missing, each group in a process of its own.
 
@@ -136,7 +136,7 @@ def compile_groups(
 class BackgroundCompilation:
     """Loads what is not needed yet, or compiles it in a process that gives way to all others."""
 
-    def __init__(self, steps: Sequence[Step], done: Callable[[Sequence[str]], None]):
+    def __init__(self, steps: Sequence[CompilationStep], done: Callable[[Sequence[str]], None]):
         """Start nothing yet.
 
         Args:

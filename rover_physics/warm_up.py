@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics.bounds.kernel import NOMINAL, find_bounds
-from rover_physics.compilation import Step, compile_groups
+from rover_physics.compilation import CompilationStep, compile_groups
 from rover_physics.prediction.evaluation import AHEAD, evaluate
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
@@ -24,16 +24,16 @@ from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 
 EXACT = (
-    Step("rover", "rover_physics.warm_up:pack_rover"),
-    Step("poses", "rover_physics.warm_up:evaluate_poses"),
-    Step("paths", "rover_physics.warm_up:judge_paths"),
+    CompilationStep("rover", "rover_physics.warm_up:pack_rover"),
+    CompilationStep("poses", "rover_physics.warm_up:evaluate_poses"),
+    CompilationStep("paths", "rover_physics.warm_up:judge_paths"),
 )
 """All that a question needs on a map whose heights are exact."""
-UNCERTAIN = (Step("uncertain heights", "rover_physics.warm_up:bound_poses"),)
+UNCERTAIN = (CompilationStep("uncertain heights", "rover_physics.warm_up:bound_poses"),)
 """All that a question needs besides on other maps."""
-SCORES = (Step("map scores", "rover_physics.warm_up:score_map"),)
+SCORES = (CompilationStep("map scores", "rover_physics.warm_up:score_map"),)
 """All that scores of single poses need."""
-SINGLE = (Step("single poses", "rover_physics.warm_up:evaluate_single_poses"),)
+SINGLE = (CompilationStep("single poses", "rover_physics.warm_up:evaluate_single_poses"),)
 """All that torque ranges and a rover with measured steering angles need."""
 
 

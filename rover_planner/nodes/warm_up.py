@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from rover_physics.compilation import Step
+from rover_physics.compilation import CompilationStep
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
@@ -18,13 +18,15 @@ from rover_planner.planning.ways.way_search import LatticeSettings, find_way
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
-CANDIDATES = (Step("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
+CANDIDATES = (CompilationStep("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
 """All that candidates of a question need."""
-WAYS = (Step("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
+WAYS = (CompilationStep("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
 """All that searches around obstacles need."""
-HAZARDS = (Step("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
+HAZARDS = (CompilationStep("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
 """All that the hazard map needs."""
-TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
+TRACTION = (
+    CompilationStep("traction controller", "rover_planner.nodes.warm_up:control_traction"),
+)
 """All that updates of the traction controller need."""
 GROUPS = ((*EXACT, *SCORES, *SINGLE, *HAZARDS, *WAYS), (*UNCERTAIN, *TRACTION, *CANDIDATES))
 """All kernels in two groups that take about the same time to compile: the first compiles the model

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import rover_physics
-from rover_physics.compilation import BackgroundCompilation, Step, compile_groups
+from rover_physics.compilation import BackgroundCompilation, CompilationStep, compile_groups
 from support.project.without_disk import fill_disk
 from support.waiting import wait_until_gone
 
@@ -39,18 +39,18 @@ def endless():
         time.sleep(0.01)
 """
 PROGRAM = """
-from rover_physics.compilation import Compilation, Step
+from rover_physics.compilation import Compilation, CompilationStep
 import some_kernels
 
-steps = [Step(name, f"some_kernels:{name}") for name in ("first", "second")]
+steps = [CompilationStep(name, f"some_kernels:{name}") for name in ("first", "second")]
 print(Compilation(steps).run(lambda name: print(name, end=" ")), end=" ")
 print(sum(some_kernels.twice.stats.cache_hits.values()))
 """
 PARENT = """
-from rover_physics.compilation import Compilation, Step
-Compilation([Step("endless", "some_kernels:endless")]).run(print)
+from rover_physics.compilation import Compilation, CompilationStep
+Compilation([CompilationStep("endless", "some_kernels:endless")]).run(print)
 """
-ENDLESS = Step("endless", "some_kernels:endless")
+ENDLESS = CompilationStep("endless", "some_kernels:endless")
 
 
 @pytest.fixture
@@ -128,8 +128,8 @@ def test_the_process_ends_with_its_parent(folder, how):
 
 def test_groups_are_compiled_by_several_processes_and_errors_are_raised(folder):
     names = []
-    steps = [Step(name, f"some_kernels:{name}") for name in ("first", "second")]
+    steps = [CompilationStep(name, f"some_kernels:{name}") for name in ("first", "second")]
     compile_groups([[step] for step in steps], names.append, 2)
     assert sorted(names) == ["first", "second"]
     with pytest.raises(AttributeError, match="third"):
-        compile_groups([[Step("third", "some_kernels:third")], steps], names.append, 2)
+        compile_groups([[CompilationStep("third", "some_kernels:third")], steps], names.append, 2)
